@@ -1,0 +1,149 @@
+//! `crumple histories`: the histories of a solver file as a table.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::file::write_whole;
+use crumple::history::{History, Side};
+use crumple::solver::{self, Problem, Selection, SolverFile, WantedId};
+use serde::Serialize;
+
+use super::output;
+use super::{CommandResult, Failure, Manners, Outcome};
+
+/// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple histories run/nodout --id 900001 --component x_displacement
+  crumple histories run/rcforc --id 3:surfa -o force.csv
+  crumple histories run/nodout -o nodout.h5")]
+pub struct Args {
+    /// File written by a solver
+    file: PathBuf,
+    /// Node, wall or interface to keep; 3:surfa keeps one side (default: all)
+    #[arg(long = "id")]
+    ids: Vec<WantedId>,
+    /// Component to keep, named as in binout, such as x_displacement (default: all)
+    #[arg(long = "component")]
+    components: Vec<String>,
+    /// Section to read; a text file has one, named like its format
+    #[arg(long)]
+    section: Option<String>,
+    /// Kind of the file (nodout, rcforc, …), if its content does not tell
+    #[arg(long)]
+    format: Option<String>,
+    /// Where to write: .csv, .h5 or .hdf5 (default: CSV on standard output)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    let some = |empty: bool| !empty;
+    let selection = Selection {
+        ids: some(args.ids.is_empty()).then(|| args.ids.clone()),
+        components: some(args.components.is_empty()).then(|| args.components.clone()),
+    };
+    let target = args.output.as_deref().map(Target::of).transpose()?;
+    let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
+    if let Some(section) = &args.section
+        && section != file.format
+    {
+        return Err(Failure::Usage(format!(
+            "{} has no section \"{section}\": it is a text file with the one section \"{}\"",
+            args.file.display(),
+            file.format
+        )));
+    }
+    for problem in &file.problems {
+        manners.warn(&format!("{}: {problem}", args.file.display()));
+    }
+    match (&args.output, target) {
+        (Some(path), Some(Target::Csv)) => {
+            let mut csv = Vec::new();
+            write_csv(&mut csv, &file)?;
+            write_whole(path, &csv)?;
+        }
+        (Some(path), Some(Target::Hdf5)) => {
+            write_whole(path, &crumple::database::histories_to_hdf5(&file)?)?;
+        }
+        _ if manners.json => {}
+        _ => output::print(|out| write_csv(out, &file))?,
+    }
+    if manners.json {
+        output::print_json(&document(args, &file))?;
+    }
+    Ok(if file.problems.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+enum Target {
+    Csv,
+    Hdf5,
+}
+
+impl Target {
+    fn of(path: &std::path::Path) -> Result<Self, Failure> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("h5" | "hdf5") => Ok(Self::Hdf5),
+            Some("csv") | None => Ok(Self::Csv),
+            Some(other) => Err(Failure::Usage(format!(
+                "cannot write \".{other}\": histories are written as .csv, .h5 or .hdf5"
+            ))),
+        }
+    }
+}
+
+/// A `time` column and one column per history, with enough digits to read back the same
+/// numbers.
+fn write_csv(out: &mut dyn Write, file: &SolverFile) -> io::Result<()> {
+    write!(out, "time")?;
+    for history in &file.histories {
+        write!(out, ",{}", history.label())?;
+    }
+    writeln!(out)?;
+    for (state, time) in file.time.iter().enumerate() {
+        write!(out, "{time:?}")?;
+        for history in &file.histories {
+            write!(out, ",{:?}", history.values[state])?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    path: String,
+    format: &'a str,
+    time: &'a [f64],
+    histories: Vec<Channel<'a>>,
+    problems: &'a [Problem],
+}
+
+#[derive(Serialize)]
+struct Channel<'a> {
+    label: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<i64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    side: Option<Side>,
+    component: &'a str,
+    /// JSON has no NaN: a value that the file does not hold is null.
+    values: &'a [f64],
+}
+
+fn document<'a>(args: &Args, file: &'a SolverFile) -> Document<'a> {
+    let channel = |h: &'a History| Channel {
+        label: h.label(),
+        id: h.entity.map(|e| e.id),
+        side: h.entity.and_then(|e| e.side),
+        component: &h.component,
+        values: &h.values,
+    };
+    Document {
+        path: args.file.display().to_string(),
+        format: file.format,
+        time: &file.time,
+        histories: file.histories.iter().map(channel).collect(),
+        problems: &file.problems,
+    }
+}

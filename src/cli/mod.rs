@@ -1,0 +1,129 @@
+//! The commands: one file each, with its arguments and a `run` that calls the library.
+
+mod inspect;
+mod histories;
+mod output;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything went well.
+const DONE: u8 = 0;
+/// The command could not do its work.
+const FAILED: u8 = 1;
+/// The command line makes no sense. clap uses the same code.
+const USAGE: u8 = 2;
+/// Done, but with damage or warnings, and `--strict` was given.
+const DONE_WITH_WARNINGS: u8 = 3;
+
+#[derive(Parser)]
+#[command(name = "crumple", version, about, propagate_version = true)]
+struct Cli {
+    #[command(flatten)]
+    manners: Manners,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options that every command takes.
+#[derive(clap::Args, Clone, Copy)]
+pub struct Manners {
+    /// Print one JSON document on standard output instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Print no progress and no warnings
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Exit with code 3 if there was damage or a warning
+    #[arg(long, global = true)]
+    pub strict: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Inspect(inspect::Args),
+    Histories(histories::Args),
+}
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    Clean,
+    /// Done, with damage in the input or warnings about the result.
+    Warned,
+    /// Part of the work could not be done; what could be done was.
+    Partly,
+}
+
+/// Why a command did not do its work.
+#[derive(Debug)]
+pub enum Failure {
+    /// The arguments do not fit together.
+    Usage(String),
+    Failed(Box<dyn Error>),
+}
+
+impl<E: Error + 'static> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Failed(Box::new(error))
+    }
+}
+
+pub type CommandResult = Result<Outcome, Failure>;
+
+impl Manners {
+    /// A warning on standard error.
+    pub fn warn(self, text: &str) {
+        if !self.quiet {
+            eprintln!("warning: {text}");
+        }
+    }
+
+    /// Something worth knowing on standard error.
+    pub fn note(self, text: &str) {
+        if !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+}
+
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let manners = cli.manners;
+    let result = match cli.command {
+        Command::Inspect(args) => inspect::run(&args, manners),
+        Command::Histories(args) => histories::run(&args, manners),
+    };
+    ExitCode::from(match result {
+        Ok(Outcome::Clean) => DONE,
+        Ok(Outcome::Warned) if manners.strict => DONE_WITH_WARNINGS,
+        Ok(Outcome::Warned) => DONE,
+        Ok(Outcome::Partly) => FAILED,
+        Err(Failure::Usage(message)) => {
+            eprintln!("error: {message}");
+            USAGE
+        }
+        Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
+        Err(Failure::Failed(error)) => {
+            print_chain(&*error);
+            FAILED
+        }
+    })
+}
+
+/// The error, then its causes; causes that the message already contains are left out.
+fn print_chain(error: &dyn Error) {
+    let mut shown = error.to_string();
+    eprintln!("error: {shown}");
+    let mut source = error.source();
+    while let Some(cause) = source {
+        let text = cause.to_string();
+        if !shown.contains(&text) {
+            eprintln!("  because: {text}");
+        }
+        shown = text;
+        source = cause.source();
+    }
+}

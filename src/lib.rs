@@ -1,0 +1,6 @@
+//! crumple
+pub mod history;
+pub mod file;
+pub mod solver;
+pub mod unit;
+pub mod database;

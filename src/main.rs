@@ -1,0 +1,7 @@
+//! The command line tool: arguments in, exit code out. See `cli`.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

@@ -1,0 +1,102 @@
+//! `glstat`: energies and other quantities of the whole model, one labelled line each.
+
+use std::io::{self, BufRead};
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, real};
+use crate::solver::problem::Place;
+use crate::solver::states::States;
+use crate::solver::{Selection, SolverFile};
+
+const STATE: &[u8] = b" dt of cycle";
+/// "label padded with dots to column 32, value columns 33–46".
+const LABEL: usize = 32;
+const VALUE: (usize, usize) = (33, 46);
+
+/// Labels whose component in binout is not the label with underscores.
+const NAMES: [(&str, &str); 3] = [
+    ("total energy / initial energy", "energy_ratio"),
+    ("energy ratio w/o eroded energy", "energy_ratio_wo_eroded"),
+    ("time per zone cycle.(nanosec)", "time_per_zone_cycle"),
+];
+
+pub fn signature(line: &[u8]) -> bool {
+    line.starts_with(STATE)
+}
+
+pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("glstat", input, selection, Glstat)
+}
+
+struct Glstat;
+
+impl Body for Glstat {
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        if line.text.starts_with(STATE) {
+            states.begin(None, line.into());
+            if !line.ended {
+                states.mark_damaged();
+            }
+            return;
+        }
+        let component = component(line.text);
+        if !line.ended && !line.is_blank() && (component.is_none() || line.text.len() < VALUE.1) {
+            states.damage(line, None, "the line is cut by the end of the file".into());
+            return;
+        }
+        let Some(component) = component else {
+            return; // Text between the labels: mass properties, warnings.
+        };
+        let value = line.columns(VALUE.0, VALUE.1);
+        if component != "time" {
+            states.scalar(&component, value, line, [VALUE.0, VALUE.1]);
+            return;
+        }
+        match real(value) {
+            Field::Real(time) if states.is_pending() && states.pending_time().is_none() => {
+                states.set_time(time);
+            }
+            // The line that opens a state is missing: its time opens it.
+            Field::Real(time) => states.begin(Some(time), line.into()),
+            _ => states.damage(line, Some([VALUE.0, VALUE.1]), "expected a time".into()),
+        }
+    }
+
+    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}
+
+/// The component a label names, as binout does; `None` if the line has no label.
+fn component(text: &[u8]) -> Option<String> {
+    let label = text.get(..LABEL)?;
+    if label.last() != Some(&b'.') || label[0] != b' ' {
+        return None;
+    }
+    let label = std::str::from_utf8(label).ok()?;
+    let label = label.trim_end_matches('.').trim();
+    let known = NAMES.iter().find(|(l, _)| *l == label);
+    known.map(|(_, name)| name.to_string()).or_else(|| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == ' ';
+        (!label.is_empty() && label.chars().all(plain))
+            .then(|| label.split_whitespace().collect::<Vec<_>>().join("_"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_become_binout_names() {
+        fn t(line: &str, expected: Option<&str>) {
+            assert_eq!(component(line.as_bytes()).as_deref(), expected, "{line:?}");
+        }
+        t(" kinetic energy.................   9.93442E-06", Some("kinetic_energy"));
+        t(" hourglass energy ..............   0.00000E+00", Some("hourglass_energy"));
+        t(" total energy / initial energy..   1.00000E+00", Some("energy_ratio"));
+        t(" energy ratio w/o eroded energy.   1.00000E+00", Some("energy_ratio_wo_eroded"));
+        t(" time per zone cycle.(nanosec)..             0", Some("time_per_zone_cycle"));
+        t(" number of shell elements that  ", None);
+        t("     total mass of body          = 1.24485715E-07", None);
+        t(" ************************************************************", None);
+    }
+}

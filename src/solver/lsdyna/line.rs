@@ -1,0 +1,248 @@
+//! Lines, columns and Fortran numbers: what all LS-DYNA ASCII files are made of.
+
+use std::io::{self, BufRead};
+
+/// Bytes kept of one line. The longest line of any known file has 170; what lies
+/// beyond is skipped, so that a file without line ends cannot fill the memory.
+const MAX_LINE: usize = 4096;
+
+/// One line without its line end.
+#[derive(Debug)]
+pub struct Line<'a> {
+    pub text: &'a [u8],
+    /// Counted from 1, as editors do.
+    pub number: u64,
+    /// Offset of the line's first byte in the file.
+    pub byte: u64,
+    /// Whether a line end follows; only the last line of a cut file has none.
+    pub ended: bool,
+    /// Whether bytes beyond [`MAX_LINE`] were skipped.
+    pub overlong: bool,
+}
+
+impl Line<'_> {
+    pub fn is_blank(&self) -> bool {
+        self.text.iter().all(u8::is_ascii_whitespace)
+    }
+
+    /// Columns `from..=to`, counted from 1, as far as the line reaches.
+    pub fn columns(&self, from: usize, to: usize) -> &[u8] {
+        let end = to.min(self.text.len());
+        self.text.get(from - 1..end).unwrap_or(&[])
+    }
+}
+
+/// Reads lines ended by LF or CRLF with a bounded buffer.
+pub struct Lines<R> {
+    input: R,
+    buffer: Vec<u8>,
+    number: u64,
+    byte: u64,
+}
+
+impl<R: BufRead> Lines<R> {
+    pub fn new(input: R) -> Self {
+        Self {
+            input,
+            buffer: Vec::with_capacity(256),
+            number: 0,
+            byte: 0,
+        }
+    }
+
+    /// Bytes read so far.
+    pub fn byte(&self) -> u64 {
+        self.byte
+    }
+
+    /// Number of the last line read, counted from 1.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The next line, or `None` at the end of the file.
+    pub fn next_line(&mut self) -> io::Result<Option<Line<'_>>> {
+        self.buffer.clear();
+        let start = self.byte;
+        let (mut ended, mut overlong) = (false, false);
+        loop {
+            let chunk = match self.input.fill_buf() {
+                Ok(chunk) => chunk,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+                Err(e) => return Err(e),
+            };
+            if chunk.is_empty() {
+                break;
+            }
+            let end = memchr::memchr(b'\n', chunk);
+            let taken = end.unwrap_or(chunk.len());
+            let room = MAX_LINE - self.buffer.len();
+            overlong |= taken > room;
+            self.buffer.extend_from_slice(&chunk[..taken.min(room)]);
+            let used = taken + usize::from(end.is_some());
+            self.input.consume(used);
+            self.byte += used as u64;
+            if end.is_some() {
+                ended = true;
+                break;
+            }
+        }
+        if self.byte == start {
+            return Ok(None);
+        }
+        if ended && self.buffer.last() == Some(&b'\r') {
+            self.buffer.pop();
+        }
+        self.number += 1;
+        Ok(Some(Line {
+            text: &self.buffer,
+            number: self.number,
+            byte: start,
+            ended,
+            overlong,
+        }))
+    }
+}
+
+/// What a numeric field holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Field {
+    /// The nearest double. A number too small for a double is the zero of its sign.
+    Real(f64),
+    /// Stars: the number did not fit its Fortran format.
+    Overflow,
+    /// `NaN` or `Infinity` as Fortran prints them, or a number too large for a double.
+    NotFinite(f64),
+    /// Anything else.
+    Bad,
+}
+
+/// Reads one Fortran real: the whole field, blanks around it allowed, nothing else.
+///
+/// Accepts what solvers write beyond C's syntax: `1.5D+00`, and exponents whose `E`
+/// was dropped to make room (`-1.5000-345`, `0.00+00`).
+pub fn real(field: &[u8]) -> Field {
+    let text = field.trim_ascii();
+    let plain = match text {
+        [] => return Field::Bad,
+        [b'0'..=b'9' | b'.' | b'-' | b'+', ..] => {
+            text.iter().all(|b| matches!(b, b'0'..=b'9' | b'.' | b'-' | b'+' | b'E' | b'e'))
+        }
+        _ => return named_value(text),
+    };
+    if plain && let Ok(value) = fast_float2::parse::<f64, _>(text) {
+        return finite(value);
+    }
+    fortran_real(text)
+}
+
+fn finite(value: f64) -> Field {
+    if value.is_finite() {
+        Field::Real(value)
+    } else {
+        Field::NotFinite(value)
+    }
+}
+
+/// Stars, `NaN`, `Infinity`.
+fn named_value(text: &[u8]) -> Field {
+    if text.iter().all(|&b| b == b'*') {
+        return Field::Overflow;
+    }
+    match text.to_ascii_lowercase().as_slice() {
+        b"nan" => Field::NotFinite(f64::NAN),
+        b"inf" | b"infinity" => Field::NotFinite(f64::INFINITY),
+        _ => Field::Bad,
+    }
+}
+
+/// Puts the exponent letter that C's syntax wants, then parses the whole field.
+fn fortran_real(text: &[u8]) -> Field {
+    let signless = &text[usize::from(matches!(text[0], b'+' | b'-'))..];
+    if matches!(signless.to_ascii_lowercase().as_slice(), b"inf" | b"infinity") {
+        return Field::NotFinite(if text[0] == b'-' { f64::NEG_INFINITY } else { f64::INFINITY });
+    }
+    let is_exponent = |b: u8| matches!(b, b'E' | b'e' | b'D' | b'd');
+    let mut repaired = Vec::with_capacity(text.len() + 1);
+    let mut seen_exponent = false;
+    for (i, &b) in text.iter().enumerate() {
+        match b {
+            b'0'..=b'9' | b'.' => repaired.push(b),
+            _ if is_exponent(b) && !seen_exponent => {
+                seen_exponent = true;
+                repaired.push(b'E');
+            }
+            b'+' | b'-' if i == 0 || is_exponent(text[i - 1]) => repaired.push(b),
+            b'+' | b'-' if !seen_exponent => {
+                seen_exponent = true;
+                repaired.extend([b'E', b]);
+            }
+            _ => return Field::Bad,
+        }
+    }
+    fast_float2::parse(&repaired).map_or(Field::Bad, finite)
+}
+
+/// Reads one integer: the whole field, blanks around it allowed.
+pub fn integer(field: &[u8]) -> Option<i64> {
+    std::str::from_utf8(field.trim_ascii()).ok()?.parse().ok()
+}
+
+/// A field's text for messages, with bytes that are no text replaced.
+pub fn shown(field: &[u8]) -> String {
+    String::from_utf8_lossy(field)
+        .chars()
+        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_fortran_reals() {
+        fn t(field: &str, expected: Field) {
+            assert_eq!(real(field.as_bytes()), expected, "{field:?}");
+        }
+        t(" 1.5000E+00", Field::Real(1.5));
+        t("-7.90000E+00", Field::Real(-7.9));
+        t("-2.0-101", Field::Real(-2.0e-101)); // exponent too wide for its E
+        t("-1.5000-345", Field::Real(-0.0)); // below the smallest double
+        t("0.00+00", Field::Real(0.0));
+        t(" 0.4873010E-02", Field::Real(0.4873010e-2));
+        t("1.5D+03", Field::Real(1500.0));
+        t("1.0+400", Field::NotFinite(f64::INFINITY));
+        t("-Infinity", Field::NotFinite(f64::NEG_INFINITY));
+        t("***********", Field::Overflow); // overflowed field
+        t("", Field::Bad);
+        t("1.234-1OO", Field::Bad);
+        t("00E+00-1.200", Field::Bad); // a row shifted by some columns
+        t("1.0 2.0", Field::Bad);
+        t("E+05", Field::Bad);
+        t("\0\0\0", Field::Bad);
+        t("-", Field::Bad);
+        t("0x10", Field::Bad);
+    }
+
+    #[test]
+    fn lines_know_their_place() {
+        let mut lines = Lines::new(&b"ab\r\n\ncd"[..]);
+        let l = lines.next_line().unwrap().unwrap();
+        assert_eq!((l.text, l.number, l.byte, l.ended), (&b"ab"[..], 1, 0, true));
+        let l = lines.next_line().unwrap().unwrap();
+        assert_eq!((l.text, l.number, l.byte), (&b""[..], 2, 4));
+        let l = lines.next_line().unwrap().unwrap();
+        assert_eq!((l.text, l.byte, l.ended), (&b"cd"[..], 5, false));
+        assert!(lines.next_line().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_file_without_line_ends_stays_small() {
+        let flood = vec![b'x'; 1_000_000];
+        let mut lines = Lines::new(io::BufReader::new(&flood[..]));
+        let line = lines.next_line().unwrap().unwrap();
+        assert!(line.overlong);
+        assert_eq!(line.text.len(), MAX_LINE);
+    }
+}

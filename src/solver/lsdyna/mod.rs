@@ -1,0 +1,9 @@
+//! LS-DYNA's ASCII time histories: one module per file, named as the solver names it.
+
+mod ascii;
+pub mod glstat;
+pub(super) mod header;
+pub mod line;
+pub mod nodout;
+pub mod rcforc;
+pub mod rwforc;

@@ -1,0 +1,190 @@
+//! `nodout`: displacements, velocities, accelerations and coordinates of nodes.
+//!
+//! A state is a translational block and, where nodes have rotations, a rotational block
+//! under a state line of its own with the same cycle and time. The column line tells
+//! which block it is.
+
+use std::io::{self, BufRead};
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::Place;
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+/// Opens every block's state line.
+const STATE: &[u8] = b" n o d a l   p r i n t   o u t   f o r   t i m e  s t e p";
+const COLUMN_LINE: &[u8] = b" nodal point";
+
+const TRANSLATIONS: [&str; 12] = [
+    "x_displacement", "y_displacement", "z_displacement",
+    "x_velocity", "y_velocity", "z_velocity",
+    "x_acceleration", "y_acceleration", "z_acceleration",
+    "x_coordinate", "y_coordinate", "z_coordinate",
+];
+const ROTATIONS: [&str; 9] = [
+    "rx_displacement", "ry_displacement", "rz_displacement",
+    "rx_velocity", "ry_velocity", "rz_velocity",
+    "rx_acceleration", "ry_acceleration", "rz_acceleration",
+];
+
+/// "id columns 1–9, first value columns 10–22 (13 wide), then eleven fields of 12":
+/// one column rule for E12.5 and E12.4. The blank of column 10 counts as the id's.
+const ID_WIDTH: usize = 10;
+const FIELD_WIDTH: usize = 12;
+
+pub fn signature(line: &[u8]) -> bool {
+    line.starts_with(STATE)
+}
+
+pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("nodout", input, selection, Nodout::default())
+}
+
+#[derive(Default)]
+struct Nodout {
+    tables: Option<[TableId; 2]>,
+    /// Cycle and time of the state line above, until its column line comes.
+    announced: Option<(i64, f64, Place)>,
+    cycle: Option<i64>,
+    block: Option<Block>,
+}
+
+#[derive(Clone, Copy)]
+struct Block {
+    table: TableId,
+    fields: usize,
+}
+
+impl Body for Nodout {
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        if line.is_blank() {
+            // The blank line between state line and column line ends nothing.
+            self.block = None;
+        } else if line.text.starts_with(STATE) {
+            self.block = None;
+            self.announced = self.state_line(line, states);
+        } else if line.text.starts_with(COLUMN_LINE) {
+            self.block = self.column_line(line, states);
+        } else if let Some(block) = self.block {
+            row(block, line, states);
+        } else {
+            // Outside a block, the state above is over; without a state line the rows
+            // below cannot be placed.
+            if !self.continue_announced(states) {
+                states.begin(None, line.into());
+            }
+            let found = shown(line.columns(1, 60));
+            states.damage(
+                line,
+                None,
+                format!("expected a state line, found \"{}\"", found.trim_end()),
+            );
+        }
+    }
+
+    fn end(&mut self, _: Place, states: &mut States<'_>) {
+        // A state line without the rows it announces.
+        if self.continue_announced(states) {
+            states.mark_damaged();
+        }
+    }
+}
+
+impl Nodout {
+    /// Cycle number right after `s t e p`, time between `( at time` and `)`.
+    fn state_line(&self, line: &Line<'_>, states: &mut States<'_>) -> Option<(i64, f64, Place)> {
+        let rest = &line.text[STATE.len()..];
+        let at = memchr::memmem::find(rest, b"( at time");
+        let close = memchr::memchr(b')', rest);
+        let parsed = at.zip(close).and_then(|(at, close)| {
+            let cycle = integer(&rest[..at])?;
+            match real(rest.get(at + b"( at time".len()..close)?) {
+                Field::Real(time) => Some((cycle, time, Place::from(line))),
+                _ => None,
+            }
+        });
+        if parsed.is_none() {
+            // Without its time the block cannot be placed: what was pending ends here.
+            states.begin(None, line.into());
+            states.damage(
+                line,
+                Some([STATE.len() + 1, line.text.len()]),
+                "expected a cycle number and \"( at time … )\"".into(),
+            );
+        }
+        parsed
+    }
+
+    /// Makes the announced state the pending one, unless its other block already did.
+    /// Returns whether a state was announced.
+    fn continue_announced(&mut self, states: &mut States<'_>) -> bool {
+        let Some((cycle, time, place)) = self.announced.take() else { return false };
+        if states.pending_time() != Some(time) || self.cycle != Some(cycle) {
+            states.begin(Some(time), place);
+            self.cycle = Some(cycle);
+        }
+        true
+    }
+
+    fn column_line(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<Block> {
+        let [translations, rotations] = *self.tables.get_or_insert_with(|| {
+            [
+                states.table("translational rows", &TRANSLATIONS),
+                states.table("rotational rows", &ROTATIONS),
+            ]
+        });
+        let heading = &line.text[COLUMN_LINE.len()..];
+        let starts = |name: &[u8]| heading.trim_ascii_start().starts_with(name);
+        let block = if starts(b"x-disp") {
+            Block { table: translations, fields: TRANSLATIONS.len() }
+        } else if starts(b"x-rot") {
+            Block { table: rotations, fields: ROTATIONS.len() }
+        } else {
+            if self.continue_announced(states) {
+                states.mark_damaged();
+            }
+            states.damage(line, None, "expected columns from x-disp or from x-rot".into());
+            return None;
+        };
+        let (_, time, place) = self.announced?;
+        self.continue_announced(states);
+        if states.has_rows(block.table) {
+            // A second block of the same kind: a state of its own, at the same time.
+            states.begin(Some(time), place);
+        }
+        Some(block)
+    }
+}
+
+/// One node. Field ends are taken from the right, because ids of more than nine digits
+/// push l2a's rows to the right.
+fn row(block: Block, line: &Line<'_>, states: &mut States<'_>) {
+    let width = line.text.trim_ascii_end().len();
+    let values = block.fields * FIELD_WIDTH;
+    if width < ID_WIDTH + values {
+        states.damage(
+            line,
+            Some([1, ID_WIDTH + values]),
+            format!(
+                "expected a node id and {} numbers of {FIELD_WIDTH} columns, found {width} columns",
+                block.fields
+            ),
+        );
+        return;
+    }
+    let first = width - values;
+    let Some(id) = integer(&line.text[..first]) else {
+        states.damage(
+            line,
+            Some([1, first]),
+            format!("expected a node id, found \"{}\"", shown(&line.text[..first])),
+        );
+        return;
+    };
+    states.row(block.table, EntityId::new(id), line, |k| {
+        let from = first + k * FIELD_WIDTH;
+        (from + 1, from + FIELD_WIDTH)
+    });
+}

@@ -1,0 +1,114 @@
+//! `rwforc`: forces on rigid walls, one line per wall and state.
+
+use std::io::{self, BufRead};
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+const COMPONENTS: [&str; 4] = ["normal_force", "x_force", "y_force", "z_force"];
+/// "time columns 1–12 E12.5, wall id 13–20, four values of 15 (E15.6)".
+const TIME: (usize, usize) = (1, 12);
+const WALL: (usize, usize) = (13, 20);
+const VALUE_WIDTH: usize = 15;
+const ROW_WIDTH: usize = WALL.1 + COMPONENTS.len() * VALUE_WIDTH;
+
+pub fn signature(line: &[u8]) -> bool {
+    is_column_line(line) || is_node_set_heading(line)
+}
+
+pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("rwforc", input, selection, Rwforc::default())
+}
+
+#[derive(Default)]
+struct Rwforc {
+    table: Option<TableId>,
+    /// Inside rows of a layout that is not read: wall segments, node-set transducers.
+    unread: Option<&'static str>,
+    unread_rows: usize,
+    first_unread: Option<Place>,
+}
+
+impl Body for Rwforc {
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        let text = line.text;
+        if line.is_blank() {
+            return;
+        }
+        if is_column_line(text) {
+            self.unread = None;
+        } else if text.trim_ascii().starts_with(b"seg#") {
+            self.unread = Some("wall segments");
+        } else if is_node_set_heading(text) {
+            self.unread = Some("node-set transducers");
+        } else if text.trim_ascii().starts_with(b"total force") {
+            self.unread = None;
+        } else if self.unread.is_some() {
+            self.unread_rows += 1;
+            self.first_unread.get_or_insert(line.into());
+        } else {
+            self.row(line, states);
+        }
+    }
+
+    fn end(&mut self, _: Place, states: &mut States<'_>) {
+        if self.unread_rows > 0 {
+            states.problems.add(
+                ProblemCode::UnreadRows,
+                self.first_unread,
+                None,
+                format!(
+                    "{} rows of wall segments or node-set transducers are not read",
+                    self.unread_rows
+                ),
+            );
+        }
+    }
+}
+
+impl Rwforc {
+    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        let time = match real(line.columns(TIME.0, TIME.1)) {
+            Field::Real(time) => Some(time),
+            _ => None,
+        };
+        let wall = integer(line.columns(WALL.0, WALL.1));
+        let whole = line.text.len() >= ROW_WIDTH;
+        let (Some(time), Some(wall), true) = (time, wall, whole) else {
+            states.damage(
+                line,
+                Some([1, ROW_WIDTH]),
+                format!(
+                    "expected time, wall and {} forces in {ROW_WIDTH} columns, found \"{}\"",
+                    COMPONENTS.len(),
+                    shown(line.columns(1, 40)).trim_end()
+                ),
+            );
+            return;
+        };
+        let table = *self
+            .table
+            .get_or_insert_with(|| states.table("walls", &COMPONENTS));
+        let entity = EntityId::new(wall);
+        if states.pending_time() != Some(time) || states.has_row(table, entity) {
+            states.begin(Some(time), line.into());
+        }
+        states.row(table, entity, line, |k| {
+            let from = WALL.1 + k * VALUE_WIDTH;
+            (from + 1, from + VALUE_WIDTH)
+        });
+    }
+}
+
+fn is_column_line(text: &[u8]) -> bool {
+    let mut words = text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+    words.next() == Some(b"time") && words.next() == Some(b"wall#")
+}
+
+fn is_node_set_heading(text: &[u8]) -> bool {
+    text.trim_ascii_start().starts_with(b"r i g i d   w a l l")
+}

@@ -1,0 +1,125 @@
+//! Problems: damage found in a file, as values in the result of reading it.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::lsdyna::line::Line;
+
+/// Problems kept per file; further ones are counted only.
+const MAX_KEPT: usize = 200;
+
+/// Kinds of damage. The names in snake case are the codes in JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProblemCode {
+    /// A state is not whole: its rows are left out of every history.
+    IncompleteState,
+    /// A line ends or is damaged within its columns; it is left out.
+    BadLine,
+    /// A field holds stars; its value is NaN.
+    OverflowedField,
+    /// A field holds `NaN`, `Infinity` or a number beyond a double; it is returned as such.
+    NotFinite,
+    /// A field holds no number; its value is NaN.
+    BadField,
+    /// A row of an entity that the first state does not have; it is left out.
+    UnexpectedEntity,
+    /// A component is missing from some states; its values there are NaN.
+    AbsentComponent,
+    /// A state's time is before the one of the state above it; the order of the file is kept.
+    TimeGoesBack,
+    /// Rows of a layout that is not read.
+    UnreadRows,
+    /// The second line is not LS-DYNA's version line.
+    NoVersionLine,
+    /// More problems than are listed.
+    MoreProblems,
+}
+
+/// One problem and its place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Problem {
+    pub code: ProblemCode,
+    /// Line, counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<u64>,
+    /// Offset in the file of the line's first byte.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub byte: Option<u64>,
+    /// First and last column, counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<[usize; 2]>,
+    pub message: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}")?;
+            if let Some([from, to]) = self.columns {
+                write!(f, ", columns {from}-{to}")?;
+            }
+            write!(f, ": ")?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+/// Where a problem is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub line: u64,
+    pub byte: u64,
+}
+
+impl From<&Line<'_>> for Place {
+    fn from(line: &Line<'_>) -> Self {
+        Self {
+            line: line.number,
+            byte: line.byte,
+        }
+    }
+}
+
+/// Collects problems up to a bound.
+#[derive(Debug, Default)]
+pub struct Problems {
+    kept: Vec<Problem>,
+    dropped: usize,
+}
+
+impl Problems {
+    pub fn add(
+        &mut self,
+        code: ProblemCode,
+        place: Option<Place>,
+        columns: Option<[usize; 2]>,
+        message: String,
+    ) {
+        if self.kept.len() == MAX_KEPT {
+            self.dropped += 1;
+            return;
+        }
+        self.kept.push(Problem {
+            code,
+            line: place.map(|p| p.line),
+            byte: place.map(|p| p.byte),
+            columns,
+            message,
+        });
+    }
+
+    pub fn into_list(mut self) -> Vec<Problem> {
+        if self.dropped > 0 {
+            self.kept.push(Problem {
+                code: ProblemCode::MoreProblems,
+                line: None,
+                byte: None,
+                columns: None,
+                message: format!("{} further problems are not listed", self.dropped),
+            });
+        }
+        self.kept
+    }
+}

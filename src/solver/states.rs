@@ -1,0 +1,448 @@
+//! Collects rows into states and keeps only whole states of selected histories.
+//!
+//! A file is a sequence of states; a state is one row per entity in one or more tables
+//! (`nodout` has two: translations and rotations). The first whole state fixes the
+//! entities of each table. Invariant: every kept history has one value per kept state.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::Selection;
+use super::lsdyna::line::{Field, Line, real, shown};
+use super::problem::{Place, Problem, ProblemCode, Problems};
+use crate::history::{EntityId, History};
+
+/// What a file's body hands over at its end.
+pub struct Collected {
+    pub entities: Vec<EntityId>,
+    pub components: Vec<Arc<str>>,
+    pub time: Arc<[f64]>,
+    pub histories: Vec<History>,
+    pub problems: Vec<Problem>,
+}
+
+/// Rows of the same components.
+struct Table {
+    name: &'static str,
+    components: Vec<Arc<str>>,
+    /// Indices into `components` that are selected.
+    wanted_columns: Vec<usize>,
+    rows: Vec<EntityId>,
+    row_of: HashMap<EntityId, usize>,
+    /// Per row: its first channel in `channels`, or `None` if the entity is not selected.
+    channel_of: Vec<Option<usize>>,
+    channels: Vec<Channel>,
+    /// Per row: whether the pending state has it.
+    filled: Vec<bool>,
+    filled_rows: usize,
+    next_row: usize,
+}
+
+/// One kept history: values of whole states, and the pending state's value.
+struct Channel {
+    values: Vec<f64>,
+    pending: f64,
+}
+
+/// Global quantities, which appear by label rather than by row.
+struct Scalar {
+    component: Arc<str>,
+    kept: bool,
+    values: Vec<f64>,
+    pending: Option<f64>,
+    absent: usize,
+}
+
+struct Pending {
+    time: Option<f64>,
+    place: Place,
+    damaged: bool,
+    /// Labels seen in this state, in order of the file.
+    labels: usize,
+}
+
+/// The states of one file while it is read.
+pub struct States<'a> {
+    selection: &'a Selection,
+    tables: Vec<Table>,
+    scalars: Vec<Scalar>,
+    time: Vec<f64>,
+    pending: Option<Pending>,
+    /// Whether a whole state has fixed the entities.
+    sealed: bool,
+    pub problems: Problems,
+}
+
+/// Index of a table, from [`States::table`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableId(usize);
+
+impl<'a> States<'a> {
+    pub fn new(selection: &'a Selection) -> Self {
+        Self {
+            selection,
+            tables: Vec::new(),
+            scalars: Vec::new(),
+            time: Vec::new(),
+            pending: None,
+            sealed: false,
+            problems: Problems::default(),
+        }
+    }
+
+    /// Adds a table. `name` is for messages; `components` name its columns.
+    pub fn table(&mut self, name: &'static str, components: &[&str]) -> TableId {
+        let components: Vec<Arc<str>> = components.iter().map(|&c| c.into()).collect();
+        let wanted_columns = (0..components.len())
+            .filter(|&i| self.selection.wants_component(&components[i]))
+            .collect();
+        self.tables.push(Table {
+            name,
+            components,
+            wanted_columns,
+            rows: Vec::new(),
+            row_of: HashMap::new(),
+            channel_of: Vec::new(),
+            channels: Vec::new(),
+            filled: Vec::new(),
+            filled_rows: 0,
+            next_row: 0,
+        });
+        TableId(self.tables.len() - 1)
+    }
+
+    /// Ends the pending state and starts one at `time` (`None`: not yet known).
+    pub fn begin(&mut self, time: Option<f64>, place: Place) {
+        self.close(false);
+        self.pending = Some(Pending { time, place, damaged: false, labels: 0 });
+    }
+
+    /// Time of the pending state.
+    pub fn pending_time(&self) -> Option<f64> {
+        self.pending.as_ref().and_then(|p| p.time)
+    }
+
+    pub fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Gives the pending state its time.
+    pub fn set_time(&mut self, time: f64) {
+        if let Some(pending) = &mut self.pending {
+            pending.time = Some(time);
+        }
+    }
+
+    /// Whether the pending state already has rows in this table.
+    pub fn has_rows(&self, table: TableId) -> bool {
+        self.tables[table.0].filled_rows > 0
+    }
+
+    /// Whether the pending state already has this entity's row.
+    pub fn has_row(&self, table: TableId, entity: EntityId) -> bool {
+        let table = &self.tables[table.0];
+        table.row_of.get(&entity).is_some_and(|&row| table.filled[row])
+    }
+
+    /// Notes a line that cannot be read; the state it belongs to is not whole.
+    /// Behind the last row of a whole state, that is the next state.
+    pub fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
+        self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
+        if let Some(pending) = &self.pending
+            && self.sealed
+            && pending.time.is_some()
+            && self.missing(pending, true).is_none()
+        {
+            self.begin(None, line.into());
+        }
+        self.mark_damaged();
+    }
+
+    /// Makes the pending state count as not whole.
+    pub fn mark_damaged(&mut self) {
+        if let Some(pending) = &mut self.pending {
+            pending.damaged = true;
+        }
+    }
+
+    /// Stores the selected fields of one row. `field(k)` gives the first and last
+    /// column (from 1) of the table's k-th component.
+    pub fn row(
+        &mut self,
+        table: TableId,
+        entity: EntityId,
+        line: &Line<'_>,
+        field: impl Fn(usize) -> (usize, usize),
+    ) {
+        let table = &mut self.tables[table.0];
+        let row = match table.find(entity) {
+            Some(row) => row,
+            None if !self.sealed => table.add_row(entity, self.selection),
+            None => {
+                self.problems.add(
+                    ProblemCode::UnexpectedEntity,
+                    Some(line.into()),
+                    None,
+                    format!("{entity} is not among the entities of the first state"),
+                );
+                return;
+            }
+        };
+        if std::mem::replace(&mut table.filled[row], true) {
+            let message = format!("{entity} appears twice in one state");
+            self.damage(line, None, message);
+            return;
+        }
+        table.filled_rows += 1;
+        table.next_row = row + 1;
+        let Some(first) = table.channel_of[row] else { return };
+        for (i, &column) in table.wanted_columns.iter().enumerate() {
+            let (from, to) = field(column);
+            let bytes = line.columns(from, to);
+            let value = read_field(bytes, line, [from, to], &mut self.problems);
+            table.channels[first + i].pending = value;
+        }
+    }
+
+    /// Stores one global quantity of the pending state.
+    pub fn scalar(&mut self, component: &str, bytes: &[u8], line: &Line<'_>, columns: [usize; 2]) {
+        let Some(pending) = &mut self.pending else { return };
+        pending.labels += 1;
+        // States repeat their labels in the same order: look where the last one was found.
+        let guess = pending.labels - 1;
+        let found = match self.scalars.get(guess) {
+            Some(s) if &*s.component == component => Some(guess),
+            _ => self.scalars.iter().position(|s| &*s.component == component),
+        };
+        let index = found.unwrap_or_else(|| {
+            let kept = self.selection.wants_component(component);
+            self.scalars.push(Scalar {
+                component: component.into(),
+                kept,
+                values: if kept { vec![f64::NAN; self.time.len()] } else { Vec::new() },
+                pending: None,
+                absent: self.time.len(),
+            });
+            self.scalars.len() - 1
+        });
+        let value = read_field(bytes, line, columns, &mut self.problems);
+        self.scalars[index].pending = Some(value);
+    }
+
+    /// Ends the pending state; keeps it if it is whole.
+    fn close(&mut self, at_end: bool) {
+        let Some(pending) = self.pending.take() else { return };
+        match (pending.time, self.missing(&pending, at_end)) {
+            (Some(time), None) => self.keep(time, &pending),
+            (time, missing) => {
+                let missing = missing.unwrap_or_else(|| "its time is missing".into());
+                let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
+                self.problems.add(
+                    ProblemCode::IncompleteState,
+                    Some(pending.place),
+                    None,
+                    format!(
+                        "state {}{at} is not complete and is left out: {missing}",
+                        self.time.len() + 1
+                    ),
+                );
+                // Labels that only dropped states had must not become components.
+                let states = self.time.len();
+                self.scalars.retain(|s| s.absent < states);
+            }
+        }
+        for table in &mut self.tables {
+            table.filled.fill(false);
+            table.filled_rows = 0;
+            table.next_row = 0;
+        }
+        for scalar in &mut self.scalars {
+            scalar.pending = None;
+        }
+    }
+
+    /// What a pending state lacks to be whole.
+    fn missing(&self, pending: &Pending, at_end: bool) -> Option<String> {
+        for table in &self.tables {
+            let (have, want) = (table.filled_rows, table.rows.len());
+            if have < want {
+                let first = table.filled.iter().position(|f| !f)?;
+                return Some(format!(
+                    "{} of {want} {} are missing, the first of {}",
+                    want - have,
+                    table.name,
+                    table.rows[first]
+                ));
+            }
+        }
+        if pending.damaged {
+            return Some("a row of it is damaged".into());
+        }
+        // A cut takes labels from the end; labels missing elsewhere are a choice of the solver.
+        let last = self.scalars.iter().rev().find(|s| s.absent == 0);
+        match last {
+            Some(last) if at_end && self.sealed && last.pending.is_none() => Some(format!(
+                "its labels end before \"{}\"",
+                last.component
+            )),
+            _ if self.tables.iter().all(|t| t.filled_rows == 0) && pending.labels == 0 => {
+                Some("it has no rows".into())
+            }
+            _ => None,
+        }
+    }
+
+    fn keep(&mut self, time: f64, pending: &Pending) {
+        if self.time.last().is_some_and(|&last| time < last) {
+            self.problems.add(
+                ProblemCode::TimeGoesBack,
+                Some(pending.place),
+                None,
+                format!(
+                    "time {time:?} of state {} is before the time of the state above it",
+                    self.time.len() + 1
+                ),
+            );
+        }
+        self.sealed = true;
+        self.time.push(time);
+        for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
+            channel.values.push(channel.pending);
+        }
+        for scalar in &mut self.scalars {
+            scalar.absent += usize::from(scalar.pending.is_none());
+            if scalar.kept {
+                scalar.values.push(scalar.pending.unwrap_or(f64::NAN));
+            }
+        }
+    }
+
+    /// Ends the file.
+    pub fn finish(mut self) -> Collected {
+        self.close(true);
+        let time: Arc<[f64]> = self.time.into();
+        let mut collected = Collected {
+            entities: Vec::new(),
+            components: Vec::new(),
+            time: time.clone(),
+            histories: Vec::new(),
+            problems: Vec::new(),
+        };
+        if self.sealed {
+            collect_tables(self.tables, &mut collected);
+            for scalar in self.scalars {
+                if scalar.absent > 0 {
+                    self.problems.add(
+                        ProblemCode::AbsentComponent,
+                        None,
+                        None,
+                        format!(
+                            "{} is missing from {} of {} states; its values there are NaN",
+                            scalar.component,
+                            scalar.absent,
+                            time.len()
+                        ),
+                    );
+                }
+                collected.components.push(scalar.component.clone());
+                if scalar.kept {
+                    collected.histories.push(History {
+                        entity: None,
+                        component: scalar.component,
+                        time: time.clone(),
+                        values: scalar.values,
+                    });
+                }
+            }
+        }
+        collected.problems = self.problems.into_list();
+        collected
+    }
+}
+
+/// Histories entity by entity, each with the components of all tables in order.
+fn collect_tables(tables: Vec<Table>, collected: &mut Collected) {
+    let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
+    for table in tables {
+        if table.rows.is_empty() {
+            continue;
+        }
+        let mut channels = table.channels.into_iter();
+        for (row, &entity) in table.rows.iter().enumerate() {
+            let histories = of_entity.entry(entity).or_insert_with(|| {
+                collected.entities.push(entity);
+                Vec::new()
+            });
+            if table.channel_of[row].is_none() {
+                continue;
+            }
+            for (&column, channel) in table.wanted_columns.iter().zip(channels.by_ref()) {
+                histories.push(History {
+                    entity: Some(entity),
+                    component: table.components[column].clone(),
+                    time: collected.time.clone(),
+                    values: channel.values,
+                });
+            }
+        }
+        collected.components.extend(table.components);
+    }
+    for entity in &collected.entities {
+        collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
+    }
+}
+
+impl Table {
+    fn find(&self, entity: EntityId) -> Option<usize> {
+        match self.rows.get(self.next_row) {
+            Some(&expected) if expected == entity => Some(self.next_row),
+            _ => self.row_of.get(&entity).copied(),
+        }
+    }
+
+    fn add_row(&mut self, entity: EntityId, selection: &Selection) -> usize {
+        let row = self.rows.len();
+        self.rows.push(entity);
+        self.row_of.insert(entity, row);
+        self.filled.push(false);
+        let wanted = selection.wants(entity) && !self.wanted_columns.is_empty();
+        self.channel_of.push(wanted.then_some(self.channels.len()));
+        if wanted {
+            self.channels.extend(
+                self.wanted_columns
+                    .iter()
+                    .map(|_| Channel { values: Vec::new(), pending: f64::NAN }),
+            );
+        }
+        row
+    }
+}
+
+/// The field's value; a problem and NaN where it holds no number.
+fn read_field(
+    bytes: &[u8],
+    line: &Line<'_>,
+    columns: [usize; 2],
+    problems: &mut Problems,
+) -> f64 {
+    let (code, message, value) = match real(bytes) {
+        Field::Real(value) => return value,
+        Field::NotFinite(value) => (
+            ProblemCode::NotFinite,
+            format!("expected a finite number, found \"{}\"", shown(bytes).trim()),
+            value,
+        ),
+        Field::Overflow => (
+            ProblemCode::OverflowedField,
+            format!("expected a real number, found \"{}\" (overflowed field)", shown(bytes).trim()),
+            f64::NAN,
+        ),
+        Field::Bad => (
+            ProblemCode::BadField,
+            format!("expected a real number, found \"{}\"", shown(bytes)),
+            f64::NAN,
+        ),
+    };
+    problems.add(code, Some(line.into()), Some(columns), message);
+    value
+}

@@ -1,0 +1,445 @@
+//! Units: where numbers with units enter the program and become SI.
+//!
+//! Everything inside is SI. A number typed by a user carries its unit
+//! (`36km/h`, `24t`, `0.75ms`); a solver's file carries none, so a
+//! [`UnitSystem`] is declared once in the study manifest.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Metres per second in one kilometre per hour.
+pub const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
+
+/// What a speed is measured against. A speed is never bare.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SpeedKind {
+    /// Speed of one body that hits a rigid wall.
+    Wall,
+    /// Relative speed of two bodies.
+    Closing,
+}
+
+impl SpeedKind {
+    /// `"wall"` or `"closing"`, as written in every file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wall => "wall",
+            Self::Closing => "closing",
+        }
+    }
+}
+
+/// An impact speed in m/s together with what it is measured against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speed {
+    pub m_per_s: f64,
+    pub kind: SpeedKind,
+}
+
+impl fmt::Display for Speed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", km_per_h(self.m_per_s), self.kind.name())
+    }
+}
+
+/// A speed as people in the field read it: `36 km/h`, at most two decimals.
+pub fn km_per_h(m_per_s: f64) -> String {
+    let rounded = (m_per_s / M_PER_S_PER_KM_PER_H * 100.0).round() / 100.0;
+    format!("{rounded} km/h")
+}
+
+/// Why a number with a unit was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UnitError {
+    #[error("{what} \"{text}\" has no unit: write for example {example}")]
+    NoUnit {
+        what: &'static str,
+        text: String,
+        example: String,
+    },
+    #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
+    UnknownUnit {
+        what: &'static str,
+        text: String,
+        unit: String,
+        known: String,
+    },
+    #[error("{what} \"{text}\" is not a number with a unit: write for example {example}")]
+    NotANumber {
+        what: &'static str,
+        text: String,
+        example: &'static str,
+    },
+    #[error("{what} \"{text}\" is out of range: it must be {range}")]
+    OutOfRange {
+        what: &'static str,
+        text: String,
+        range: &'static str,
+    },
+    #[error(
+        "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\""
+    )]
+    UnknownSystem {
+        text: String,
+        lengths: String,
+        masses: String,
+        times: String,
+    },
+}
+
+/// One kind of quantity: its name for messages, its units with their size in SI.
+pub struct Dimension {
+    pub what: &'static str,
+    example_unit: &'static str,
+    units: &'static [(&'static str, f64)],
+}
+
+pub const SPEED: Dimension = Dimension {
+    what: "speed",
+    example_unit: "km/h",
+    units: &[
+        ("km/h", M_PER_S_PER_KM_PER_H),
+        ("m/s", 1.0),
+        ("mm/ms", 1.0),
+        ("mm/s", 1e-3),
+        ("mph", 0.44704),
+    ],
+};
+pub const MASS: Dimension = Dimension {
+    what: "mass",
+    example_unit: "t",
+    units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)],
+};
+pub const LENGTH: Dimension = Dimension {
+    what: "length",
+    example_unit: "mm",
+    units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
+};
+pub const TIME: Dimension = Dimension {
+    what: "time",
+    example_unit: "ms",
+    units: &[("us", 1e-6), ("ms", 1e-3), ("s", 1.0)],
+};
+pub const STIFFNESS: Dimension = Dimension {
+    what: "stiffness",
+    example_unit: "MN/m",
+    units: &[
+        ("N/m", 1.0),
+        ("kN/m", 1e3),
+        ("MN/m", 1e6),
+        ("GN/m", 1e9),
+        ("N/mm", 1e3),
+        ("kN/mm", 1e6),
+    ],
+};
+pub const FORCE: Dimension = Dimension {
+    what: "force",
+    example_unit: "kN",
+    units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)],
+};
+
+impl Dimension {
+    /// SI value of a number with a unit, such as `"36 km/h"`.
+    ///
+    /// # Errors
+    /// [`UnitError`] when the number or the unit is missing, unknown or not finite.
+    pub fn parse(&self, text: &str) -> Result<f64, UnitError> {
+        let trimmed = text.trim();
+        let number_end = trimmed
+            .char_indices()
+            .find(|&(i, c)| !continues_number(trimmed, i, c))
+            .map_or(trimmed.len(), |(i, _)| i);
+        let (number, unit) = trimmed.split_at(number_end);
+        let value: f64 = number.trim().parse().map_err(|_| UnitError::NotANumber {
+            what: self.what,
+            text: text.into(),
+            example: self.example(),
+        })?;
+        let unit = unit.trim();
+        if unit.is_empty() {
+            return Err(UnitError::NoUnit {
+                what: self.what,
+                text: text.into(),
+                example: self
+                    .units
+                    .iter()
+                    .take(2)
+                    .map(|(u, _)| format!("\"{number}{u}\""))
+                    .collect::<Vec<_>>()
+                    .join(" or "),
+            });
+        }
+        let size = self.size_of(unit).ok_or_else(|| UnitError::UnknownUnit {
+            what: self.what,
+            text: text.into(),
+            unit: unit.into(),
+            known: self.known_units(),
+        })?;
+        let si = value * size;
+        if !si.is_finite() {
+            return Err(UnitError::OutOfRange {
+                what: self.what,
+                text: text.into(),
+                range: "finite",
+            });
+        }
+        Ok(si)
+    }
+
+    /// SI value of one `unit`, or `None` when the unit is not one of this quantity's.
+    pub fn size_of(&self, unit: &str) -> Option<f64> {
+        self.units
+            .iter()
+            .find(|(name, _)| *name == unit)
+            .map(|&(_, size)| size)
+    }
+
+    /// Like [`Dimension::parse`], but refuses values that are not above zero.
+    pub fn parse_positive(&self, text: &str) -> Result<f64, UnitError> {
+        let value = self.parse(text)?;
+        if value > 0.0 {
+            Ok(value)
+        } else {
+            Err(UnitError::OutOfRange {
+                what: self.what,
+                text: text.into(),
+                range: "above zero",
+            })
+        }
+    }
+
+    /// Like [`Dimension::parse`], but refuses values below zero.
+    pub fn parse_not_negative(&self, text: &str) -> Result<f64, UnitError> {
+        let value = self.parse(text)?;
+        if value >= 0.0 {
+            Ok(value)
+        } else {
+            Err(UnitError::OutOfRange {
+                what: self.what,
+                text: text.into(),
+                range: "zero or above",
+            })
+        }
+    }
+
+    /// The units of this quantity, for messages: `km/h, m/s, …`.
+    pub fn known_units(&self) -> String {
+        names(self.units)
+    }
+
+    fn example(&self) -> &'static str {
+        match self.example_unit {
+            "km/h" => "36km/h",
+            "t" => "24t",
+            "mm" => "30mm",
+            "ms" => "0.75ms",
+            "MN/m" => "80MN/m",
+            _ => "500kN",
+        }
+    }
+}
+
+/// Whether the character at `i` still belongs to the number that `text` starts with.
+/// An `e` does only when digits follow it, so that a unit may begin with one.
+fn continues_number(text: &str, i: usize, c: char) -> bool {
+    match c {
+        '0'..='9' | '.' | '+' | '-' => true,
+        'e' | 'E' => text[i + 1..]
+            .trim_start_matches(['+', '-'])
+            .starts_with(|c: char| c.is_ascii_digit()),
+        _ => false,
+    }
+}
+
+/// The units in which a solver's files are written; factors turn a file's value into SI.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct UnitSystem {
+    pub length_m: f64,
+    pub mass_kg: f64,
+    pub time_s: f64,
+}
+
+const LENGTHS: &[(&str, f64)] = &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)];
+const MASSES: &[(&str, f64)] = &[("kg", 1.0), ("t", 1e3), ("Mg", 1e3), ("g", 1e-3)];
+const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
+
+impl UnitSystem {
+    pub const SI: Self = Self {
+        length_m: 1.0,
+        mass_kg: 1.0,
+        time_s: 1.0,
+    };
+
+    /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
+    pub fn parse(text: &str) -> Result<Self, UnitError> {
+        if text.eq_ignore_ascii_case("si") {
+            return Ok(Self::SI);
+        }
+        let unknown = || UnitError::UnknownSystem {
+            text: text.into(),
+            lengths: names(LENGTHS),
+            masses: names(MASSES),
+            times: names(TIMES),
+        };
+        let (mut length, mut mass, mut time) = (None, None, None);
+        for part in text.split(['-', ' ', ',', '/']).filter(|p| !p.is_empty()) {
+            let slot_and_size = [
+                (&mut length, LENGTHS),
+                (&mut mass, MASSES),
+                (&mut time, TIMES),
+            ]
+            .into_iter()
+            .find_map(|(slot, table)| size_in(table, part).map(|size| (slot, size)));
+            let (slot, size) = slot_and_size.ok_or_else(unknown)?;
+            if slot.replace(size).is_some() {
+                return Err(unknown());
+            }
+        }
+        match (length, mass, time) {
+            (Some(length_m), Some(mass_kg), Some(time_s)) => Ok(Self {
+                length_m,
+                mass_kg,
+                time_s,
+            }),
+            _ => Err(unknown()),
+        }
+    }
+
+    /// m/s in one unit of speed.
+    pub fn speed(&self) -> f64 {
+        self.length_m / self.time_s
+    }
+
+    /// m/s² in one unit of acceleration.
+    pub fn acceleration(&self) -> f64 {
+        self.length_m / (self.time_s * self.time_s)
+    }
+
+    /// N in one unit of force.
+    pub fn force(&self) -> f64 {
+        self.mass_kg * self.acceleration()
+    }
+}
+
+fn size_in(table: &[(&str, f64)], unit: &str) -> Option<f64> {
+    table.iter().find(|(n, _)| *n == unit).map(|&(_, size)| size)
+}
+
+fn names(table: &[(&str, f64)]) -> String {
+    let names: Vec<_> = table.iter().map(|(n, _)| *n).collect();
+    names.join(", ")
+}
+
+impl<'de> Deserialize<'de> for UnitSystem {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Self::parse(&text).map_err(serde::de::Error::custom)
+    }
+}
+
+/// A value read from text with a unit in a TOML file; `TEXT` picks the quantity.
+macro_rules! text_quantity {
+    ($(#[$doc:meta])* $name:ident, $parse:expr, $pattern:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name(pub f64);
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+                let text = String::deserialize(d)?;
+                $parse(&text).map(Self).map_err(serde::de::Error::custom)
+            }
+        }
+
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!({ "type": "string", "pattern": $pattern })
+            }
+        }
+    };
+}
+
+text_quantity!(
+    /// A speed in m/s, zero or above, written like `"36km/h"`.
+    SpeedText, |t: &str| SPEED.parse_not_negative(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
+);
+text_quantity!(
+    /// A mass in kg, above zero, written like `"24t"`.
+    MassText, |t: &str| MASS.parse_positive(t), "^[0-9.eE+-]+ *(t|kg|g)$"
+);
+text_quantity!(
+    /// A length in m, zero or above, written like `"30mm"`.
+    LengthText, |t: &str| LENGTH.parse_not_negative(t), "^[0-9.eE+-]+ *(mm|cm|m)$"
+);
+text_quantity!(
+    /// A time in s, above zero, written like `"0.75ms"`.
+    TimeText, |t: &str| TIME.parse_positive(t), "^[0-9.eE+-]+ *(us|ms|s)$"
+);
+text_quantity!(
+    /// A stiffness in N/m, above zero, written like `"80MN/m"`.
+    StiffnessText, |t: &str| STIFFNESS.parse_positive(t),
+    "^[0-9.eE+-]+ *(N/m|kN/m|MN/m|GN/m|N/mm|kN/mm)$"
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_numbers_with_units() {
+        fn t(dimension: &Dimension, text: &str, expected: f64) {
+            assert_eq!(dimension.parse(text), Ok(expected), "{text:?}");
+        }
+        t(&SPEED, "36km/h", 36.0 / 3.6);
+        t(&SPEED, " 10 m/s", 10.0);
+        t(&MASS, "24.0t", 24_000.0);
+        t(&MASS, "2.4e4kg", 24_000.0);
+        t(&TIME, "0.75ms", 0.75e-3);
+        t(&STIFFNESS, "80MN/m", 80e6);
+        t(&LENGTH, "-3mm", -0.003);
+    }
+
+    #[test]
+    fn says_what_to_write_instead() {
+        fn t(dimension: &Dimension, text: &str, expected: &str) {
+            assert_eq!(dimension.parse(text).unwrap_err().to_string(), expected);
+        }
+        t(
+            &SPEED,
+            "36",
+            "speed \"36\" has no unit: write for example \"36km/h\" or \"36m/s\"",
+        );
+        t(
+            &SPEED,
+            "36kmh",
+            "speed \"36kmh\" has the unknown unit \"kmh\": use one of km/h, m/s, mm/ms, mm/s, mph",
+        );
+        t(
+            &MASS,
+            "t24",
+            "mass \"t24\" is not a number with a unit: write for example 24t",
+        );
+        t(
+            &SPEED,
+            "1e999m/s",
+            "speed \"1e999m/s\" is out of range: it must be finite",
+        );
+    }
+
+    #[test]
+    fn unit_systems_in_any_order() {
+        let a = UnitSystem::parse("mm-t-s").unwrap();
+        assert_eq!(a, UnitSystem::parse("t-mm-s").unwrap());
+        assert!((a.force() - 1.0).abs() < 1e-15, "mm-t-s forces are newtons");
+        let b = UnitSystem::parse("kg-mm-ms").unwrap();
+        assert!((b.force() - 1e3).abs() < 1e-9, "kg-mm-ms forces are kilonewtons");
+        assert!(UnitSystem::parse("mm-s").is_err());
+        assert!(UnitSystem::parse("mm-mm-s").is_err());
+        assert!(UnitSystem::parse("furlong-t-s").is_err());
+    }
+}
