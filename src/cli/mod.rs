@@ -1,8 +1,12 @@
 //! The commands: one file each, with its arguments and a `run` that calls the library.
 
-mod inspect;
+mod build;
+mod db;
 mod histories;
+mod inspect;
 mod output;
+mod plot;
+mod progress;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -45,6 +49,8 @@ pub struct Manners {
 enum Command {
     Inspect(inspect::Args),
     Histories(histories::Args),
+    Build(build::Args),
+    Db(db::Args),
 }
 
 /// How a command ended.
@@ -95,6 +101,8 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Inspect(args) => inspect::run(&args, manners),
         Command::Histories(args) => histories::run(&args, manners),
+        Command::Build(args) => build::run(&args, manners),
+        Command::Db(args) => db::run(&args, manners),
     };
     ExitCode::from(match result {
         Ok(Outcome::Clean) => DONE,

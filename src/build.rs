@@ -1,0 +1,122 @@
+//! Building a database: every run of a study becomes a case; unchanged runs are kept.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::curve::Case;
+use crate::database::{Database, DatabaseError, LockError, WriterLock};
+use crate::manifest::ManifestError;
+use crate::study::{self, RunError, Study};
+
+/// Why nothing could be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
+    NoRun { path: PathBuf, reasons: String },
+}
+
+/// How one run ended.
+#[derive(Debug)]
+pub enum RunOutcome {
+    /// Read and extracted.
+    Built,
+    /// Unchanged since it was built.
+    Kept,
+    /// Not usable, with the reason; an earlier build of it stays in the database.
+    Failed { reason: RunError, earlier_kept: bool },
+}
+
+/// What a build did.
+#[derive(Debug)]
+pub struct BuildReport {
+    pub group: String,
+    /// Name and end of every run, in the order of the manifest.
+    pub runs: Vec<(String, RunOutcome)>,
+    /// Cases that the study no longer has.
+    pub removed: Vec<String>,
+    pub database: Database,
+}
+
+/// Builds the study at `manifest` into the database at `path`.
+///
+/// Runs whose recipe, entry and files are unchanged are not read again. A run that cannot
+/// be used is reported, and the others go on; the file is written once, whole.
+/// `progress` is called with the name of each run when it is done, from any thread.
+///
+/// # Errors
+/// [`BuildError`] if the manifest is wrong, the database is not ours, busy or cannot be
+/// written, or no run is usable. The database is then unchanged.
+pub fn build(
+    manifest: &Path,
+    path: &Path,
+    progress: impl Fn(&str) + Sync,
+) -> Result<BuildReport, BuildError> {
+    let study = study::load(manifest)?;
+    let _lock = WriterLock::take(path)?;
+    let mut database = match path.is_file() {
+        true => Database::read(path)?,
+        false => Database::default(),
+    };
+    let results: Vec<(String, Result<Option<Case>, RunError>)> = study
+        .runs()
+        .par_iter()
+        .map(|entry| {
+            let name = entry.case_name();
+            let result = case(&study, entry, &database);
+            progress(&name);
+            (name, result)
+        })
+        .collect();
+    if results.iter().all(|(_, r)| r.is_err()) {
+        let reasons: Vec<String> = results
+            .iter()
+            .filter_map(|(name, r)| r.as_ref().err().map(|e| format!("  {name}: {e}")))
+            .collect();
+        return Err(BuildError::NoRun { path: manifest.into(), reasons: reasons.join("\n") });
+    }
+    let mut runs = Vec::new();
+    for (name, result) in results {
+        let outcome = match result {
+            Ok(Some(case)) => {
+                database.put(case)?;
+                RunOutcome::Built
+            }
+            Ok(None) => RunOutcome::Kept,
+            Err(reason) => {
+                let earlier_kept = database.cases(study.group()).iter().any(|c| c.name == name);
+                RunOutcome::Failed { reason, earlier_kept }
+            }
+        };
+        runs.push((name, outcome));
+    }
+    let removed = database.retain(study.group(), |case| {
+        case.study != study.name() || runs.iter().any(|(name, _)| *name == case.name)
+    });
+    let changed = !removed.is_empty() || runs.iter().any(|(_, o)| matches!(o, RunOutcome::Built));
+    if changed || !path.is_file() {
+        database.write(path)?;
+    }
+    Ok(BuildReport { group: study.group().into(), runs, removed, database })
+}
+
+/// The run's case, or `None` if the database already has it.
+fn case(
+    study: &Study,
+    entry: &study::RunEntry,
+    database: &Database,
+) -> Result<Option<Case>, RunError> {
+    let located = study.locate(entry)?;
+    let name = entry.case_name();
+    let kept = database
+        .cases(study.group())
+        .iter()
+        .any(|c| c.name == name && c.fingerprint == located.fingerprint);
+    if kept { Ok(None) } else { located.extract().map(Some) }
+}

@@ -1,0 +1,333 @@
+//! `crumple db`: look into a curve database.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::curve::{Case, EnergyAudit, Source};
+use crumple::database::Database;
+use crumple::unit::{SpeedKind, km_per_h};
+use serde::Serialize;
+
+use super::output;
+use super::{CommandResult, Failure, Manners, Outcome};
+
+/// List, show and check the cases of a curve database
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple db ls curves.h5
+  crumple db show curves.h5 --group lead-car-wall --case 36kmh
+  crumple db show curves.h5 --json > curves.json
+  crumple db check curves.h5 --strict")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// List groups and cases by speed
+    Ls {
+        /// Curve database
+        database: PathBuf,
+    },
+    /// Show cases with their curves: a terminal plot, or everything with --json
+    Show {
+        /// Curve database
+        database: PathBuf,
+        /// Group to show (default: all)
+        #[arg(long)]
+        group: Option<String>,
+        /// Case to show (default: all of the group)
+        #[arg(long, requires = "group")]
+        case: Option<String>,
+    },
+    /// Audit every case: energy, end of loading, order, warnings of the extraction
+    Check {
+        /// Curve database
+        database: PathBuf,
+    },
+}
+
+/// What a list says of one case.
+#[derive(Serialize)]
+pub struct CaseRow {
+    name: String,
+    speed_m_per_s: f64,
+    speed_kind: SpeedKind,
+    mass_kg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_mass_kg: Option<f64>,
+    force_kind: crumple::curve::ForceKind,
+    states: usize,
+    peak_force_n: f64,
+    max_deflection_m: f64,
+    loading_end: usize,
+    truncated: bool,
+    unloading_stiffness_n_per_m: Option<f64>,
+    work_j: f64,
+    kinetic_energy_j: f64,
+    work_over_energy: f64,
+    contact_time_s: f64,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+impl CaseRow {
+    pub const HEADING: [&str; 6] =
+        ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
+
+    pub fn of(case: &Case) -> Self {
+        Self {
+            name: case.name.clone(),
+            speed_m_per_s: case.speed.m_per_s,
+            speed_kind: case.speed.kind,
+            mass_kg: case.masses.body_kg,
+            other_mass_kg: case.masses.other_kg,
+            force_kind: case.force_kind,
+            states: case.sampled.time_s().len(),
+            peak_force_n: case.peak_force_n(),
+            max_deflection_m: case.max_deflection_m(),
+            loading_end: case.loading_end(),
+            truncated: case.is_truncated(),
+            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            work_j: case.audit.work_j,
+            kinetic_energy_j: case.audit.kinetic_j,
+            work_over_energy: case.audit.ratio(),
+            contact_time_s: case.contact_time_s,
+            notes: case.notes.clone(),
+            warnings: case.warnings.clone(),
+        }
+    }
+
+    pub fn cells(&self) -> Vec<String> {
+        vec![
+            format!("{} ({})", km_per_h(self.speed_m_per_s), self.speed_kind.name()),
+            format!("{:.2} t", self.mass_kg / 1e3),
+            format!("{:.3} MN", self.peak_force_n / 1e6),
+            format!(
+                "{:.4} m{}",
+                self.max_deflection_m,
+                if self.truncated { " (truncated)" } else { "" }
+            ),
+            format!("{:.4}", self.work_over_energy),
+            self.unloading_stiffness_n_per_m
+                .map_or("-".into(), |k| format!("{:.1} MN/m", k / 1e6)),
+        ]
+    }
+}
+
+/// Everything of one case.
+#[derive(Serialize)]
+struct FullCase<'a> {
+    #[serde(flatten)]
+    row: CaseRow,
+    study: &'a str,
+    time_s: &'a [f64],
+    deflection_m: &'a [f64],
+    #[serde(rename = "force_N")]
+    force_n: &'a [f64],
+    closing_speed_m_per_s: &'a [f64],
+    original: Columns<'a>,
+    recipe: serde_json::Value,
+    sources: &'a [Source],
+    fingerprint: &'a str,
+}
+
+#[derive(Serialize)]
+struct Columns<'a> {
+    time_s: &'a [f64],
+    deflection_m: &'a [f64],
+    #[serde(rename = "force_N")]
+    force_n: &'a [f64],
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    match &args.command {
+        Command::Ls { database } => ls(&Database::read(database)?, manners),
+        Command::Show { database: path, group, case } => {
+            let database = Database::read(path)?;
+            let groups: Vec<&str> = match group {
+                Some(group) => vec![group],
+                None => database.groups().collect(),
+            };
+            let mut shown = BTreeMap::new();
+            for group in groups {
+                let cases: Vec<&Case> = match case {
+                    Some(name) => vec![database.case(path, group, name)?],
+                    None => database.group(path, group)?.iter().collect(),
+                };
+                shown.insert(group.to_string(), cases);
+            }
+            show(&shown, manners)
+        }
+        Command::Check { database } => check(&Database::read(database)?, manners),
+    }
+}
+
+#[derive(Serialize)]
+struct Groups<T> {
+    groups: BTreeMap<String, Vec<T>>,
+}
+
+fn ls(database: &Database, manners: Manners) -> CommandResult {
+    let rows = |group: &str| database.cases(group).iter().map(CaseRow::of).collect::<Vec<_>>();
+    if manners.json {
+        let groups = database.groups().map(|g| (g.to_string(), rows(g))).collect();
+        output::print_json(&Groups { groups })?;
+        return Ok(Outcome::Clean);
+    }
+    output::print(|out| database.groups().try_for_each(|g| print_group(out, g, &rows(g))))?;
+    Ok(Outcome::Clean)
+}
+
+fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
+    let heading: Vec<&str> = [group].into_iter().chain(CaseRow::HEADING).collect();
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|r| [r.name.clone()].into_iter().chain(r.cells()).collect())
+        .collect();
+    output::table(out, &heading, &cells)?;
+    writeln!(out)
+}
+
+fn show(shown: &BTreeMap<String, Vec<&Case>>, manners: Manners) -> CommandResult {
+    if manners.json {
+        let groups = shown
+            .iter()
+            .map(|(group, cases)| {
+                let cases: Result<Vec<_>, Failure> = cases.iter().map(|c| full(c)).collect();
+                Ok((group.clone(), cases?))
+            })
+            .collect::<Result<_, Failure>>()?;
+        output::print_json(&Groups { groups })?;
+        return Ok(Outcome::Clean);
+    }
+    output::print(|out| {
+        for (group, cases) in shown {
+            for case in cases {
+                print_case(out, group, case)?;
+            }
+        }
+        Ok(())
+    })?;
+    Ok(Outcome::Clean)
+}
+
+fn full(case: &Case) -> Result<FullCase<'_>, Failure> {
+    Ok(FullCase {
+        row: CaseRow::of(case),
+        study: &case.study,
+        time_s: case.sampled.time_s(),
+        deflection_m: case.sampled.deflection_m(),
+        force_n: case.sampled.force_n(),
+        closing_speed_m_per_s: &case.closing_speed_m_per_s,
+        original: Columns {
+            time_s: case.original.time_s(),
+            deflection_m: case.original.deflection_m(),
+            force_n: case.original.force_n(),
+        },
+        recipe: serde_json::from_str(&case.recipe)?,
+        sources: &case.sources,
+        fingerprint: &case.fingerprint,
+    })
+}
+
+fn print_case(out: &mut dyn Write, group: &str, case: &Case) -> io::Result<()> {
+    print_group(out, group, &[CaseRow::of(case)])?;
+    for source in &case.sources {
+        writeln!(
+            out,
+            "from {} ({} bytes, blake3 {}…, {} {})",
+            source.path,
+            source.size_bytes,
+            &source.blake3.get(..12).unwrap_or(&source.blake3),
+            source.solver.as_deref().unwrap_or("unknown solver"),
+            source.version.as_deref().unwrap_or("")
+        )?;
+    }
+    for note in &case.notes {
+        writeln!(out, "note: {note}")?;
+    }
+    for warning in &case.warnings {
+        writeln!(out, "warning: {warning}")?;
+    }
+    writeln!(out, "\nforce [MN] over deflection [m]")?;
+    let (d, f) = (case.original.deflection_m(), case.original.force_n());
+    super::plot::curve(out, d, f)?;
+    writeln!(out)
+}
+
+/// Findings about one case.
+#[derive(Serialize)]
+struct Finding {
+    group: String,
+    case: String,
+    code: &'static str,
+    message: String,
+}
+
+#[derive(Serialize)]
+struct CheckDocument {
+    cases: usize,
+    findings: Vec<Finding>,
+}
+
+fn check(database: &Database, manners: Manners) -> CommandResult {
+    let mut findings = Vec::new();
+    let mut cases = 0;
+    for group in database.groups() {
+        for case in database.cases(group) {
+            cases += 1;
+            let mut add = |code, message| {
+                let (group, case) = (group.to_string(), case.name.clone());
+                findings.push(Finding { group, case, code, message });
+            };
+            check_case(case, &mut add);
+        }
+        for pair in database.cases(group).windows(2) {
+            if pair[0].speed == pair[1].speed {
+                findings.push(Finding {
+                    group: group.to_string(),
+                    case: pair[1].name.clone(),
+                    code: "equal_speeds",
+                    message: format!("has the same speed as {}", pair[0].name),
+                });
+            }
+        }
+    }
+    if manners.json {
+        output::print_json(&CheckDocument { cases, findings: std::mem::take(&mut findings) })?;
+    } else {
+        output::print(|out| {
+            for f in &findings {
+                writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
+            }
+            writeln!(out, "{cases} cases checked, {} findings", findings.len())
+        })?;
+    }
+    Ok(if findings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+fn check_case(case: &Case, add: &mut impl FnMut(&'static str, String)) {
+    let audit = crumple::curve::energy::audit(&case.original, case.masses, case.speed);
+    if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
+        add("energy_mismatch", format!("W/E is {:.4}, off by more than 5 %", audit.ratio()));
+    }
+    // The stored audit must follow from the stored curve; only rounding may differ.
+    if (audit.work_j - case.audit.work_j).abs() > 1e-9 * audit.work_j.abs() {
+        add("audit_differs", format!(
+            "the stored work {} J is not the curve's {} J",
+            case.audit.work_j, audit.work_j
+        ));
+    }
+    if case.is_truncated() {
+        add("truncated", "the run ended while loading".into());
+    }
+    if case.unloading_stiffness_n_per_m.is_none() {
+        add("no_unloading", "the record does not hold the unloading branch".into());
+    }
+    for warning in &case.warnings {
+        add("extraction", warning.clone());
+    }
+}

@@ -1,0 +1,146 @@
+//! CFC filter of crash channels: ISO 6487 / SAE J211, forward and backward (zero phase).
+
+use std::f64::consts::{PI, SQRT_2};
+
+/// Why a history cannot be filtered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CfcError {
+    #[error(
+        "the interval of {interval_s:e} s is too long for CFC{class}: at most {longest_s:e} s; use a lower class, filter = \"none\", or output at a higher rate"
+    )]
+    TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
+    #[error(
+        "the filter needs equal intervals, but they differ by up to {spread_percent:.1} % of their mean: use filter = \"none\""
+    )]
+    Uneven { spread_percent: f64 },
+}
+
+/// Largest deviation of an interval from the mean that still counts as equal.
+/// Explicit solvers write at the first cycle past each multiple.
+const MAX_SPREAD: f64 = 0.05;
+
+/// Length of the mirrored pad at each end: the longer of these.
+const PAD_S: f64 = 0.010;
+const PAD_SAMPLES: usize = 100;
+
+/// Coefficients of one pass: a two-pole Butterworth low-pass.
+#[derive(Debug, Clone, Copy)]
+pub struct Coefficients {
+    pub a0: f64,
+    pub a1: f64,
+    pub a2: f64,
+    pub b1: f64,
+    pub b2: f64,
+}
+
+impl Coefficients {
+    /// `class`: CFC in Hz (60, 180, 600, 1000); `interval_s`: sampling interval.
+    /// Formulas of SAE J211-1, appendix C.
+    pub fn new(class: u32, interval_s: f64) -> Self {
+        let w_d = 2.0 * PI * f64::from(class) * 2.0775;
+        let w_a = (w_d * interval_s / 2.0).tan();
+        let denominator = 1.0 + SQRT_2 * w_a + w_a * w_a;
+        let a0 = w_a * w_a / denominator;
+        Self {
+            a0,
+            a1: 2.0 * a0,
+            a2: a0,
+            b1: -2.0 * (w_a * w_a - 1.0) / denominator,
+            b2: (-1.0 + SQRT_2 * w_a - w_a * w_a) / denominator,
+        }
+    }
+
+    /// One pass in place, begun at rest at the first value.
+    fn pass(&self, values: &mut [f64]) {
+        let Some(&first) = values.first() else { return };
+        let (mut x1, mut x2, mut y1, mut y2) = (first, first, first, first);
+        for value in values {
+            let x = *value;
+            let y = self.a0 * x + self.a1 * x1 + self.a2 * x2 + self.b1 * y1 + self.b2 * y2;
+            (x2, x1, y2, y1) = (x1, x, y1, y);
+            *value = y;
+        }
+    }
+}
+
+/// `values` at `time_s` (s, increasing, equal intervals), filtered without phase shift.
+///
+/// Both ends are padded by point reflection `2 x_0 − x_j`, so that the ends keep their level.
+///
+/// # Errors
+/// [`CfcError`] if the interval is over `1/(10 CFC)` or the intervals differ.
+pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Vec<f64>, CfcError> {
+    let n = values.len();
+    if n < 2 {
+        return Ok(values.to_vec());
+    }
+    let interval_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
+    let spread = time_s
+        .windows(2)
+        .map(|w| ((w[1] - w[0]) / interval_s - 1.0).abs())
+        .fold(0.0, f64::max);
+    if spread > MAX_SPREAD {
+        return Err(CfcError::Uneven { spread_percent: spread * 100.0 });
+    }
+    let longest_s = 1.0 / (10.0 * f64::from(class));
+    if interval_s > longest_s * (1.0 + 1e-9) {
+        return Err(CfcError::TooCoarse { class, interval_s, longest_s });
+    }
+    let pad = ((PAD_S / interval_s).round() as usize).max(PAD_SAMPLES).min(n - 1);
+    let (first, last) = (values[0], values[n - 1]);
+    let mut padded = Vec::with_capacity(n + 2 * pad);
+    padded.extend((1..=pad).rev().map(|j| 2.0 * first - values[j]));
+    padded.extend_from_slice(values);
+    padded.extend((1..=pad).map(|j| 2.0 * last - values[n - 1 - j]));
+    let coefficients = Coefficients::new(class, interval_s);
+    coefficients.pass(&mut padded);
+    padded.reverse();
+    coefficients.pass(&mut padded);
+    padded.reverse();
+    Ok(padded[pad..pad + n].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coefficients_are_the_standards() {
+        let c = Coefficients::new(60, 1e-4);
+        assert!((c.a0 - 0.0014523675).abs() < 5e-11);
+        assert!((c.b1 - 1.8893432).abs() < 5e-8);
+        assert!((c.b2 + 0.89515269).abs() < 5e-9);
+    }
+
+    fn gain_at(frequency_hz: f64) -> f64 {
+        let time_s: Vec<f64> = (0..20_000).map(|i| f64::from(i) * 1e-4).collect();
+        let wave: Vec<f64> = time_s.iter().map(|t| (2.0 * PI * frequency_hz * t).sin()).collect();
+        let filtered = filter(60, &time_s, &wave).unwrap();
+        filtered[5_000..15_000].iter().fold(0.0, |m: f64, v| m.max(v.abs()))
+    }
+
+    #[test]
+    fn both_passes_lose_3_db_at_1_665_cfc() {
+        let half_power = 0.5_f64.sqrt();
+        assert!((gain_at(1.665 * 60.0) - half_power).abs() < 2e-3);
+        assert!((gain_at(5.0) - 1.0).abs() < 1e-3);
+        assert!(gain_at(600.0) < 1e-2);
+    }
+
+    #[test]
+    fn keeps_a_straight_line() {
+        let time_s: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.75e-3).collect();
+        let line: Vec<f64> = time_s.iter().map(|t| 3.0 - 20.0 * t).collect();
+        for (a, b) in filter(60, &time_s, &line).unwrap().iter().zip(&line) {
+            assert!((a - b).abs() < 1e-6, "{a} against {b}");
+        }
+    }
+
+    #[test]
+    fn refuses_what_the_standard_does_not_allow() {
+        let time_s: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.75e-3).collect();
+        assert!(matches!(filter(180, &time_s, &time_s), Err(CfcError::TooCoarse { .. })));
+        let uneven: Vec<f64> = time_s.iter().map(|t| t * t).collect();
+        assert!(matches!(filter(60, &uneven, &uneven), Err(CfcError::Uneven { .. })));
+    }
+}

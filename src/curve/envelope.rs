@@ -1,0 +1,186 @@
+//! Envelope: the loading branch as a function, force over increasing deflection.
+
+/// A piecewise linear force over deflection.
+///
+/// Invariant: at least two points, all finite, deflection strictly increasing from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Envelope {
+    deflection_m: Vec<f64>,
+    force_n: Vec<f64>,
+    /// `∫F dd` from 0 to each point, in J.
+    work_j: Vec<f64>,
+}
+
+/// Why two columns are no envelope.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EnvelopeError {
+    #[error("an envelope needs at least 2 points, found {points}")]
+    TooShort { points: usize },
+    #[error("{deflections} deflections but {forces} forces")]
+    Lengths { deflections: usize, forces: usize },
+    #[error("point {point} is ({deflection_m} m, {force_n} N): expected finite numbers")]
+    NotFinite { point: usize, deflection_m: f64, force_n: f64 },
+    #[error("the deflection must begin at 0, found {first_m} m")]
+    NotFromZero { first_m: f64 },
+    #[error("the deflection must increase, found {deflection_m} m after {before_m} m at point {point}")]
+    Order { point: usize, deflection_m: f64, before_m: f64 },
+}
+
+impl Envelope {
+    /// Checks the invariant once.
+    ///
+    /// # Errors
+    /// [`EnvelopeError`] names the first point that breaks it, counted from 1.
+    pub fn new(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, EnvelopeError> {
+        let (deflections, forces) = (deflection_m.len(), force_n.len());
+        if deflections != forces {
+            return Err(EnvelopeError::Lengths { deflections, forces });
+        }
+        if deflections < 2 {
+            return Err(EnvelopeError::TooShort { points: deflections });
+        }
+        for (i, (&deflection_m, &force_n)) in deflection_m.iter().zip(&force_n).enumerate() {
+            if !(deflection_m.is_finite() && force_n.is_finite()) {
+                return Err(EnvelopeError::NotFinite { point: i + 1, deflection_m, force_n });
+            }
+        }
+        if deflection_m[0] != 0.0 {
+            return Err(EnvelopeError::NotFromZero { first_m: deflection_m[0] });
+        }
+        if let Some(i) = deflection_m.windows(2).position(|w| w[1] <= w[0]) {
+            let (before_m, deflection_m) = (deflection_m[i], deflection_m[i + 1]);
+            return Err(EnvelopeError::Order { point: i + 2, deflection_m, before_m });
+        }
+        let mut work = 0.0;
+        let mut work_j = vec![0.0];
+        for i in 1..deflections {
+            work += 0.5 * (force_n[i - 1] + force_n[i]) * (deflection_m[i] - deflection_m[i - 1]);
+            work_j.push(work);
+        }
+        Ok(Self { deflection_m, force_n, work_j })
+    }
+
+    pub fn deflection_m(&self) -> &[f64] {
+        &self.deflection_m
+    }
+
+    pub fn force_n(&self) -> &[f64] {
+        &self.force_n
+    }
+
+    /// Largest deflection of the table, in m.
+    pub fn end_m(&self) -> f64 {
+        self.deflection_m[self.deflection_m.len() - 1]
+    }
+
+    /// Force at `deflection_m` by linear interpolation; the first and last force beyond the ends.
+    pub fn force_at(&self, deflection_m: f64) -> f64 {
+        let i = self.segment(deflection_m);
+        let (d0, d1) = (self.deflection_m[i], self.deflection_m[i + 1]);
+        let (f0, f1) = (self.force_n[i], self.force_n[i + 1]);
+        let share = ((deflection_m - d0) / (d1 - d0)).clamp(0.0, 1.0);
+        f0 + share * (f1 - f0)
+    }
+
+    /// `∫F dd` from 0 to `deflection_m`, exact for the piecewise linear force; beyond the
+    /// end the last force is held. In J.
+    pub fn work_to(&self, deflection_m: f64) -> f64 {
+        let end = self.deflection_m.len() - 1;
+        if deflection_m >= self.deflection_m[end] {
+            return self.work_j[end]
+                + self.force_n[end] * (deflection_m - self.deflection_m[end]);
+        }
+        let i = self.segment(deflection_m);
+        let d = (deflection_m - self.deflection_m[i]).max(0.0);
+        self.work_j[i] + 0.5 * (self.force_n[i] + self.force_at(deflection_m)) * d
+    }
+
+    /// `∫F dd` over the whole table, in J.
+    pub fn work(&self) -> f64 {
+        self.work_j[self.work_j.len() - 1]
+    }
+
+    /// The deflection at which the envelope has taken up `energy_j`; beyond its end the
+    /// last force holds. `None` if it never does.
+    pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
+        let end = self.work_j.len() - 1;
+        match self.work_j.iter().position(|&w| w >= energy_j) {
+            Some(0) => Some(0.0),
+            Some(i) => {
+                let (d0, d1) = (self.deflection_m[i - 1], self.deflection_m[i]);
+                let (f0, f1) = (self.force_n[i - 1], self.force_n[i]);
+                let rest = energy_j - self.work_j[i - 1];
+                let slope = (f1 - f0) / (d1 - d0);
+                // Root of f0 d + slope d²/2 = rest, in the form that is exact for slope → 0.
+                let root = (f0 * f0 + 2.0 * slope * rest).max(0.0).sqrt();
+                Some((d0 + 2.0 * rest / (f0 + root)).clamp(d0, d1))
+            }
+            None if self.force_n[end] > 0.0 => {
+                Some(self.end_m() + (energy_j - self.work_j[end]) / self.force_n[end])
+            }
+            None => None,
+        }
+    }
+
+    /// Steepest rise, in N/m; 0 if the force never rises.
+    pub fn max_slope(&self) -> f64 {
+        let slope = |i: usize| {
+            (self.force_n[i] - self.force_n[i - 1])
+                / (self.deflection_m[i] - self.deflection_m[i - 1])
+        };
+        (1..self.force_n.len()).map(slope).fold(0.0, f64::max)
+    }
+
+    /// Largest force, in N.
+    pub fn peak_force_n(&self) -> f64 {
+        self.force_n.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Index of the segment that holds `deflection_m`, the first or last one beyond the ends.
+    fn segment(&self, deflection_m: f64) -> usize {
+        let above = self.deflection_m.partition_point(|&d| d <= deflection_m);
+        above.clamp(1, self.deflection_m.len() - 1) - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle() -> Envelope {
+        Envelope::new(vec![0.0, 1.0, 3.0], vec![0.0, 10.0, 0.0]).unwrap()
+    }
+
+    #[test]
+    fn work_is_exact_between_points() {
+        let e = triangle();
+        assert_eq!(e.work_to(0.5), 1.25);
+        assert_eq!(e.work_to(2.0), 5.0 + 7.5);
+        assert_eq!(e.work(), 15.0);
+        assert_eq!(e.work_to(9.0), 15.0, "the last force, 0, is held");
+    }
+
+    #[test]
+    fn deflection_for_work_inverts_work() {
+        let e = triangle();
+        for d in [0.1, 0.9, 1.0, 1.7, 2.9] {
+            let back = e.deflection_for_work(e.work_to(d)).unwrap();
+            assert!((back - d).abs() < 1e-12, "{d} came back as {back}");
+        }
+        assert_eq!(e.deflection_for_work(20.0), None, "the force has ended");
+        let constant = Envelope::new(vec![0.0, 1.0], vec![2.0, 2.0]).unwrap();
+        assert_eq!(constant.deflection_for_work(5.0), Some(2.5));
+    }
+
+    #[test]
+    fn refuses_what_is_no_function() {
+        let order = Envelope::new(vec![0.0, 1.0, 1.0], vec![0.0; 3]).unwrap_err();
+        assert_eq!(
+            order.to_string(),
+            "the deflection must increase, found 1 m after 1 m at point 3"
+        );
+        assert!(Envelope::new(vec![0.1, 1.0], vec![0.0; 2]).is_err());
+        assert!(Envelope::new(vec![0.0, f64::NAN], vec![0.0; 2]).is_err());
+        assert!(Envelope::new(vec![0.0], vec![0.0]).is_err());
+    }
+}

@@ -1,0 +1,217 @@
+//! Curves: force over deflection, extracted from histories by a declared recipe.
+//!
+//! Deflection is positive in compression, force pushes the bodies apart; SI throughout.
+
+pub mod cfc;
+pub mod energy;
+pub mod envelope;
+pub mod extract;
+pub mod loading;
+pub mod recipe;
+pub mod resample;
+
+use serde::{Deserialize, Serialize};
+
+use crate::unit::Speed;
+pub use envelope::{Envelope, EnvelopeError};
+
+/// A force–deflection history: what one run measured at an interface.
+///
+/// Invariant: equal lengths of at least two, all finite, time strictly increasing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    time_s: Vec<f64>,
+    deflection_m: Vec<f64>,
+    force_n: Vec<f64>,
+}
+
+/// Why three columns are no curve.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CurveError {
+    #[error("a curve needs at least 2 states, found {states}")]
+    TooShort { states: usize },
+    #[error("columns differ in length: {time} times, {deflection} deflections, {force} forces")]
+    Lengths { time: usize, deflection: usize, force: usize },
+    #[error("the {column} of state {state} is {value}: expected a finite number")]
+    NotFinite { column: &'static str, state: usize, value: f64 },
+    #[error("time does not increase at state {state}: {time_s} s follows {before_s} s")]
+    TimeOrder { state: usize, time_s: f64, before_s: f64 },
+}
+
+impl Curve {
+    /// Checks the invariant once.
+    ///
+    /// # Errors
+    /// [`CurveError`] names the first state that breaks it, counted from 1.
+    pub fn new(
+        time_s: Vec<f64>,
+        deflection_m: Vec<f64>,
+        force_n: Vec<f64>,
+    ) -> Result<Self, CurveError> {
+        let (time, deflection, force) = (time_s.len(), deflection_m.len(), force_n.len());
+        if time != deflection || time != force {
+            return Err(CurveError::Lengths { time, deflection, force });
+        }
+        if time < 2 {
+            return Err(CurveError::TooShort { states: time });
+        }
+        let columns = [("time", &time_s), ("deflection", &deflection_m), ("force", &force_n)];
+        for (column, values) in columns {
+            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                return Err(CurveError::NotFinite { column, state: i + 1, value: values[i] });
+            }
+        }
+        if let Some(i) = time_s.windows(2).position(|w| w[1] <= w[0]) {
+            let (before_s, time_s) = (time_s[i], time_s[i + 1]);
+            return Err(CurveError::TimeOrder { state: i + 2, time_s, before_s });
+        }
+        Ok(Self { time_s, deflection_m, force_n })
+    }
+
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    pub fn deflection_m(&self) -> &[f64] {
+        &self.deflection_m
+    }
+
+    pub fn force_n(&self) -> &[f64] {
+        &self.force_n
+    }
+}
+
+/// Which force a curve is: the two differ by what is stopped inside the crush zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceKind {
+    /// What the obstacle feels: wall, contact side, section.
+    Contact,
+    /// Mass times acceleration of the body.
+    Body,
+}
+
+impl ForceKind {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Contact => "contact",
+            Self::Body => "body",
+        }
+    }
+}
+
+/// Masses of a case: one body against a wall, or two bodies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Masses {
+    pub body_kg: f64,
+    /// The other body of a pair; `None` against a rigid wall.
+    pub other_kg: Option<f64>,
+}
+
+impl Masses {
+    /// The mass that moves along the deflection: the body's against a wall, the reduced
+    /// mass `m_a m_b / (m_a + m_b)` of a pair.
+    pub fn effective_kg(&self) -> f64 {
+        match self.other_kg {
+            Some(other) => self.body_kg * other / (self.body_kg + other),
+            None => self.body_kg,
+        }
+    }
+
+    /// Kinetic energy that a stop at a common velocity takes up, in J.
+    pub fn kinetic_energy_j(&self, speed: Speed) -> f64 {
+        0.5 * self.effective_kg() * speed.m_per_s * speed.m_per_s
+    }
+}
+
+/// A file a case was made from, so that a curve can be traced to its bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// As found from the manifest: `25kmh/nodout`.
+    pub path: String,
+    pub size_bytes: u64,
+    pub blake3: String,
+    pub format: String,
+    pub solver: Option<String>,
+    pub version: Option<String>,
+    pub title: Option<String>,
+    pub problems: usize,
+}
+
+/// Energy of the loading branch against the kinetic energy it stopped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyAudit {
+    /// `W`: integral of force over deflection up to the largest deflection.
+    pub work_j: f64,
+    /// `E`: kinetic energy of the impact.
+    pub kinetic_j: f64,
+}
+
+impl EnergyAudit {
+    /// Imbalance over which a warning is due.
+    pub const TOLERANCE: f64 = 0.05;
+
+    /// `W/E`; 1 where the curve takes up exactly the impact's energy.
+    pub fn ratio(&self) -> f64 {
+        self.work_j / self.kinetic_j
+    }
+}
+
+/// One FE run as the database keeps it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    pub study: String,
+    pub group: String,
+    pub name: String,
+    pub speed: Speed,
+    pub masses: Masses,
+    pub force_kind: ForceKind,
+    /// At the common interval, from contact on.
+    pub sampled: Curve,
+    /// Rate of the deflection at the sampled times, in m/s.
+    pub closing_speed_m_per_s: Vec<f64>,
+    /// At the solver's rate, from contact on (filtered if the recipe says so).
+    pub original: Curve,
+    /// Solver's time of the first contact, in s; curves count from it.
+    pub contact_time_s: f64,
+    /// Secant of the unloading branch between 90 % and 10 % of its force, in N/m;
+    /// `None` if the record ends before.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    pub audit: EnergyAudit,
+    /// The recipe and the run's entry, as JSON.
+    pub recipe: String,
+    /// Hash over recipe, entry and sources: equal hashes need no new extraction.
+    pub fingerprint: String,
+    pub sources: Vec<Source>,
+    /// What the extraction did that the manifest does not say.
+    pub notes: Vec<String>,
+    /// What the user should look at before trusting the case.
+    pub warnings: Vec<String>,
+}
+
+impl Case {
+    /// The loading branch at the solver's rate, with its share of dropped samples.
+    pub fn loading(&self) -> Result<loading::Loading, EnvelopeError> {
+        loading::loading_branch(&self.original)
+    }
+
+    /// Index of the largest deflection in the original curve.
+    pub fn loading_end(&self) -> usize {
+        loading::loading_end(&self.original)
+    }
+
+    /// Largest deflection, in m.
+    pub fn max_deflection_m(&self) -> f64 {
+        self.original.deflection_m[self.loading_end()]
+    }
+
+    /// Largest contact force, in N.
+    pub fn peak_force_n(&self) -> f64 {
+        self.original.force_n.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Whether the run ended before the bodies moved apart again.
+    pub fn is_truncated(&self) -> bool {
+        self.loading_end() + 1 == self.original.time_s.len()
+    }
+}

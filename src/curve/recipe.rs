@@ -1,0 +1,259 @@
+//! The recipe of a study: which histories make a curve, and how.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::history::Side;
+
+/// How curves are extracted from the runs of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    pub deflection: DeflectionSource,
+    pub force: ForceSource,
+    #[serde(default)]
+    pub filter: Filter,
+    #[serde(default)]
+    pub sampling: Sampling,
+}
+
+/// Displacement of one node, or the difference of two.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeflectionSource {
+    /// File in the run's folder.
+    pub file: String,
+    /// Node behind the crush zone, or the centre of gravity.
+    pub node: i64,
+    /// Node whose displacement is taken off, on the other body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub minus_node: Option<i64>,
+    /// `x_displacement`, `y_displacement` or `z_displacement`.
+    pub component: DisplacementComponent,
+}
+
+/// Direction of the deflection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[allow(clippy::enum_variant_names, reason = "the names are the components' in the files")]
+pub enum DisplacementComponent {
+    XDisplacement,
+    YDisplacement,
+    ZDisplacement,
+}
+
+impl DisplacementComponent {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::XDisplacement => "x_displacement",
+            Self::YDisplacement => "y_displacement",
+            Self::ZDisplacement => "z_displacement",
+        }
+    }
+
+    /// The component that holds its rate.
+    pub fn velocity(self) -> &'static str {
+        match self {
+            Self::XDisplacement => "x_velocity",
+            Self::YDisplacement => "y_velocity",
+            Self::ZDisplacement => "z_velocity",
+        }
+    }
+}
+
+/// Where the force comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "ForceTable", into = "ForceTable")]
+#[schemars(with = "ForceTable")]
+pub enum ForceSource {
+    /// A contact force: rigid wall, side of an interface.
+    Contact { file: String, id: i64, side: Option<Side>, component: String },
+    /// Mass of the body times the acceleration of its node.
+    Body { file: String, node: i64, motion: BodyMotion, component: String },
+}
+
+/// What the acceleration of a body is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyMotion {
+    Acceleration,
+    /// Differentiated by central differences: a mean over two output intervals.
+    Velocity,
+}
+
+/// The force as written in a manifest.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ForceTable {
+    /// File in the run's folder.
+    file: String,
+    /// Wall or interface of a contact force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<i64>,
+    /// Side of an interface: "surfa" (slave) or "surfb" (master).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    side: Option<String>,
+    /// Node of a body force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    node: Option<i64>,
+    /// Such as "normal_force", "x_force"; for a body force "x_acceleration" or "x_velocity".
+    component: String,
+    /// "mass" makes a body force of the node's acceleration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    times: Option<String>,
+}
+
+impl TryFrom<ForceTable> for ForceSource {
+    type Error = String;
+
+    fn try_from(table: ForceTable) -> Result<Self, String> {
+        let ForceTable { file, id, side, node, component, times } = table;
+        match (id, node, times.as_deref()) {
+            (Some(id), None, None) => {
+                let side = side
+                    .map(|s| {
+                        Side::parse(&s).ok_or_else(|| {
+                            format!("side \"{s}\" is not known: write \"surfa\" (slave) or \"surfb\" (master)")
+                        })
+                    })
+                    .transpose()?;
+                Ok(Self::Contact { file, id, side, component })
+            }
+            (None, Some(node), Some("mass")) => {
+                let motion = match component.as_str() {
+                    "x_acceleration" | "y_acceleration" | "z_acceleration" => {
+                        BodyMotion::Acceleration
+                    }
+                    "x_velocity" | "y_velocity" | "z_velocity" => BodyMotion::Velocity,
+                    _ => {
+                        return Err(format!(
+                            "\"{component}\" times mass is no force: use x_acceleration, or x_velocity to differentiate it"
+                        ));
+                    }
+                };
+                Ok(Self::Body { file, node, motion, component })
+            }
+            (None, Some(_), _) => {
+                Err("a force from a node needs times = \"mass\" (body force)".into())
+            }
+            _ => Err(
+                "a force needs either id = … (a wall or contact) or node = … with times = \"mass\""
+                    .into(),
+            ),
+        }
+    }
+}
+
+impl From<ForceSource> for ForceTable {
+    fn from(source: ForceSource) -> Self {
+        match source {
+            ForceSource::Contact { file, id, side, component } => Self {
+                file,
+                id: Some(id),
+                side: side.map(|s| s.name().into()),
+                node: None,
+                component,
+                times: None,
+            },
+            ForceSource::Body { file, node, component, .. } => Self {
+                file,
+                id: None,
+                side: None,
+                node: Some(node),
+                component,
+                times: Some("mass".into()),
+            },
+        }
+    }
+}
+
+/// Filter of the force: `"CFC60"` (default), another class, or `"none"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+#[schemars(with = "String")]
+pub enum Filter {
+    None,
+    Cfc(u32),
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Self::Cfc(60)
+    }
+}
+
+impl TryFrom<String> for Filter {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let class = text.strip_prefix("CFC").and_then(|c| c.parse().ok());
+        match (text.as_str(), class) {
+            ("none", _) => Ok(Self::None),
+            (_, Some(class @ (60 | 180 | 600 | 1000))) => Ok(Self::Cfc(class)),
+            _ => Err(format!(
+                "filter \"{text}\" is not known: write \"CFC60\", \"CFC180\", \"CFC600\", \"CFC1000\" or \"none\""
+            )),
+        }
+    }
+}
+
+impl From<Filter> for String {
+    fn from(filter: Filter) -> Self {
+        match filter {
+            Filter::None => "none".into(),
+            Filter::Cfc(class) => format!("CFC{class}"),
+        }
+    }
+}
+
+/// The common times of all cases: `states` from contact on, one each `interval_ms`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "SamplingTable", into = "SamplingTable")]
+#[schemars(with = "SamplingTable")]
+pub struct Sampling {
+    pub states: usize,
+    pub interval_s: f64,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SamplingTable {
+    /// 2 to 1 000 000.
+    states: usize,
+    /// Above 0.
+    interval_ms: f64,
+}
+
+/// Guards memory against a mistyped number; real outputs have hundreds of states.
+const MAX_STATES: usize = 1_000_000;
+
+impl TryFrom<SamplingTable> for Sampling {
+    type Error = String;
+
+    fn try_from(table: SamplingTable) -> Result<Self, String> {
+        if !(2..=MAX_STATES).contains(&table.states) {
+            return Err(format!(
+                "sampling needs states from 2 to {MAX_STATES}, found {}",
+                table.states
+            ));
+        }
+        if !(table.interval_ms > 0.0 && table.interval_ms.is_finite()) {
+            return Err(format!("sampling needs interval_ms above 0, found {}", table.interval_ms));
+        }
+        Ok(Self { states: table.states, interval_s: table.interval_ms * 1e-3 })
+    }
+}
+
+impl From<Sampling> for SamplingTable {
+    fn from(sampling: Sampling) -> Self {
+        // Back through the decimal that was typed: 0.75, not 0.7500000000000001.
+        let interval_ms = (sampling.interval_s * 1e15).round() / 1e12;
+        Self { states: sampling.states, interval_ms }
+    }
+}
+
+impl Default for Sampling {
+    /// The reference data's: 400 states, one each 0.75 ms.
+    fn default() -> Self {
+        Self { states: 400, interval_s: 0.75e-3 }
+    }
+}

@@ -1,0 +1,76 @@
+//! Resampling and differentiation of histories.
+
+/// Why a history has no value at a time.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]
+pub struct OutOfRange {
+    pub time_s: f64,
+    pub first_s: f64,
+    pub last_s: f64,
+}
+
+/// Values at `times_s` by linear interpolation.
+///
+/// `at_s`: increasing, at least one; `times_s`: increasing, within the range of `at_s`.
+/// Returns one value per time, in the unit of `values`.
+///
+/// # Errors
+/// [`OutOfRange`] names the first time outside the history.
+pub fn interpolate(at_s: &[f64], values: &[f64], times_s: &[f64]) -> Result<Vec<f64>, OutOfRange> {
+    let (first_s, last_s) = (at_s[0], at_s[at_s.len() - 1]);
+    let mut i = 0;
+    times_s
+        .iter()
+        .map(|&time_s| {
+            if !(first_s..=last_s).contains(&time_s) {
+                return Err(OutOfRange { time_s, first_s, last_s });
+            }
+            while i + 2 < at_s.len() && at_s[i + 1] <= time_s {
+                i += 1;
+            }
+            if at_s.len() == 1 {
+                return Ok(values[0]);
+            }
+            let share = (time_s - at_s[i]) / (at_s[i + 1] - at_s[i]);
+            Ok(values[i] + share * (values[i + 1] - values[i]))
+        })
+        .collect()
+}
+
+/// Rate of `values` over `time_s`: central differences, one-sided at both ends.
+///
+/// `time_s`: strictly increasing, at least two. Over an output interval `h` the result is
+/// a mean over `2 h`, as the contact forces derived from impulses are.
+pub fn derivative(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let last = values.len() - 1;
+    (0..values.len())
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+            (values[b] - values[a]) / (time_s[b] - time_s[a])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolates_within_and_refuses_beyond() {
+        let (t, v) = ([0.0, 1.0, 3.0], [0.0, 10.0, 30.0]);
+        assert_eq!(interpolate(&t, &v, &[0.0, 0.5, 1.0, 2.0, 3.0]).unwrap(), [0.0, 5.0, 10.0, 20.0, 30.0]);
+        assert_eq!(
+            interpolate(&t, &v, &[3.5]).unwrap_err().to_string(),
+            "time 3.5 s lies outside the history (0 s to 3 s)"
+        );
+    }
+
+    #[test]
+    fn derivative_of_a_parabola_is_exact_inside() {
+        let t: Vec<f64> = (0..10).map(|i| f64::from(i) * 0.5).collect();
+        let v: Vec<f64> = t.iter().map(|t| t * t).collect();
+        let rate = derivative(&t, &v);
+        assert_eq!(rate[4], 4.0);
+        assert_eq!(rate[0], 0.5, "one-sided at the end");
+    }
+}

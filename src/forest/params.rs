@@ -1,0 +1,193 @@
+//! Hyperparameters: a builder, checked once into the type that can fit.
+
+use linfa::{Float, ParamGuard};
+use serde::{Deserialize, Serialize};
+
+/// How thresholds are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Thresholds {
+    /// Every midpoint between consecutive distinct values; the best one is taken.
+    Midpoint,
+    /// One uniform draw in the node's range per feature (extra-trees).
+    Random,
+}
+
+/// When a node is not split although it could be: its coefficient of variation is low.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopRule {
+    /// Never: grow until leaves are pure.
+    Unpruned,
+    /// `Var/Mean`, as printed in the reference; in the unit of the target.
+    VarOverMean(f64),
+    /// `sqrt(Var)/|Mean|`, dimensionless.
+    StdOverMean(f64),
+}
+
+/// How many features are candidates at a split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FeaturesPerSplit {
+    All,
+    /// This many that are not constant in the node, drawn without replacement.
+    Count(usize),
+}
+
+/// Why a forest cannot be fitted.
+#[derive(Debug, thiserror::Error)]
+pub enum ForestError {
+    #[error("a forest needs at least 1 tree, found 0")]
+    NoTrees,
+    #[error("min_samples_leaf must be at least 1, found 0")]
+    MinSamplesLeaf,
+    #[error("max_depth must be at least 1, found 0")]
+    MaxDepth,
+    #[error("features per split must be at least 1, found 0")]
+    FeaturesPerSplit,
+    #[error("the stop rule's threshold must be a finite number of at least 0, found {threshold}")]
+    StopThreshold { threshold: f64 },
+    #[error("out-of-bag error needs bootstrap samples: set bootstrap(true)")]
+    OutOfBagWithoutBootstrap,
+    #[error("features per split are {count}, but the records have {features} features")]
+    TooManyFeaturesPerSplit { count: usize, features: usize },
+    #[error("there are no samples to fit")]
+    NoSamples,
+    #[error("there are no features to split on")]
+    NoFeatures,
+    #[error("{samples} samples are more than a forest can index ({most})", most = u32::MAX)]
+    TooManySamples { samples: usize },
+    #[error("{records} records but {targets} targets")]
+    Lengths { records: usize, targets: usize },
+    #[error("record {row}, feature {feature} is {value}: expected a finite number")]
+    RecordNotFinite { row: usize, feature: usize, value: f64 },
+    #[error("target {row} is {value}: expected a finite number")]
+    TargetNotFinite { row: usize, value: f64 },
+    #[error(transparent)]
+    Linfa(#[from] linfa::Error),
+}
+
+/// Checked hyperparameters; only these can fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForestValidParams<F> {
+    pub(super) trees: usize,
+    pub(super) seed: u64,
+    pub(super) bootstrap: bool,
+    pub(super) thresholds: Thresholds,
+    pub(super) stop: StopRule,
+    pub(super) min_samples_leaf: usize,
+    pub(super) max_depth: Option<usize>,
+    pub(super) features_per_split: FeaturesPerSplit,
+    pub(super) out_of_bag: bool,
+    #[serde(skip)]
+    float: std::marker::PhantomData<F>,
+}
+
+impl<F> ForestValidParams<F> {
+    pub fn thresholds(&self) -> Thresholds {
+        self.thresholds
+    }
+}
+
+/// Hyperparameters of a regression forest, unchecked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForestParams<F>(ForestValidParams<F>);
+
+impl<F: Float> ForestParams<F> {
+    /// A forest of `trees` unpruned trees on bootstrap samples, all features at every
+    /// split, midpoint thresholds, seed 0.
+    pub fn new(trees: usize) -> Self {
+        Self(ForestValidParams {
+            trees,
+            seed: 0,
+            bootstrap: true,
+            thresholds: Thresholds::Midpoint,
+            stop: StopRule::Unpruned,
+            min_samples_leaf: 1,
+            max_depth: None,
+            features_per_split: FeaturesPerSplit::All,
+            out_of_bag: false,
+            float: std::marker::PhantomData,
+        })
+    }
+
+    /// Seed of all random draws. The same seed gives the same forest on any number of threads.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.0.seed = seed;
+        self
+    }
+
+    /// Whether each tree sees N samples drawn with replacement (default) or all once.
+    pub fn bootstrap(mut self, bootstrap: bool) -> Self {
+        self.0.bootstrap = bootstrap;
+        self
+    }
+
+    pub fn thresholds(mut self, thresholds: Thresholds) -> Self {
+        self.0.thresholds = thresholds;
+        self
+    }
+
+    pub fn stop(mut self, stop: StopRule) -> Self {
+        self.0.stop = stop;
+        self
+    }
+
+    /// Fewest samples of a leaf; samples drawn twice count twice.
+    pub fn min_samples_leaf(mut self, samples: usize) -> Self {
+        self.0.min_samples_leaf = samples;
+        self
+    }
+
+    /// Most splits between root and leaf; `None` for no limit.
+    pub fn max_depth(mut self, depth: Option<usize>) -> Self {
+        self.0.max_depth = depth;
+        self
+    }
+
+    pub fn features_per_split(mut self, features: FeaturesPerSplit) -> Self {
+        self.0.features_per_split = features;
+        self
+    }
+
+    /// Whether to estimate the error from the samples each tree did not see.
+    pub fn out_of_bag(mut self, out_of_bag: bool) -> Self {
+        self.0.out_of_bag = out_of_bag;
+        self
+    }
+}
+
+impl<F: Float> ParamGuard for ForestParams<F> {
+    type Checked = ForestValidParams<F>;
+    type Error = ForestError;
+
+    fn check_ref(&self) -> Result<&Self::Checked, ForestError> {
+        let p = &self.0;
+        if p.trees == 0 {
+            return Err(ForestError::NoTrees);
+        }
+        if p.min_samples_leaf == 0 {
+            return Err(ForestError::MinSamplesLeaf);
+        }
+        if p.max_depth == Some(0) {
+            return Err(ForestError::MaxDepth);
+        }
+        if p.features_per_split == FeaturesPerSplit::Count(0) {
+            return Err(ForestError::FeaturesPerSplit);
+        }
+        if let StopRule::VarOverMean(threshold) | StopRule::StdOverMean(threshold) = p.stop
+            && !(threshold.is_finite() && threshold >= 0.0)
+        {
+            return Err(ForestError::StopThreshold { threshold });
+        }
+        if p.out_of_bag && !p.bootstrap {
+            return Err(ForestError::OutOfBagWithoutBootstrap);
+        }
+        Ok(p)
+    }
+
+    fn check(self) -> Result<Self::Checked, ForestError> {
+        self.check_ref()?;
+        Ok(self.0)
+    }
+}

@@ -1,0 +1,61 @@
+//! TOML files written by users: parsing, with errors that name file, line and columns.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+/// Manifests have a few kilobytes; anything beyond this is another kind of file.
+const MAX_BYTES: u64 = 16 << 20;
+
+/// Why a TOML file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ManifestError {
+    #[error("{path}: {source}")]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{path}: {bytes} bytes are too many for a TOML file: is this another kind of file?")]
+    TooLarge { path: PathBuf, bytes: u64 },
+    #[error("{path}: line {line}, columns {from}-{to}: {message}")]
+    Toml { path: PathBuf, line: usize, from: usize, to: usize, message: String },
+    #[error("{path}: {message}")]
+    Invalid { path: PathBuf, message: String },
+}
+
+/// Reads and parses the TOML file at `path`.
+///
+/// # Errors
+/// [`ManifestError`] with the place of an unknown key, a missing key or a bad value.
+pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
+    let io = |source| ManifestError::Io { path: path.into(), source };
+    let bytes = fs::metadata(path).map_err(io)?.len();
+    if bytes > MAX_BYTES {
+        return Err(ManifestError::TooLarge { path: path.into(), bytes });
+    }
+    parse(path, &fs::read_to_string(path).map_err(io)?)
+}
+
+/// Parses TOML text; `path` is for messages.
+pub fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
+    toml::from_str(text).map_err(|error| {
+        let message = error.message().trim().replace('\n', "; ");
+        match error.span() {
+            Some(span) => {
+                let (line, from) = line_and_column(text, span.start);
+                let (end_line, end) = line_and_column(text, span.end.max(span.start + 1) - 1);
+                // A value over several lines is shown by where it begins.
+                let to = if end_line == line { end } else { from };
+                ManifestError::Toml { path: path.into(), line, from, to, message }
+            }
+            None => ManifestError::Invalid { path: path.into(), message },
+        }
+    })
+}
+
+/// Line and column of a byte, both counted from 1.
+fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..byte.min(text.len())];
+    let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
+    let column = before.iter().rev().take_while(|&&b| b != b'\n').count() + 1;
+    (line, column)
+}

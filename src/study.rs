@@ -1,0 +1,448 @@
+//! Study manifest: which runs there are, and how each becomes a case.
+
+use std::collections::HashSet;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::curve::extract::{ExtractError, Measured, MeasuredForce, Setup, extract};
+use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
+use crate::curve::{Case, ForceKind, Masses, Source};
+use crate::history::{EntityId, Side};
+use crate::manifest::{self, ManifestError};
+use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
+use crate::unit::{MassText, SpeedKind, SpeedText, UnitSystem};
+
+/// Part of every fingerprint: raise it when the extraction gives other numbers.
+const EXTRACTION_VERSION: u32 = 1;
+
+/// A study manifest as written (TOML).
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    pub study: Head,
+    pub recipe: Recipe,
+    /// One entry per FE run.
+    pub run: Vec<RunEntry>,
+}
+
+/// What all runs of a study share.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Head {
+    pub name: String,
+    /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …
+    #[schemars(with = "String")]
+    pub units: UnitSystem,
+    /// Group of the curve database.
+    pub group: String,
+    pub kind: StudyKind,
+    /// The pair is modelled as one body against its symmetry plane: closing speed and
+    /// deflection are twice the run's.
+    #[serde(default)]
+    pub half_model: bool,
+}
+
+/// What hits what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StudyKind {
+    /// A body against a rigid wall; speeds are wall speeds.
+    Wall,
+    /// Two bodies; speeds are closing speeds.
+    Pair,
+}
+
+/// One FE run.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunEntry {
+    /// Folder with the solver's files, relative to the manifest.
+    pub path: String,
+    /// Name of the case; the path if absent.
+    pub name: Option<String>,
+    /// Impact speed; taken from the first state if absent.
+    pub speed: Option<SpeedText>,
+    /// Mass of the body, or of each body of a pair.
+    pub mass: MassText,
+    /// Mass of the other body, if the bodies of a pair differ.
+    pub other_mass: Option<MassText>,
+}
+
+/// A manifest that makes sense, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Study {
+    manifest: Manifest,
+    folder: PathBuf,
+}
+
+/// Why one run gives no case.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    #[error("the run's folder {path} does not exist: check path in the manifest")]
+    NoFolder { path: PathBuf },
+    #[error("the run's folder {folder} has no file \"{file}\": it has {found}")]
+    NoFile { folder: PathBuf, file: String, found: String },
+    #[error("{path}: {source}")]
+    Io { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error("{path}: {source}")]
+    Extract { path: PathBuf, source: ExtractError },
+}
+
+/// A source file of a run before it is read.
+#[derive(Clone, Debug, PartialEq)]
+struct Located {
+    /// As written in the recipe.
+    file: String,
+    path: PathBuf,
+    size_bytes: u64,
+    blake3: String,
+}
+
+/// A run whose files are found and hashed but not read.
+pub struct LocatedRun<'a> {
+    study: &'a Study,
+    entry: &'a RunEntry,
+    files: Vec<Located>,
+    recipe: String,
+    pub fingerprint: String,
+}
+
+/// Loads and checks a study manifest.
+///
+/// # Errors
+/// [`ManifestError`] with line and columns for what TOML or a single value breaks, and
+/// without for what only the whole shows.
+pub fn load(path: &Path) -> Result<Study, ManifestError> {
+    let manifest: Manifest = manifest::load(path)?;
+    check(&manifest)
+        .map_err(|message| ManifestError::Invalid { path: path.into(), message })?;
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    Ok(Study { manifest, folder })
+}
+
+fn check(manifest: &Manifest) -> Result<(), String> {
+    let Head { name, group, kind, half_model, .. } = &manifest.study;
+    for (key, value) in [("name", name), ("group", group)] {
+        if value.trim().is_empty() {
+            return Err(format!("study.{key} is empty"));
+        }
+    }
+    if group.contains('/') || group == "." {
+        return Err(format!("study.group \"{group}\" may not contain \"/\""));
+    }
+    if *kind == StudyKind::Wall && *half_model {
+        return Err("half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair".into());
+    }
+    if manifest.run.is_empty() {
+        return Err("there is no [[run]]".into());
+    }
+    let mut names = HashSet::new();
+    for run in &manifest.run {
+        if run.path.trim().is_empty() {
+            return Err("a [[run]] has an empty path".into());
+        }
+        if *kind == StudyKind::Wall && run.other_mass.is_some() {
+            return Err(format!("run \"{}\": other_mass needs kind = \"pair\"", run.path));
+        }
+        if !names.insert(run.case_name()) {
+            return Err(format!(
+                "two runs are named \"{}\": give one of them a name = …",
+                run.case_name()
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl RunEntry {
+    /// Name of the run's case in the database.
+    pub fn case_name(&self) -> String {
+        let name = self.name.as_deref().unwrap_or(&self.path);
+        name.trim_start_matches("./").trim_matches('/').replace('/', "_")
+    }
+}
+
+impl Study {
+    pub fn name(&self) -> &str {
+        &self.manifest.study.name
+    }
+
+    pub fn group(&self) -> &str {
+        &self.manifest.study.group
+    }
+
+    pub fn runs(&self) -> &[RunEntry] {
+        &self.manifest.run
+    }
+
+    /// Finds and hashes the files of a run.
+    ///
+    /// # Errors
+    /// [`RunError`] if the folder or a file is missing or unreadable.
+    pub fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, RunError> {
+        let folder = self.folder.join(&entry.path);
+        if !folder.is_dir() {
+            return Err(RunError::NoFolder { path: folder });
+        }
+        let recipe = &self.manifest.recipe;
+        let mut names = vec![recipe.deflection.file.as_str()];
+        if !names.contains(&force_file(&recipe.force)) {
+            names.push(force_file(&recipe.force));
+        }
+        let files = names
+            .into_iter()
+            .map(|name| locate_file(&folder, name))
+            .collect::<Result<Vec<_>, _>>()?;
+        let recipe = self.recipe_json(entry);
+        let mut hash = blake3::Hasher::new();
+        hash.update(&EXTRACTION_VERSION.to_le_bytes());
+        hash.update(recipe.as_bytes());
+        for file in &files {
+            hash.update(file.blake3.as_bytes());
+        }
+        let fingerprint = hash.finalize().to_hex().to_string();
+        Ok(LocatedRun { study: self, entry, files, recipe, fingerprint })
+    }
+
+    /// Everything of the manifest that decides the case's numbers.
+    fn recipe_json(&self, entry: &RunEntry) -> String {
+        let head = &self.manifest.study;
+        serde_json::json!({
+            "study": head.name,
+            "units": head.units,
+            "kind": self.speed_kind(),
+            "half_model": head.half_model,
+            "recipe": self.manifest.recipe,
+            "run": {
+                "path": entry.path,
+                "speed_m_per_s": entry.speed.map(|s| s.0),
+                "mass_kg": entry.mass.0,
+                "other_mass_kg": entry.other_mass.map(|m| m.0),
+            },
+        })
+        .to_string()
+    }
+
+    fn speed_kind(&self) -> SpeedKind {
+        match self.manifest.study.kind {
+            StudyKind::Wall => SpeedKind::Wall,
+            StudyKind::Pair => SpeedKind::Closing,
+        }
+    }
+
+    fn masses(&self, entry: &RunEntry) -> Masses {
+        let body_kg = entry.mass.0;
+        let other_kg = match self.manifest.study.kind {
+            StudyKind::Wall => None,
+            StudyKind::Pair => Some(entry.other_mass.map_or(body_kg, |m| m.0)),
+        };
+        Masses { body_kg, other_kg }
+    }
+}
+
+impl LocatedRun<'_> {
+    /// Reads the selected histories and extracts the case.
+    ///
+    /// # Errors
+    /// [`RunError`] names the file and what to change.
+    pub fn extract(&self) -> Result<Case, RunError> {
+        let study = self.study;
+        let head = &study.manifest.study;
+        let recipe = &study.manifest.recipe;
+        let motion_file = self.file(&recipe.deflection.file);
+        let motion = read_motion(motion_file, &recipe.deflection)?;
+        let force_file = self.file(force_file(&recipe.force));
+        let force = read_force(force_file, &recipe.force)?;
+        let at = |file: &SolverFile, node: i64, component: &str| {
+            file.history(Some(EntityId::new(node)), component).cloned()
+        };
+        let DeflectionSource { node, minus_node, component, .. } = recipe.deflection;
+        let lacking = |path: &Path, component: &str, file: &SolverFile| ReadError::NoSuchComponent {
+            path: path.into(),
+            format: file.format,
+            component: component.into(),
+            known: file.components.join(", "),
+        };
+        let displacement = at(&motion, node, component.name())
+            .ok_or_else(|| lacking(&motion_file.path, component.name(), &motion))?;
+        let minus_displacement = minus_node.and_then(|n| at(&motion, n, component.name()));
+        let velocity = at(&motion, node, component.velocity());
+        let minus_velocity = minus_node.and_then(|n| at(&motion, n, component.velocity()));
+        let (force_history, force_kind) = match &recipe.force {
+            ForceSource::Contact { id, side, component, .. } => {
+                (contact_history(&force, *id, *side, component), ForceKind::Contact)
+            }
+            ForceSource::Body { node, component, .. } => {
+                (at(&force, *node, component), ForceKind::Body)
+            }
+        };
+        let force_history = force_history
+            .ok_or_else(|| lacking(&force_file.path, force_component(&recipe.force), &force))?;
+        let measured = Measured {
+            units: head.units,
+            displacement: &displacement,
+            minus_displacement: minus_displacement.as_ref(),
+            velocity: velocity.as_ref(),
+            minus_velocity: minus_velocity.as_ref(),
+            force: match recipe.force {
+                ForceSource::Contact { .. } => MeasuredForce::Contact(&force_history),
+                ForceSource::Body { motion, .. } => MeasuredForce::Body(&force_history, motion),
+            },
+        };
+        let masses = study.masses(self.entry);
+        let setup = Setup {
+            recipe,
+            kind: study.speed_kind(),
+            half_model: head.half_model,
+            masses,
+            declared_speed_m_per_s: self.entry.speed.map(|s| s.0),
+        };
+        let extracted = extract(&measured, &setup).map_err(|source| RunError::Extract {
+            path: force_file.path.clone(),
+            source,
+        })?;
+        let mut notes = extracted.notes;
+        if let ForceSource::Contact { id, side: None, .. } = recipe.force
+            && let Some(side) = force_history.entity.and_then(|e| e.side)
+        {
+            notes.push(format!(
+                "force: side {} of interface {id} is used, the recipe names none",
+                side.name()
+            ));
+        }
+        let mut warnings = extracted.warnings;
+        let read: Vec<(&Located, &SolverFile)> = match self.files.len() {
+            1 => vec![(motion_file, &motion)],
+            _ => vec![(motion_file, &motion), (force_file, &force)],
+        };
+        for (located, file) in &read {
+            warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
+        }
+        Ok(Case {
+            study: head.name.clone(),
+            group: head.group.clone(),
+            name: self.entry.case_name(),
+            speed: extracted.speed,
+            masses,
+            force_kind,
+            sampled: extracted.sampled,
+            closing_speed_m_per_s: extracted.closing_speed_m_per_s,
+            original: extracted.original,
+            contact_time_s: extracted.contact_time_s,
+            unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
+            audit: extracted.audit,
+            recipe: self.recipe.clone(),
+            fingerprint: self.fingerprint.clone(),
+            sources: read.iter().map(|(l, f)| self.source(l, f)).collect(),
+            notes,
+            warnings,
+        })
+    }
+
+    /// The located file of a recipe's file name; `locate` found every one.
+    fn file(&self, name: &str) -> &Located {
+        self.files.iter().find(|f| f.file == name).unwrap_or(&self.files[0])
+    }
+
+    fn source(&self, located: &Located, file: &SolverFile) -> Source {
+        Source {
+            path: format!("{}/{}", self.entry.path, located.file),
+            size_bytes: located.size_bytes,
+            blake3: located.blake3.clone(),
+            format: file.format.into(),
+            solver: file.solver.clone(),
+            version: file.version.clone(),
+            title: file.title.clone(),
+            problems: file.problems.len(),
+        }
+    }
+}
+
+fn force_file(force: &ForceSource) -> &str {
+    match force {
+        ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
+    }
+}
+
+fn force_component(force: &ForceSource) -> &str {
+    match force {
+        ForceSource::Contact { component, .. } | ForceSource::Body { component, .. } => component,
+    }
+}
+
+fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
+    let path = folder.join(name);
+    let io = |source| RunError::Io { path: path.clone(), source };
+    if !path.is_file() {
+        let mut found: Vec<String> = folder
+            .read_dir()
+            .map_err(io)?
+            .filter_map(Result::ok)
+            .map(|e| e.file_name().to_string_lossy().into_owned())
+            .take(100)
+            .collect();
+        found.sort();
+        let found = if found.is_empty() { "no files".into() } else { found.join(", ") };
+        return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
+    }
+    let mut hasher = blake3::Hasher::new();
+    let file = File::open(&path).map_err(io)?;
+    hasher.update_reader(file).map_err(io)?;
+    Ok(Located {
+        file: name.into(),
+        size_bytes: hasher.count(),
+        blake3: hasher.finalize().to_hex().to_string(),
+        path,
+    })
+}
+
+/// Displacements and, where the file has them, velocities of the recipe's nodes.
+fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {
+    let wanted = |id| WantedId { id, side: None };
+    let ids: Vec<WantedId> =
+        [Some(source.node), source.minus_node].into_iter().flatten().map(wanted).collect();
+    let component = source.component;
+    let select = |components: Vec<String>| Selection {
+        ids: Some(ids.clone()),
+        components: Some(components),
+    };
+    let both = select(vec![component.name().into(), component.velocity().into()]);
+    match solver::read(&file.path, None, &both) {
+        Err(ReadError::NoSuchComponent { component: c, .. }) if c == component.velocity() => {
+            solver::read(&file.path, None, &select(vec![component.name().into()]))
+        }
+        result => result,
+    }
+}
+
+fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadError> {
+    let id = match *source {
+        ForceSource::Contact { id, side, .. } => WantedId { id, side },
+        ForceSource::Body { node, .. } => WantedId { id: node, side: None },
+    };
+    let component = force_component(source).to_string();
+    let selection = Selection { ids: Some(vec![id]), components: Some(vec![component]) };
+    solver::read(&file.path, None, &selection)
+}
+
+/// The history of a wall or of one side of an interface; without a side named, SURFA's.
+fn contact_history(
+    file: &SolverFile,
+    id: i64,
+    side: Option<Side>,
+    component: &str,
+) -> Option<crate::history::History> {
+    let bare = file.history(Some(EntityId::new(id)), component);
+    let of_side = |side| file.history(Some(EntityId { id, side: Some(side) }), component);
+    match side {
+        Some(side) => of_side(side).or(bare),
+        None => bare.or_else(|| of_side(Side::SurfA)),
+    }
+    .cloned()
+}
