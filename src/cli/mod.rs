@@ -1,12 +1,20 @@
 //! The commands: one file each, with its arguments and a `run` that calls the library.
 
+mod arguments;
 mod build;
+mod compare;
 mod db;
+mod demo;
+mod export;
 mod histories;
 mod inspect;
 mod output;
 mod plot;
+mod predict;
 mod progress;
+mod shell;
+mod simulate;
+mod train;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -51,6 +59,14 @@ enum Command {
     Histories(histories::Args),
     Build(build::Args),
     Db(db::Args),
+    Train(train::Args),
+    Predict(predict::Args),
+    Simulate(simulate::Args),
+    Compare(compare::Args),
+    Export(export::Args),
+    Demo(demo::Args),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 /// How a command ended.
@@ -86,13 +102,6 @@ impl Manners {
             eprintln!("warning: {text}");
         }
     }
-
-    /// Something worth knowing on standard error.
-    pub fn note(self, text: &str) {
-        if !self.quiet {
-            eprintln!("{text}");
-        }
-    }
 }
 
 pub fn main() -> ExitCode {
@@ -103,6 +112,14 @@ pub fn main() -> ExitCode {
         Command::Histories(args) => histories::run(&args, manners),
         Command::Build(args) => build::run(&args, manners),
         Command::Db(args) => db::run(&args, manners),
+        Command::Train(args) => train::run(&args, manners),
+        Command::Predict(args) => predict::run(&args, manners),
+        Command::Simulate(args) => simulate::run(&args, manners),
+        Command::Compare(args) => compare::run(&args, manners),
+        Command::Export(args) => export::run(&args, manners),
+        Command::Demo(args) => demo::run(&args, manners),
+        Command::Completions(args) => shell::completions(&args, manners),
+        Command::Man(args) => shell::man(&args, manners),
     };
     ExitCode::from(match result {
         Ok(Outcome::Clean) => DONE,

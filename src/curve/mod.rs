@@ -7,6 +7,7 @@ pub mod energy;
 pub mod envelope;
 pub mod extract;
 pub mod loading;
+pub mod rating;
 pub mod recipe;
 pub mod resample;
 

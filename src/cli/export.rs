@@ -1,0 +1,133 @@
+//! `crumple export`: one curve as a file for another tool.
+
+use std::path::{Path, PathBuf};
+
+use crumple::export::{self, ExportError, FORMATS, Format, Options};
+use crumple::file::write_whole;
+use crumple::unit::UnitSystem;
+use serde::Serialize;
+
+use super::output;
+use super::{CommandResult, Failure, Manners, Outcome};
+
+/// Write a predicted curve for another tool
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple export lead54.json --to lsdyna --units mm-t-s -o lead54.k
+  crumple export lead54.json --to csv
+  crumple export --list")]
+pub struct Args {
+    /// Predicted curve (JSON made by crumple predict)
+    #[arg(required_unless_present = "list")]
+    curve: Option<PathBuf>,
+    /// List the formats
+    #[arg(long)]
+    list: bool,
+    /// File to write (default: standard output)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    target: Target,
+}
+
+/// The target's format and what it leaves open.
+#[derive(clap::Args)]
+pub struct Target {
+    /// Format, if not told by the file's extension (crumple export --list)
+    #[arg(long)]
+    to: Option<String>,
+    /// Units of the target's deck, such as mm-t-s (LS-DYNA; default: SI)
+    #[arg(long, value_parser = units)]
+    units: Option<UnitSystem>,
+    /// Number of the curve in the target's deck
+    #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_999))]
+    curve_id: u32,
+}
+
+fn units(text: &str) -> Result<UnitSystem, String> {
+    UnitSystem::parse(text).map_err(|e| e.to_string())
+}
+
+impl Target {
+    /// The format by `--to`, else by the extension of the file.
+    pub fn format(&self, path: Option<&Path>) -> Result<&'static Format, Failure> {
+        let found = match (&self.to, path) {
+            (Some(name), _) => export::by_name(name),
+            (None, Some(path)) => export::by_extension(path),
+            (None, None) => {
+                let names: Vec<&str> = FORMATS.iter().map(|f| f.name).collect();
+                return Err(Failure::Usage(format!(
+                    "name the format with --to ({}) or by the extension of -o",
+                    names.join(", ")
+                )));
+            }
+        };
+        found.map_err(|e: ExportError| Failure::Usage(e.to_string()))
+    }
+
+    pub fn options(&self) -> Result<Options, Failure> {
+        Ok(Options { units: self.units.unwrap_or(UnitSystem::SI), id: self.curve_id })
+    }
+}
+
+#[derive(Serialize)]
+struct List {
+    formats: Vec<Listed>,
+}
+
+#[derive(Serialize)]
+struct Listed {
+    name: &'static str,
+    extensions: &'static [&'static str],
+    description: &'static str,
+}
+
+#[derive(Serialize)]
+struct Document {
+    format: &'static str,
+    bytes: usize,
+    output: String,
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    let Some(curve) = args.curve.as_ref().filter(|_| !args.list) else {
+        return list(manners);
+    };
+    let format = args.target.format(args.output.as_deref())?;
+    let curve = export::json::read(curve)?;
+    let bytes = format.encode(&curve, &args.target.options()?)?;
+    match &args.output {
+        None => output::print(|out| out.write_all(&bytes))?,
+        Some(path) => {
+            write_whole(path, &bytes)?;
+            if manners.json {
+                output::print_json(&Document {
+                    format: format.name,
+                    bytes: bytes.len(),
+                    output: path.display().to_string(),
+                })?;
+            } else {
+                output::print(|out| writeln!(out, "wrote {}", path.display()))?;
+            }
+        }
+    }
+    Ok(Outcome::Clean)
+}
+
+fn list(manners: Manners) -> CommandResult {
+    if manners.json {
+        let listed = |f: &Format| Listed {
+            name: f.name,
+            extensions: f.extensions,
+            description: f.description,
+        };
+        output::print_json(&List { formats: FORMATS.iter().map(listed).collect() })?;
+    } else {
+        output::print(|out| {
+            FORMATS.iter().try_for_each(|f| {
+                writeln!(out, "{:<8} .{:<14} {}", f.name, f.extensions.join(" ."), f.description)
+            })
+        })?;
+    }
+    Ok(Outcome::Clean)
+}

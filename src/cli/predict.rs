@@ -1,0 +1,119 @@
+//! `crumple predict`: the curve at a new speed.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::file::write_whole;
+use crumple::surrogate::max_crush::MaxCrushRule;
+use crumple::surrogate::{Model, PredictedCurve, Query, predict};
+use crumple::unit::km_per_h;
+
+use super::arguments::{self, MaxCrush};
+use super::output;
+use super::{CommandResult, Manners, Outcome};
+
+/// Predict the force-deflection curve at a speed, with energy audit and warnings
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple predict lead.model --speed 54km/h
+  crumple predict lead.model --speed 54km/h -o lead54.json -o lead54.csv -o lead54.k
+  crumple predict lead.model --speed 15m/s --max-crush energy --json")]
+pub struct Args {
+    /// Model file made by crumple train
+    model: PathBuf,
+    /// Impact speed with its unit, of the kind the model was trained on
+    #[arg(long, value_parser = arguments::speed)]
+    speed: f64,
+    /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
+    #[arg(long, value_parser = arguments::mass)]
+    mass: Option<f64>,
+    /// Rule for the maximal crush [default: monotone]
+    #[arg(long, value_enum)]
+    max_crush: Option<MaxCrush>,
+    /// The reference method's choices: maximal crush by the cubic spline
+    #[arg(long, conflicts_with = "max_crush")]
+    paper: bool,
+    /// File to write, its format told by the extension or by --to; may be repeated
+    #[arg(short, long)]
+    output: Vec<PathBuf>,
+    #[command(flatten)]
+    target: super::export::Target,
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    let rule = match (args.paper, args.max_crush) {
+        (true, _) => MaxCrushRule::Spline,
+        (false, Some(rule)) => rule.into(),
+        (false, None) => MaxCrushRule::Monotone,
+    };
+    let options = args.target.options()?;
+    let formats = args
+        .output
+        .iter()
+        .map(|path| args.target.format(Some(path)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let model = Model::read(&args.model)?;
+    let query = Query { speed_m_per_s: args.speed, mass_kg: args.mass, rule };
+    let curve = predict(&model, &query)?;
+    // All files are encoded before the first is written.
+    let files = formats
+        .iter()
+        .map(|format| format.encode(&curve, &options))
+        .collect::<Result<Vec<_>, _>>()?;
+    for (path, bytes) in args.output.iter().zip(&files) {
+        write_whole(path, bytes)?;
+    }
+    for warning in &curve.warnings {
+        manners.warn(&warning.message);
+    }
+    if manners.json {
+        output::print_json(&curve)?;
+    } else {
+        output::print(|out| {
+            print(out, &curve)?;
+            args.output.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
+        })?;
+    }
+    Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+    let provenance = &curve.provenance;
+    let crush = provenance.max_crush;
+    let metres = |d: Option<f64>| d.map_or("-".into(), |d| format!("{d:.4} m"));
+    let speed = km_per_h(curve.speed_m_per_s);
+    writeln!(out, "{} at {speed} ({}) by {}", provenance.group, curve.speed_kind.name(), curve.model)?;
+    let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
+    writeln!(out, "  peak force           {:.3} MN", peak / 1e6)?;
+    writeln!(
+        out,
+        "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}",
+        curve.max_deflection_m,
+        provenance.max_crush_rule.name(),
+        metres(crush.spline_m),
+        metres(crush.monotone_m),
+        metres(crush.energy_m)
+    )?;
+    writeln!(
+        out,
+        "  energy               {:.4} MJ, {:.2} % of the impact's {:.4} MJ",
+        curve.energy_j / 1e6,
+        provenance.energy_over_kinetic * 100.0,
+        provenance.kinetic_energy_j / 1e6
+    )?;
+    writeln!(
+        out,
+        "  unloading stiffness  {:.1} MN/m",
+        curve.unloading_stiffness_n_per_m / 1e6
+    )?;
+    writeln!(
+        out,
+        "  nearest training     {} away",
+        km_per_h(provenance.distance_to_nearest_m_per_s)
+    )?;
+    for warning in &curve.warnings {
+        writeln!(out, "  warning              {}", warning.message)?;
+    }
+    writeln!(out, "\nforce [MN] over deflection [m]")?;
+    super::plot::curve(out, &curve.deflection_m, &curve.force_n)
+}

@@ -1,0 +1,37 @@
+//! `crumple completions` and `crumple man`: made from the command line's own definition.
+
+use clap::CommandFactory;
+
+use super::output;
+use super::{Cli, CommandResult, Manners, Outcome};
+
+/// Print a completion script for a shell
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple completions bash > /etc/bash_completion.d/crumple
+  crumple completions zsh > ~/.zfunc/_crumple")]
+pub struct Completions {
+    /// Shell to complete in
+    shell: clap_complete::Shell,
+}
+
+/// Print the manual page
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple man > crumple.1
+  crumple man | man -l -")]
+pub struct Man {}
+
+pub fn completions(args: &Completions, _: Manners) -> CommandResult {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "crumple", &mut script);
+    output::print(|out| out.write_all(&script))?;
+    Ok(Outcome::Clean)
+}
+
+pub fn man(_: &Man, _: Manners) -> CommandResult {
+    let mut page = Vec::new();
+    clap_mangen::Man::new(Cli::command()).render(&mut page)?;
+    output::print(|out| out.write_all(&page))?;
+    Ok(Outcome::Clean)
+}

@@ -1,0 +1,215 @@
+//! `crumple simulate`: the multi-body run of a scenario.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crumple::file::write_whole;
+use crumple::multibody::integrator::BodyHistory;
+use crumple::multibody::ledger::{ENERGY_TOLERANCE, Ledger, MOMENTUM_TOLERANCE};
+use crumple::multibody::{Run, simulate};
+use crumple::scenario::{self, Prepared};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::output;
+use super::{CommandResult, Manners, Outcome};
+
+/// Run a scenario and write the histories of every body and interface
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple simulate scenario.toml -o result.csv
+  crumple simulate scenario.toml --json > result.json
+  crumple simulate scenario.toml -o - | head        # CSV on standard output")]
+pub struct Args {
+    /// Scenario (TOML)
+    scenario: PathBuf,
+    /// Result as CSV; \"-\" is standard output
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// Standard gravity, in m/s² (CGPM 1901): decelerations are quoted in g.
+const G_M_PER_S2: f64 = 9.80665;
+
+#[derive(Serialize)]
+struct Summary {
+    bodies: Vec<BodySummary>,
+    interfaces: Vec<InterfaceSummary>,
+    step_s: f64,
+}
+
+#[derive(Serialize)]
+struct BodySummary {
+    name: String,
+    final_v_m_per_s: f64,
+    mean_deceleration_m_per_s2: f64,
+    mean_deceleration_g: f64,
+}
+
+#[derive(Serialize)]
+struct InterfaceSummary {
+    name: String,
+    #[serde(rename = "peak_force_N")]
+    peak_force_n: f64,
+    max_deflection_m: f64,
+    max_deflection_time_s: f64,
+    restitution: Option<f64>,
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    let prepared = scenario::load(&args.scenario)?;
+    let run = simulate(&prepared.chain, &prepared.settings)?;
+    let mut warnings = prepared.warnings.clone();
+    warnings.extend(ledger_warnings(&run.ledger));
+    for warning in &warnings {
+        manners.warn(warning);
+    }
+    let columns = columns(&prepared, &run);
+    let to_stdout = args.output.as_deref() == Some(Path::new("-"));
+    if let Some(path) = args.output.as_ref().filter(|_| !to_stdout) {
+        let mut csv = Vec::new();
+        write_csv(&mut csv, &columns)?;
+        write_whole(path, &csv)?;
+    }
+    let summary = summary(&prepared, &run);
+    if manners.json {
+        output::print_json(&document(&columns, &summary, &run.ledger, &warnings)?)?;
+    } else if to_stdout {
+        output::print(|out| write_csv(out, &columns))?;
+    } else {
+        output::print(|out| {
+            print(out, &summary, &run.ledger)?;
+            match &args.output {
+                Some(path) => writeln!(out, "wrote {}", path.display()),
+                None => Ok(()),
+            }
+        })?;
+    }
+    Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+fn ledger_warnings(ledger: &Ledger) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if ledger.max_energy_error > ENERGY_TOLERANCE {
+        warnings.push(format!(
+            "energy is off by {:.2e} of the initial kinetic energy (tolerance {ENERGY_TOLERANCE:e}): shorten the step",
+            ledger.max_energy_error
+        ));
+    }
+    if ledger.max_momentum_error > MOMENTUM_TOLERANCE {
+        warnings.push(format!(
+            "momentum is off by {:.2e} (tolerance {MOMENTUM_TOLERANCE:e}): shorten the step",
+            ledger.max_momentum_error
+        ));
+    }
+    warnings
+}
+
+/// Column names and values, in the order of the scenario.
+fn columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f64])> {
+    let mut columns: Vec<(String, &[f64])> = vec![("time_s".into(), &run.time_s)];
+    for &i in &prepared.order {
+        let name = &prepared.chain.bodies()[i].name;
+        let BodyHistory { x_m, v_m_per_s, a_m_per_s2, .. } = &run.bodies[i];
+        columns.push((format!("x_m[{name}]"), x_m));
+        columns.push((format!("v_m_per_s[{name}]"), v_m_per_s));
+        columns.push((format!("a_m_per_s2[{name}]"), a_m_per_s2));
+    }
+    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
+        columns.push((format!("deflection_m[{}]", interface.name), &history.deflection_m));
+        columns.push((format!("force_N[{}]", interface.name), &history.force_n));
+    }
+    columns
+}
+
+fn write_csv(out: &mut dyn Write, columns: &[(String, &[f64])]) -> io::Result<()> {
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    writeln!(out, "{}", names.join(","))?;
+    for row in 0..columns[0].1.len() {
+        for (k, (_, values)) in columns.iter().enumerate() {
+            let comma = if k == 0 { "" } else { "," };
+            write!(out, "{comma}{:?}", values[row])?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// The columns by name, with `summary`, `ledger` and `warnings`.
+fn document(
+    columns: &[(String, &[f64])],
+    summary: &Summary,
+    ledger: &Ledger,
+    warnings: &[String],
+) -> serde_json::Result<Value> {
+    let mut document = Map::new();
+    for (name, values) in columns {
+        document.insert(name.clone(), serde_json::to_value(values)?);
+    }
+    document.insert("summary".into(), serde_json::to_value(summary)?);
+    document.insert("ledger".into(), serde_json::to_value(ledger)?);
+    document.insert("warnings".into(), serde_json::to_value(warnings)?);
+    Ok(Value::Object(document))
+}
+
+fn summary(prepared: &Prepared, run: &Run) -> Summary {
+    let body = |&i: &usize| BodySummary {
+        name: prepared.chain.bodies()[i].name.clone(),
+        final_v_m_per_s: run.bodies[i].v_m_per_s.last().copied().unwrap_or(0.0),
+        mean_deceleration_m_per_s2: run.bodies[i].mean_deceleration_m_per_s2,
+        mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / G_M_PER_S2,
+    };
+    let interfaces = prepared
+        .chain
+        .interfaces()
+        .iter()
+        .zip(&run.interfaces)
+        .map(|(interface, history)| InterfaceSummary {
+            name: interface.name.clone(),
+            peak_force_n: history.peak_force_n,
+            max_deflection_m: history.max_deflection_m,
+            max_deflection_time_s: history.max_deflection_time_s,
+            restitution: history.restitution,
+        })
+        .collect();
+    Summary { bodies: prepared.order.iter().map(body).collect(), interfaces, step_s: run.step_s }
+}
+
+fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<()> {
+    let rows: Vec<Vec<String>> = summary
+        .interfaces
+        .iter()
+        .map(|i| {
+            vec![
+                i.name.clone(),
+                format!("{:.6} MN", i.peak_force_n / 1e6),
+                format!("{:.7} m", i.max_deflection_m),
+                format!("{:.3} ms", i.max_deflection_time_s * 1e3),
+                i.restitution.map_or("-".into(), |e| format!("{e:.4}")),
+            ]
+        })
+        .collect();
+    let heading = ["interface", "peak force", "max crush", "at", "restitution"];
+    output::table(out, &heading, &rows)?;
+    let rows: Vec<Vec<String>> = summary
+        .bodies
+        .iter()
+        .map(|b| {
+            vec![
+                b.name.clone(),
+                format!("{:.6} m/s", b.final_v_m_per_s),
+                format!("{:.4} g", b.mean_deceleration_g),
+            ]
+        })
+        .collect();
+    output::table(out, &["body", "final speed", "mean deceleration"], &rows)?;
+    writeln!(
+        out,
+        "energy of {:.6} MJ: {:.6} kinetic, {:.6} stored, {:.6} dissipated; largest imbalance {:.1e}",
+        ledger.initial_kinetic_j / 1e6,
+        ledger.kinetic_j / 1e6,
+        ledger.stored_j / 1e6,
+        ledger.dissipated_j / 1e6,
+        ledger.max_energy_error
+    )
+}

@@ -1,0 +1,55 @@
+//! LS-DYNA `*DEFINE_CURVE_TITLE`: eight fields of 10, then points in two fields of 20.
+
+use std::fmt::Write;
+
+use super::{ExportError, Options, headline, nine_digits};
+use crate::surrogate::PredictedCurve;
+
+/// Columns of a title.
+const TITLE_WIDTH: usize = 80;
+
+pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
+    let units = options.units;
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let mut line = |text: std::fmt::Arguments<'_>| {
+        let _ = writeln!(out, "{text}");
+    };
+    line(format_args!("*KEYWORD"));
+    line(format_args!("$ force over deflection, positive in compression"));
+    line(format_args!(
+        "$ units: length {} m, force {} N",
+        units.length_m,
+        units.force()
+    ));
+    line(format_args!("$ speed {} m/s ({})", curve.speed_m_per_s, curve.speed_kind.name()));
+    line(format_args!("$ mass {} kg", curve.mass_kg));
+    line(format_args!(
+        "$ unloading stiffness {} N/m",
+        nine_digits(curve.unloading_stiffness_n_per_m)
+    ));
+    line(format_args!("$ model {}, {}", curve.model, curve.provenance.written_by));
+    line(format_args!("$ training set {}", curve.provenance.training_hash));
+    line(format_args!("*DEFINE_CURVE_TITLE"));
+    line(format_args!("{}", title(&headline(curve))));
+    line(format_args!("$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint"));
+    line(format_args!(
+        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+        options.id, 0, "1.0", "1.0", "0.0", "0.0", 0, 0
+    ));
+    line(format_args!("$#                a1                  o1"));
+    for (d, f) in curve.deflection_m.iter().zip(&curve.force_n) {
+        line(format_args!(
+            "{:>20}{:>20}",
+            nine_digits(d / units.length_m),
+            nine_digits(f / units.force())
+        ));
+    }
+    line(format_args!("*END"));
+    Ok(out.into_bytes())
+}
+
+/// A title that fits its line; LS-DYNA reads ASCII.
+fn title(text: &str) -> String {
+    text.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' }).take(TITLE_WIDTH).collect()
+}

@@ -1,0 +1,163 @@
+//! Exports: a predicted curve as a file for another tool. One file per target.
+
+pub mod csv;
+pub mod json;
+pub mod lsdyna;
+
+use std::path::Path;
+
+use crate::surrogate::PredictedCurve;
+use crate::unit::UnitSystem;
+
+/// One target: its name, its file extensions, how it is written.
+pub struct Format {
+    pub name: &'static str,
+    /// Without the dot; the first is the usual one.
+    pub extensions: &'static [&'static str],
+    pub description: &'static str,
+    write: fn(&PredictedCurve, &Options) -> Result<Vec<u8>, ExportError>,
+}
+
+/// Every format we write. To add one: write its module, add its line here.
+pub const FORMATS: &[Format] = &[
+    Format {
+        name: "json",
+        extensions: &["json"],
+        description: "predicted curve with everything known of it, SI (master format)",
+        write: json::write,
+    },
+    Format {
+        name: "csv",
+        extensions: &["csv"],
+        description: "columns d_m,force_N with # header lines, SI",
+        write: csv::write,
+    },
+    Format {
+        name: "lsdyna",
+        extensions: &["k", "key", "dyn"],
+        description: "LS-DYNA *DEFINE_CURVE_TITLE, in the deck's units (--units)",
+        write: lsdyna::write,
+    },
+];
+
+/// Choices that some targets take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Units of the target's deck.
+    pub units: UnitSystem,
+    /// Number of the curve in the target's deck.
+    pub id: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { units: UnitSystem::SI, id: 101 }
+    }
+}
+
+/// Why a curve cannot be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    #[error("there is no export format \"{name}\": use one of {known}")]
+    NoSuchFormat { name: String, known: String },
+    #[error("{path}: the extension does not name an export format: use one of {known}, or name the format")]
+    NoSuchExtension { path: String, known: String },
+    #[error("{format} takes {needs}")]
+    Unfit { format: &'static str, needs: String },
+    #[error("cannot encode the curve: {0}")]
+    Encode(#[from] serde_json::Error),
+}
+
+/// Fewest points that every target takes.
+pub const MIN_POINTS: usize = 4;
+
+impl Format {
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// [`ExportError::Unfit`] if the target cannot take the curve.
+    pub fn encode(
+        &self,
+        curve: &PredictedCurve,
+        options: &Options,
+    ) -> Result<Vec<u8>, ExportError> {
+        if curve.deflection_m.len() < MIN_POINTS {
+            return Err(ExportError::Unfit {
+                format: self.name,
+                needs: format!("{MIN_POINTS} points or more, found {}", curve.deflection_m.len()),
+            });
+        }
+        (self.write)(curve, options)
+    }
+}
+
+/// The format of that name.
+///
+/// # Errors
+/// [`ExportError::NoSuchFormat`] lists the names there are.
+pub fn by_name(name: &str) -> Result<&'static Format, ExportError> {
+    let known = || FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ");
+    FORMATS
+        .iter()
+        .find(|f| f.name == name)
+        .ok_or_else(|| ExportError::NoSuchFormat { name: name.into(), known: known() })
+}
+
+/// The format that the file's extension names.
+///
+/// # Errors
+/// [`ExportError::NoSuchExtension`] lists the extensions there are.
+pub fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let known = || {
+        let all: Vec<String> =
+            FORMATS.iter().flat_map(|f| f.extensions).map(|e| format!(".{e}")).collect();
+        all.join(", ")
+    };
+    FORMATS
+        .iter()
+        .find(|f| f.extensions.contains(&extension))
+        .ok_or_else(|| ExportError::NoSuchExtension {
+            path: path.display().to_string(),
+            known: known(),
+        })
+}
+
+/// What a curve is, in one line, for headers and titles.
+fn headline(curve: &PredictedCurve) -> String {
+    format!(
+        "{} {} ({})",
+        curve.provenance.group,
+        crate::unit::km_per_h(curve.speed_m_per_s),
+        curve.speed_kind.name()
+    )
+}
+
+/// Nine significant digits in Fortran's form: `3.80000000E+06`.
+fn nine_digits(value: f64) -> String {
+    // A negative zero would only puzzle readers.
+    let text = format!("{:.8E}", value + 0.0);
+    match text.split_once('E') {
+        Some((mantissa, exponent)) => {
+            let (sign, digits) = match exponent.strip_prefix('-') {
+                Some(digits) => ('-', digits),
+                None => ('+', exponent),
+            };
+            format!("{mantissa}E{sign}{digits:0>2}")
+        }
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_nine_digits() {
+        assert_eq!(nine_digits(3.8e6), "3.80000000E+06");
+        assert_eq!(nine_digits(-1.0 / 3.0), "-3.33333333E-01");
+        assert_eq!(nine_digits(-0.0), "0.00000000E+00");
+        assert_eq!(nine_digits(1e-120), "1.00000000E-120");
+    }
+}

@@ -1,0 +1,96 @@
+//! The immutable model: bodies in a row and the interfaces between them.
+
+use super::interface::ForceLaw;
+
+/// One mass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    pub name: String,
+    pub mass_kg: f64,
+    /// Initial speed, positive in the direction in which the first train moves.
+    pub speed_m_per_s: f64,
+}
+
+/// The interface in front of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interface {
+    /// `A1|A2`, `A1|wall`.
+    pub name: String,
+    pub law: ForceLaw,
+    /// Free distance before contact, in m.
+    pub gap_m: f64,
+}
+
+/// Bodies from back to front (increasing x), each with the interface to the next one.
+///
+/// Invariant: masses above 0; as many interfaces as bodies if the row ends at a rigid
+/// wall, one less otherwise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    bodies: Vec<Body>,
+    interfaces: Vec<Interface>,
+}
+
+/// Why bodies and interfaces are no chain.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ChainError {
+    #[error("there are no bodies")]
+    NoBodies,
+    #[error("{bodies} bodies need {} interfaces, or {bodies} with a wall in front, found {interfaces}", bodies - 1)]
+    Interfaces { bodies: usize, interfaces: usize },
+    #[error("the mass of {name} is {mass_kg} kg: expected more than 0")]
+    Mass { name: String, mass_kg: f64 },
+    #[error("the speed of {name} is {speed_m_per_s} m/s: expected a finite number")]
+    Speed { name: String, speed_m_per_s: f64 },
+    #[error("the gap of {name} is {gap_m} m: expected 0 or more")]
+    Gap { name: String, gap_m: f64 },
+}
+
+impl Chain {
+    /// Checks the invariant once.
+    ///
+    /// # Errors
+    /// [`ChainError`] names the body or interface that breaks it.
+    pub fn new(bodies: Vec<Body>, interfaces: Vec<Interface>) -> Result<Self, ChainError> {
+        if bodies.is_empty() {
+            return Err(ChainError::NoBodies);
+        }
+        if interfaces.len() != bodies.len() && interfaces.len() + 1 != bodies.len() {
+            let (bodies, interfaces) = (bodies.len(), interfaces.len());
+            return Err(ChainError::Interfaces { bodies, interfaces });
+        }
+        for body in &bodies {
+            let Body { name, mass_kg, speed_m_per_s } = body.clone();
+            if !(mass_kg > 0.0 && mass_kg.is_finite()) {
+                return Err(ChainError::Mass { name, mass_kg });
+            }
+            if !speed_m_per_s.is_finite() {
+                return Err(ChainError::Speed { name, speed_m_per_s });
+            }
+        }
+        for interface in &interfaces {
+            if !(interface.gap_m >= 0.0 && interface.gap_m.is_finite()) {
+                let (name, gap_m) = (interface.name.clone(), interface.gap_m);
+                return Err(ChainError::Gap { name, gap_m });
+            }
+        }
+        Ok(Self { bodies, interfaces })
+    }
+
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    pub fn interfaces(&self) -> &[Interface] {
+        &self.interfaces
+    }
+
+    /// Longest time step of the step rule, `0.1 sqrt(m_min / k_max)`, in s; infinite for
+    /// interfaces without stiffness.
+    pub fn longest_step_s(&self) -> f64 {
+        let lightest = self.bodies.iter().map(|b| b.mass_kg).fold(f64::INFINITY, f64::min);
+        let stiffest =
+            self.interfaces.iter().map(|i| i.law.max_stiffness_n_per_m()).fold(0.0, f64::max);
+        0.1 * (lightest / stiffest).sqrt()
+    }
+}

@@ -1,0 +1,493 @@
+//! Scenario (TOML): trains, wall and curves, resolved into a multi-body chain.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::curve::Envelope;
+use crate::database::{Database, DatabaseError};
+use crate::export::{csv, json};
+use crate::manifest::{self, ManifestError};
+use crate::multibody::integrator::DEFAULT_STEP_S;
+use crate::multibody::{
+    Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading,
+};
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::PredictError;
+use crate::surrogate::{Model, ModelError, Query, predict};
+use crate::unit::{
+    LengthText, MassText, SpeedKind, SpeedText, StiffnessText, TimeText, km_per_h,
+};
+
+/// A scenario as written.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    pub run: RunTable,
+    /// Curves, used below by name.
+    pub curves: BTreeMap<String, CurveTable>,
+    /// The moving train, then the one it meets, if any.
+    pub train: Vec<TrainTable>,
+    /// A rigid wall in place of a second train.
+    pub wall: Option<WallTable>,
+    /// Between the two noses, or nose and wall.
+    pub contact: ContactTable,
+}
+
+/// Times of the run.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunTable {
+    pub duration: TimeText,
+    #[serde(default = "default_interval")]
+    pub output_interval: TimeText,
+    /// Longest integration step.
+    pub step: Option<TimeText>,
+    /// Which speed an interface's model curve is predicted for.
+    #[serde(default)]
+    pub interface_speed: InterfaceSpeed,
+}
+
+/// 0.75 ms, as in the reference data.
+fn default_interval() -> TimeText {
+    TimeText(0.75e-3)
+}
+
+/// Which speed an interface's model curve is predicted for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InterfaceSpeed {
+    /// The speed at which the trains meet.
+    Train,
+    /// The interface's own closing speed.
+    #[default]
+    Local,
+}
+
+/// One curve: exactly one of `model`, `file` and `database`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurveTable {
+    /// Model file; the curve is predicted for the speed of the interface.
+    pub model: Option<PathBuf>,
+    /// Curve file: predicted curve (.json) or table (.csv).
+    pub file: Option<PathBuf>,
+    /// Curve database, with `case`.
+    pub database: Option<PathBuf>,
+    /// Case of the database, as "group/case".
+    pub case: Option<String>,
+    /// Unloading stiffness; the curve's own if absent.
+    pub unloading: Option<StiffnessText>,
+    /// Free distance before contact.
+    pub gap: Option<LengthText>,
+    #[serde(default)]
+    pub law: LawName,
+    #[serde(default)]
+    pub end: EndName,
+    #[serde(default)]
+    pub max_crush: MaxCrushName,
+}
+
+/// Force law of an interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawName {
+    /// Elastic-plastic: unloads on a line of the unloading stiffness.
+    #[default]
+    Memory,
+    /// Follows the curve back, as the reference model.
+    Elastic,
+}
+
+/// What the force does beyond the curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EndName {
+    /// Holds the last force.
+    #[default]
+    Hold,
+    /// Continues the last segment.
+    Slope,
+    /// Ends the run with an error.
+    Error,
+}
+
+/// Rule for the maximal crush of a model's curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MaxCrushName {
+    Spline,
+    #[default]
+    Monotone,
+    Energy,
+}
+
+impl From<MaxCrushName> for MaxCrushRule {
+    fn from(name: MaxCrushName) -> Self {
+        match name {
+            MaxCrushName::Spline => Self::Spline,
+            MaxCrushName::Monotone => Self::Monotone,
+            MaxCrushName::Energy => Self::Energy,
+        }
+    }
+}
+
+/// A train.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrainTable {
+    pub name: String,
+    pub speed: SpeedText,
+    /// Curve of the interfaces between its vehicles.
+    pub inner: Option<String>,
+    /// From the nose back.
+    pub vehicles: Vec<VehicleTable>,
+}
+
+/// A vehicle.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VehicleTable {
+    pub name: String,
+    pub mass: MassText,
+}
+
+/// A rigid wall.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WallTable {
+    #[serde(default = "wall_name")]
+    pub name: String,
+}
+
+fn wall_name() -> String {
+    "wall".into()
+}
+
+/// The first contact.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactTable {
+    /// Name of its curve.
+    pub curve: String,
+    /// Free distance before contact; the curve's own if absent.
+    pub gap: Option<LengthText>,
+}
+
+/// A scenario ready to run.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    pub chain: Chain,
+    pub settings: RunSettings,
+    /// Bodies as the scenario lists them: indices into the chain, first train first.
+    pub order: Vec<usize>,
+    /// Warnings of the curves used.
+    pub warnings: Vec<String>,
+}
+
+/// Why a scenario cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    #[error("{path}: {message}")]
+    Invalid { path: PathBuf, message: String },
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error("curve \"{curve}\": {source}")]
+    Predict { curve: String, source: PredictError },
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    #[error(transparent)]
+    CurveFile(#[from] json::CurveFileError),
+    #[error(transparent)]
+    Csv(#[from] csv::CsvError),
+    #[error("{path}: {source}")]
+    Chain { path: PathBuf, source: ChainError },
+}
+
+/// Loads a scenario and everything it names.
+///
+/// # Errors
+/// [`ScenarioError`] names the key, curve or file.
+pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
+    let scenario: Scenario = manifest::load(path)?;
+    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
+    let obstacle_speed = check(&scenario).map_err(invalid)?;
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let meeting = Meeting {
+        folder: &folder,
+        path,
+        speed_m_per_s: scenario.train[0].speed.0 - obstacle_speed,
+        kind: if scenario.wall.is_some() { SpeedKind::Wall } else { SpeedKind::Closing },
+    };
+    let mut builder = Builder::default();
+    // From the back of the first train to its nose.
+    let first = &scenario.train[0];
+    for (i, vehicle) in first.vehicles.iter().enumerate().rev() {
+        builder.body(vehicle, first.speed.0);
+        if i > 0 {
+            let name = format!("{}|{}", first.vehicles[i - 1].name, vehicle.name);
+            builder.interface(&scenario, &meeting, inner(first), name, None, false)?;
+        }
+    }
+    let ahead = match (&scenario.wall, scenario.train.get(1)) {
+        (Some(wall), _) => wall.name.clone(),
+        (None, Some(second)) => second.vehicles[0].name.clone(),
+        (None, None) => String::new(),
+    };
+    let contact = format!("{}|{ahead}", first.vehicles[0].name);
+    let gap = scenario.contact.gap.map(|g| g.0);
+    builder.interface(&scenario, &meeting, &scenario.contact.curve, contact, gap, true)?;
+    if let Some(second) = scenario.train.get(1) {
+        for (i, vehicle) in second.vehicles.iter().enumerate() {
+            builder.body(vehicle, second.speed.0);
+            if let Some(next) = second.vehicles.get(i + 1) {
+                let name = format!("{}|{}", vehicle.name, next.name);
+                builder.interface(&scenario, &meeting, inner(second), name, None, false)?;
+            }
+        }
+    }
+    let front = first.vehicles.len();
+    let order = (0..front).rev().chain(front..builder.bodies.len()).collect();
+    let chain = Chain::new(builder.bodies, builder.interfaces)
+        .map_err(|source| ScenarioError::Chain { path: path.into(), source })?;
+    let settings = RunSettings {
+        duration_s: scenario.run.duration.0,
+        output_interval_s: scenario.run.output_interval.0,
+        step_s: scenario.run.step.map_or(DEFAULT_STEP_S, |s| s.0),
+    };
+    builder.warnings.dedup();
+    Ok(Prepared { chain, settings, order, warnings: builder.warnings })
+}
+
+fn inner(train: &TrainTable) -> &str {
+    train.inner.as_deref().unwrap_or_default()
+}
+
+/// Checks what a single key cannot show; returns the speed of the obstacle.
+fn check(scenario: &Scenario) -> Result<f64, String> {
+    let obstacle_speed = match (&scenario.wall, scenario.train.as_slice()) {
+        (Some(_), [_]) => 0.0,
+        (None, [_, second]) => second.speed.0,
+        (Some(_), trains) => {
+            return Err(format!("a [wall] needs exactly one [[train]], found {}", trains.len()));
+        }
+        (None, trains) => {
+            return Err(format!(
+                "expected two [[train]], or one and a [wall], found {} [[train]] and no [wall]",
+                trains.len()
+            ));
+        }
+    };
+    let mut names = std::collections::HashSet::new();
+    for train in &scenario.train {
+        if train.vehicles.is_empty() {
+            return Err(format!("train \"{}\" has no vehicles", train.name));
+        }
+        if train.vehicles.len() > 1 && train.inner.is_none() {
+            return Err(format!(
+                "train \"{}\" has {} vehicles but no inner = \"…\" curve between them",
+                train.name,
+                train.vehicles.len()
+            ));
+        }
+        for vehicle in &train.vehicles {
+            let name = &vehicle.name;
+            if name.is_empty() || name.contains([',', '|', '[', ']', '"', '\n']) {
+                return Err(format!("vehicle name \"{name}\" may not be empty or contain , | [ ] or quotes"));
+            }
+            if !names.insert(name) {
+                return Err(format!("two vehicles are named \"{name}\""));
+            }
+        }
+    }
+    if scenario.train[0].speed.0 <= obstacle_speed {
+        return Err(format!(
+            "train \"{}\" at {} never meets what is in front of it: it must be faster",
+            scenario.train[0].name,
+            km_per_h(scenario.train[0].speed.0)
+        ));
+    }
+    Ok(obstacle_speed)
+}
+
+/// What all interfaces share.
+struct Meeting<'a> {
+    folder: &'a Path,
+    path: &'a Path,
+    speed_m_per_s: f64,
+    kind: SpeedKind,
+}
+
+#[derive(Default)]
+struct Builder {
+    bodies: Vec<Body>,
+    interfaces: Vec<Interface>,
+    warnings: Vec<String>,
+}
+
+/// An envelope with what its source knows of unloading.
+struct Source {
+    envelope: Envelope,
+    unloading_n_per_m: Option<f64>,
+    kind: Option<SpeedKind>,
+    warnings: Vec<String>,
+}
+
+impl Builder {
+    fn body(&mut self, vehicle: &VehicleTable, speed_m_per_s: f64) {
+        let (name, mass_kg) = (vehicle.name.clone(), vehicle.mass.0);
+        self.bodies.push(Body { name, mass_kg, speed_m_per_s });
+    }
+
+    fn interface(
+        &mut self,
+        scenario: &Scenario,
+        meeting: &Meeting<'_>,
+        curve: &str,
+        name: String,
+        gap: Option<f64>,
+        is_contact: bool,
+    ) -> Result<(), ScenarioError> {
+        let invalid =
+            |message: String| ScenarioError::Invalid { path: meeting.path.into(), message };
+        let table = scenario.curves.get(curve).ok_or_else(|| {
+            let known: Vec<&str> = scenario.curves.keys().map(String::as_str).collect();
+            invalid(format!("there is no curve \"{curve}\" in [curves]: it has {}", known.join(", ")))
+        })?;
+        if !is_contact
+            && table.model.is_some()
+            && scenario.run.interface_speed == InterfaceSpeed::Local
+        {
+            return Err(invalid(format!(
+                "interface {name} takes its curve from a model at its own closing speed, which this version does not iterate: write interface_speed = \"train\" in [run], or give curve \"{curve}\" as a file or database case"
+            )));
+        }
+        let source = source(table, curve, meeting, &invalid)?;
+        let expected = if is_contact { meeting.kind } else { SpeedKind::Closing };
+        if let Some(kind) = source.kind
+            && kind != expected
+        {
+            return Err(invalid(format!(
+                "curve \"{curve}\" was measured at {} speeds, but interface {name} needs one of {} speeds",
+                kind.name(),
+                expected.name()
+            )));
+        }
+        self.warnings.extend(source.warnings.iter().map(|w| format!("curve \"{curve}\": {w}")));
+        let unloading = match table.law {
+            LawName::Elastic => Unloading::Elastic,
+            LawName::Memory => {
+                let asked = table.unloading.map(|u| u.0);
+                let steepest = source.envelope.max_slope();
+                let stiffness = asked.or(source.unloading_n_per_m).unwrap_or(steepest);
+                if let Some(asked) = asked
+                    && asked < steepest
+                {
+                    self.warnings.push(format!(
+                        "curve \"{curve}\": unloading {:.4} MN/m is softer than the curve's steepest rise and was raised to {:.4} MN/m",
+                        asked / 1e6,
+                        steepest / 1e6
+                    ));
+                }
+                if stiffness.max(steepest) <= 0.0 {
+                    return Err(invalid(format!(
+                        "curve \"{curve}\" never rises, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
+                    )));
+                }
+                Unloading::Memory { stiffness_n_per_m: stiffness }
+            }
+        };
+        let end = match table.end {
+            EndName::Hold => EnvelopeEnd::Hold,
+            EndName::Slope => EnvelopeEnd::Slope,
+            EndName::Error => EnvelopeEnd::Error,
+        };
+        self.interfaces.push(Interface {
+            name,
+            law: ForceLaw::new(source.envelope, unloading, end),
+            gap_m: gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0),
+        });
+        Ok(())
+    }
+}
+
+/// Reads the one source that a curve table names.
+fn source(
+    table: &CurveTable,
+    name: &str,
+    meeting: &Meeting<'_>,
+    invalid: &impl Fn(String) -> ScenarioError,
+) -> Result<Source, ScenarioError> {
+    match (&table.model, &table.file, &table.database) {
+        (Some(model), None, None) => from_model(&meeting.folder.join(model), table, name, meeting),
+        (None, Some(file), None) => from_file(&meeting.folder.join(file)),
+        (None, None, Some(database)) => {
+            let case = table.case.as_deref().and_then(|c| c.split_once('/')).ok_or_else(|| {
+                invalid(format!("curve \"{name}\": write case = \"group/case\" beside database"))
+            })?;
+            from_database(&meeting.folder.join(database), case)
+        }
+        _ => Err(invalid(format!(
+            "curve \"{name}\" needs exactly one of model, file and database"
+        ))),
+    }
+}
+
+fn from_model(
+    path: &Path,
+    table: &CurveTable,
+    name: &str,
+    meeting: &Meeting<'_>,
+) -> Result<Source, ScenarioError> {
+    let model = Model::read(path)?;
+    let query = Query {
+        speed_m_per_s: meeting.speed_m_per_s,
+        mass_kg: None,
+        rule: table.max_crush.into(),
+    };
+    let failed = |source| ScenarioError::Predict { curve: name.into(), source };
+    let curve = predict(&model, &query).map_err(failed)?;
+    Ok(Source {
+        envelope: curve.envelope().map_err(failed)?,
+        unloading_n_per_m: Some(curve.unloading_stiffness_n_per_m),
+        kind: Some(curve.speed_kind),
+        warnings: curve.warnings.iter().map(|w| w.message.clone()).collect(),
+    })
+}
+
+fn from_file(path: &Path) -> Result<Source, ScenarioError> {
+    if path.extension().is_some_and(|e| e == "json") {
+        let curve = json::read(path)?;
+        let envelope = curve
+            .envelope()
+            .map_err(|source| json::CurveFileError::Curve { path: path.into(), source })?;
+        return Ok(Source {
+            envelope,
+            unloading_n_per_m: Some(curve.unloading_stiffness_n_per_m),
+            kind: Some(curve.speed_kind),
+            warnings: curve.warnings.iter().map(|w| w.message.clone()).collect(),
+        });
+    }
+    let envelope = csv::read(path)?;
+    Ok(Source { envelope, unloading_n_per_m: None, kind: None, warnings: Vec::new() })
+}
+
+fn from_database(path: &Path, (group, name): (&str, &str)) -> Result<Source, ScenarioError> {
+    let database = Database::read(path)?;
+    let case = database.case(path, group, name)?;
+    let loading = case.loading().map_err(|e| ScenarioError::Invalid {
+        path: path.into(),
+        message: format!("case {group}/{name}: {e}"),
+    })?;
+    let truncated = case.is_truncated().then(|| "the run ended while loading".to_string());
+    Ok(Source {
+        envelope: loading.envelope,
+        unloading_n_per_m: case.unloading_stiffness_n_per_m,
+        kind: Some(case.speed.kind),
+        warnings: truncated.into_iter().collect(),
+    })
+}

@@ -1,0 +1,108 @@
+//! `forest` (DDTCM): the reference method's random forest on {v, d} → F.
+
+use linfa::traits::{Fit, Predict};
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
+
+use super::{Surrogate, Warning};
+use crate::dataset::{TableKind, TrainingSet};
+use crate::forest::{ForestError, ForestParams, RegressionForest, StopRule, Thresholds};
+
+/// Choices of the forest surrogate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForestOptions {
+    pub trees: usize,
+    pub seed: u64,
+    pub thresholds: Thresholds,
+    pub stop: StopRule,
+    pub min_samples_leaf: usize,
+    pub table: TableKind,
+}
+
+impl Default for ForestOptions {
+    /// 50 trees on a deflection grid from the solver's rate.
+    fn default() -> Self {
+        Self {
+            trees: 50,
+            seed: 0,
+            thresholds: Thresholds::Midpoint,
+            stop: StopRule::StdOverMean(0.01),
+            min_samples_leaf: 1,
+            table: TableKind::Grid,
+        }
+    }
+}
+
+impl ForestOptions {
+    /// The reference method: 50 trees, the states at the common interval, and the stop
+    /// rule as printed, `Var/Mean`. Its threshold is not printed with a unit; 0.01 (in N)
+    /// leaves the trees practically unpruned.
+    pub fn paper() -> Self {
+        Self { stop: StopRule::VarOverMean(0.01), table: TableKind::Samples, ..Self::default() }
+    }
+}
+
+/// A fitted forest and the speeds it jumps between.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForestSurrogate {
+    speeds_m_per_s: Vec<f64>,
+    forest: RegressionForest<f64>,
+}
+
+/// Distance to a split midpoint below which a warning is due, as a share of the midpoint.
+const NEAR_MIDPOINT: f64 = 0.01;
+
+impl ForestSurrogate {
+    /// Fits the forest to the table of the set.
+    ///
+    /// # Errors
+    /// [`ForestError`] for options that make no forest.
+    pub fn fit(set: &TrainingSet, options: &ForestOptions) -> Result<Self, ForestError> {
+        let forest = ForestParams::new(options.trees)
+            .seed(options.seed)
+            .thresholds(options.thresholds)
+            .stop(options.stop)
+            .min_samples_leaf(options.min_samples_leaf)
+            .out_of_bag(true)
+            .fit(&set.table(options.table))?;
+        Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
+    }
+
+    pub fn forest(&self) -> &RegressionForest<f64> {
+        &self.forest
+    }
+
+    /// Checks a forest that was read from a file.
+    pub fn check(&self) -> Result<(), String> {
+        if self.forest.features() != 2 {
+            return Err(format!("the forest has {} features instead of 2", self.forest.features()));
+        }
+        self.forest.check().map_err(|e| e.to_string())
+    }
+}
+
+impl Surrogate for ForestSurrogate {
+    fn force_n(&self, speed_m_per_s: f64, deflection_m: &[f64]) -> Vec<f64> {
+        let records = Array2::from_shape_fn((deflection_m.len(), 2), |(i, k)| match k {
+            0 => speed_m_per_s,
+            _ => deflection_m[i],
+        });
+        let force: Array1<f64> = self.forest.predict(&records);
+        force.to_vec()
+    }
+
+    fn warnings(&self, speed_m_per_s: f64) -> Vec<Warning> {
+        if self.forest.params().thresholds() == Thresholds::Random {
+            return Vec::new();
+        }
+        let near = |pair: &&[f64]| {
+            let middle = 0.5 * (pair[0] + pair[1]);
+            (speed_m_per_s - middle).abs() <= NEAR_MIDPOINT * middle
+        };
+        self.speeds_m_per_s
+            .windows(2)
+            .filter(near)
+            .map(|pair| Warning::near_split_midpoint(speed_m_per_s, pair[0], pair[1]))
+            .collect()
+    }
+}
