@@ -1,17 +1,66 @@
-//! crumple
-pub mod forest;
-pub mod history;
-pub mod export;
-pub mod file;
-pub mod multibody;
-pub mod scenario;
-pub mod solver;
-pub mod manifest;
-pub mod study;
-pub mod surrogate;
+//! Force–deflection curves for multi-body crash models, from the histories of FE runs.
+//!
+//! The whole pipeline; each step takes the previous one's output and never reaches back:
+//!
+//! ```
+//! use crumple::build::build;
+//! use crumple::dataset::TrainingSet;
+//! use crumple::surrogate::{Model, Options, Query, forest::ForestOptions, predict};
+//! use crumple::surrogate::max_crush::MaxCrushRule;
+//! use std::path::Path;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let folder = folder.path();
+//! // solver files → histories → curves → database
+//! let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe/lead-car-wall/study.toml");
+//! let report = build(&study, &folder.join("curves.h5"), |_run| {})?;
+//!
+//! // database → data set → forest
+//! let set = TrainingSet::new("lead-car-wall", report.database.cases("lead-car-wall"))?;
+//! let model = Model::fit(&set, Options::Forest(ForestOptions::default()))?;
+//!
+//! // forest → curve at a speed that was never run
+//! let query = Query {
+//!     speed_m_per_s: 50.0 / 3.6,
+//!     mass_kg: None,
+//!     rule: MaxCrushRule::Monotone,
+//! };
+//! let curve = predict(&model, &query)?;
+//! assert!(curve.max_deflection_m > 0.87 && curve.max_deflection_m < 1.24);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The modules below stand in the order worth reading. Inside is SI; units enter at the
+//! edges ([`unit`]). A speed always says what it is measured against.
+
 pub mod unit;
-pub mod build;
-pub mod compare;
+
+pub mod history;
+
+pub mod solver;
+
 pub mod curve;
+
+pub mod manifest;
+
+pub mod study;
+
 pub mod database;
+
+pub mod build;
+
 pub mod dataset;
+
+pub mod forest;
+
+pub mod surrogate;
+
+pub mod multibody;
+
+pub mod export;
+
+pub mod scenario;
+
+pub mod compare;
+
+pub mod file;

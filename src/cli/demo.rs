@@ -39,7 +39,7 @@ static FE_RUNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/fe");
 
 /// The group that is trained, and a speed between its FE runs.
 const GROUP: &str = "lead-car-wall";
-const SPEED_M_PER_S: f64 = 54.0 * M_PER_S_PER_KM_PER_H;
+const SPEED_M_PER_S: f64 = 50.0 * M_PER_S_PER_KM_PER_H;
 
 const SCENARIO: &str = r#"# A lead car against a rigid wall at a speed for which there is no FE run.
 [run]
@@ -51,7 +51,7 @@ nose = { model = "lead.model" }
 
 [[train]]
 name = "A"
-speed = "54km/h"
+speed = "50km/h"
 vehicles = [ { name = "A1", mass = "24t" } ]
 
 [wall]
@@ -194,7 +194,7 @@ impl Flow<'_> {
         let query =
             Query { speed_m_per_s: SPEED_M_PER_S, mass_kg: None, rule: MaxCrushRule::Monotone };
         let curve = predict(model, &query)?;
-        for name in ["lead54.json", "lead54.csv", "lead54.k"] {
+        for name in ["lead50.json", "lead50.csv", "lead50.k"] {
             let path = self.path(name);
             let bytes = export::by_extension(&path)?.encode(&curve, &export::Options::default())?;
             write_whole(&path, &bytes)?;

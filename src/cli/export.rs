@@ -13,8 +13,8 @@ use super::{CommandResult, Failure, Manners, Outcome};
 /// Write a predicted curve for another tool
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  crumple export lead54.json --to lsdyna --units mm-t-s -o lead54.k
-  crumple export lead54.json --to csv
+  crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
+  crumple export lead50.json --to csv
   crumple export --list")]
 pub struct Args {
     /// Predicted curve (JSON made by crumple predict)

@@ -15,9 +15,9 @@ use super::{CommandResult, Manners, Outcome};
 /// Predict the force-deflection curve at a speed, with energy audit and warnings
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  crumple predict lead.model --speed 54km/h
-  crumple predict lead.model --speed 54km/h -o lead54.json -o lead54.csv -o lead54.k
-  crumple predict lead.model --speed 15m/s --max-crush energy --json")]
+  crumple predict lead.model --speed 50km/h
+  crumple predict lead.model --speed 50km/h -o lead50.json -o lead50.csv -o lead50.k
+  crumple predict lead.model --speed 14m/s --max-crush energy --json")]
 pub struct Args {
     /// Model file made by crumple train
     model: PathBuf,

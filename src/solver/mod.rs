@@ -219,6 +219,21 @@ pub fn read(
     Ok(file)
 }
 
+/// Reads the selected histories of a format's file from `input`.
+///
+/// Unlike [`read`], it does not hold the selection against what the file has.
+///
+/// # Errors
+/// [`ReadError::NoSuchFormat`], or [`ReadError::Io`] (without a path) from `input`.
+pub fn read_from(
+    format: &str,
+    input: &mut dyn BufRead,
+    selection: &Selection,
+) -> Result<SolverFile, ReadError> {
+    (named(format)?.read)(input, selection)
+        .map_err(|source| ReadError::Io { path: PathBuf::new(), source })
+}
+
 fn named(name: &str) -> Result<&'static Format, ReadError> {
     FORMATS
         .iter()

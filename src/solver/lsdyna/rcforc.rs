@@ -5,7 +5,7 @@ use std::io::{self, BufRead};
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::{EntityId, Side};
-use crate::solver::problem::Place;
+use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
 
@@ -71,6 +71,14 @@ impl Body for Rcforc {
         if let Some(id) = undefined_interface(line.text) {
             if !self.undefined.contains(&id) {
                 self.undefined.push(id);
+            }
+            if !line.ended && !line.text.ends_with(b"undefined") {
+                states.problems.add(
+                    ProblemCode::BadLine,
+                    Some(line.into()),
+                    None,
+                    "the line is cut by the end of the file".into(),
+                );
             }
         } else if let Some((side, rest)) = side(line.text) {
             self.row(side, rest, line, states);

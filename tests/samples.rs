@@ -1,0 +1,242 @@
+//! Every value of the real LS-DYNA samples, held against an independent reading.
+//!
+//! The program reads fixed columns; the reading here knows no columns: it finds numbers by
+//! their grammar, so that the two cannot share a mistake about layout.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use common::{crumple_in, crumple_ok, samples};
+
+/// Columns of a CSV by name, and the times.
+type Table = BTreeMap<String, Vec<f64>>;
+
+/// What the program prints for a file.
+fn histories(path: &Path) -> Table {
+    let text = crumple_ok(Path::new("."), &["histories", path.to_str().unwrap()]);
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut table: Table = names.iter().map(|n| (n.to_string(), Vec::new())).collect();
+    for line in lines {
+        for (name, value) in names.iter().zip(line.split(',')) {
+            table.get_mut(*name).unwrap().push(value.parse().unwrap());
+        }
+    }
+    table
+}
+
+/// Numbers of Fortran's E format in a text, found by their grammar: sign, digits, point,
+/// digits, then `E` with sign and two digits, or sign and two or three digits without `E`.
+fn numbers(text: &str) -> Vec<f64> {
+    let bytes = text.as_bytes();
+    let digits = |mut i: usize| {
+        while i < bytes.len() && bytes[i].is_ascii_digit() {
+            i += 1;
+        }
+        i
+    };
+    let mut found = Vec::new();
+    let mut i = 0;
+    while i < bytes.len() {
+        let start = i;
+        if bytes[i] == b'-' {
+            i += 1;
+        }
+        let point = digits(i);
+        if point == i || bytes.get(point) != Some(&b'.') {
+            i = start.max(point) + usize::from(point <= start);
+            continue;
+        }
+        let mantissa = digits(point + 1);
+        let exponent = if bytes.get(mantissa) == Some(&b'E') { mantissa + 1 } else { mantissa };
+        let end = digits(exponent + 1);
+        let text = format!("{}E{}", &text[start..mantissa], &text[exponent..end]);
+        found.push(text.parse().unwrap());
+        i = end;
+    }
+    found
+}
+
+fn same(ours: &Table, theirs: &Table, path: &Path) {
+    let names = |t: &Table| t.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(ours), names(theirs), "columns of {}", path.display());
+    for (name, values) in theirs {
+        // Bit by bit, so that a lost sign of zero counts.
+        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&ours[name]), bits(values), "{name} of {}", path.display());
+    }
+}
+
+fn push(table: &mut Table, name: String, value: f64) {
+    table.entry(name).or_default().push(value);
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+#[test]
+fn nodout_values_are_the_files() {
+    let Some(files) = samples("nodout") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        let mut prefix = "";
+        let mut last_state = String::new();
+        for line in text.lines() {
+            if line.contains("n o d a l") {
+                if line != last_state {
+                    let at = line.find("( at time").unwrap();
+                    push(&mut theirs, "time".into(), numbers(&line[at..])[0]);
+                }
+                last_state = line.to_string();
+            } else if line.contains("nodal point") {
+                prefix = if line.contains("x-rot") { "r" } else { "" };
+            } else if line.contains("E+") || line.contains("E-") {
+                let id: i64 = line[..9].trim().parse().unwrap();
+                let values = numbers(&line[9..]);
+                let kinds = ["displacement", "velocity", "acceleration", "coordinate"];
+                assert_eq!(values.len(), if prefix == "r" { 9 } else { 12 }, "{line}");
+                for (k, value) in values.into_iter().enumerate() {
+                    let name = format!("{prefix}{}_{}[{id}]", AXES[k % 3], kinds[k / 3]);
+                    push(&mut theirs, name, value);
+                }
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn rcforc_values_are_the_files() {
+    let Some(files) = samples("rcforc") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        let mut first = None;
+        for line in text.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let side = match words.first().map(|w| w.to_ascii_lowercase()).as_deref() {
+                Some("slave" | "surfa") => "surfa",
+                Some("master" | "surfb") => "surfb",
+                _ => continue,
+            };
+            let key = (side, words[1]);
+            let values = numbers(line);
+            // Titles of the legend begin like rows, but hold no numbers.
+            if values.len() != 8 {
+                continue;
+            }
+            if *first.get_or_insert((side, words[1].to_string())) == (key.0, key.1.to_string()) {
+                push(&mut theirs, "time".into(), values[0]);
+            }
+            let names =
+                ["x_force", "y_force", "z_force", "mass", "x_moment", "y_moment", "z_moment"];
+            for (name, value) in names.iter().zip(&values[1..]) {
+                push(&mut theirs, format!("{name}[{}:{side}]", words[1]), *value);
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn rwforc_values_are_the_files() {
+    let Some(files) = samples("rwforc") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::new();
+        for line in text.lines().filter(|l| numbers(l).len() == 5) {
+            let wall = line.split_whitespace().nth(1).unwrap().to_string();
+            let values = numbers(line);
+            push(&mut theirs, "time".into(), values[0]);
+            let names = ["normal_force", "x_force", "y_force", "z_force"];
+            for (name, value) in names.iter().zip(&values[1..]) {
+                push(&mut theirs, format!("{name}[{wall}]"), *value);
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn glstat_values_are_the_files() {
+    let Some(files) = samples("glstat") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::new();
+        for line in text.lines().filter(|l| l.contains("...") || l.contains("..  ") || l.contains(".   ")) {
+            let (label, value) = line.split_at(32);
+            let label = label.trim_end_matches('.').trim();
+            let name = match label {
+                "total energy / initial energy" => "energy_ratio".to_string(),
+                "energy ratio w/o eroded energy" => "energy_ratio_wo_eroded".to_string(),
+                "time per zone cycle.(nanosec)" => "time_per_zone_cycle".to_string(),
+                _ => label.replace(' ', "_"),
+            };
+            push(&mut theirs, name, value.trim().parse().unwrap());
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+/// States, first and last time, ids of every sample, counted by hand (`grep -c` and `head`).
+#[test]
+fn inspect_says_states_times_and_ids() {
+    let cases: [(&str, usize, Option<[f64; 2]>, usize); 19] = [
+        ("nodout/l2a_scheckmate_root_r10.1_smp_s_norot", 101, Some([0.0, 9.9999873]), 1),
+        ("nodout/lstoolbox_r13.1_smp_d_header_only_crlf", 0, None, 0),
+        ("nodout/mlp6_113151_smp_d_1000nodes", 3, Some([0.0, 1.9962452e-4]), 1000),
+        ("nodout/mlp6_78769_smp_d_handedited_1state", 1, Some([0.0, 0.0]), 3),
+        ("nodout/mlp6_78769_smp_d_handedited_exp345", 3, Some([0.0, 0.3]), 3),
+        ("nodout/node997_r14_smp_d_header_only", 0, None, 0),
+        ("nodout/pillars_r13.1.1_smp_d_rot_legend", 1001, Some([0.0, 4.9998876]), 2),
+        ("nodout/rowan_r14.1.1_smp_d_run0001", 8, Some([0.0, 11.597012]), 116),
+        ("nodout/rowan_r14.1.1_smp_d_run0010_5", 2, Some([0.0, 2.5]), 214),
+        ("rcforc/crimping_r16.1_smp_d_excerpt_4states", 4, Some([0.0, 0.1296]), 10),
+        ("rcforc/l2a_lasso_r12_empty", 0, None, 0),
+        ("rcforc/l2a_node997_r14_slave_master_1state", 1, Some([0.0, 0.0]), 8),
+        ("rcforc/node997_r14_smp_d_surfa_surfb_1state", 1, Some([0.0, 0.0]), 8),
+        ("rcforc/pillars_r13.1.1_smp_d_slave_master", 1001, Some([0.0, 4.99989]), 2),
+        ("rwforc/l2a_lasso_r12_smp_s", 88, Some([0.0, 0.0347576]), 1),
+        ("rwforc/l2a_lasso_r7.1.2_smp_s_nolegend", 88, Some([0.0, 0.0347804]), 1),
+        ("glstat/amoudes_148931_mpp_d_massprops_first50", 50, Some([0.0, 4.89068e-7]), 0),
+        ("glstat/mlp6_78769_smp_s", 21, Some([0.0, 9.99997e-3]), 0),
+        ("glstat/pillars_r13.1.1_smp_d", 1001, Some([0.0, 4.99989]), 0),
+    ];
+    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    for (name, states, time, entities) in cases {
+        let path = folder.join(name);
+        // --strict: exit code 0 says that no sample counts as damaged.
+        let text =
+            crumple_ok(Path::new("."), &["inspect", "--json", "--strict", path.to_str().unwrap()]);
+        let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let file = &report["files"][0];
+        assert_eq!(file["format"], name.split('/').next().unwrap(), "{name}");
+        assert_eq!(file["states"], states, "{name}");
+        assert_eq!(file["entities"].as_array().unwrap().len(), entities, "{name}");
+        let found: Option<[f64; 2]> = serde_json::from_value(file["time"].clone()).unwrap();
+        assert_eq!(found, time, "{name}");
+    }
+}
+
+#[test]
+fn single_surface_contacts_are_named_and_have_no_histories() {
+    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    let path = folder.join("rcforc/pillars_r13.1.1_smp_d_slave_master");
+    let path = path.to_str().unwrap();
+    let report: serde_json::Value =
+        serde_json::from_str(&crumple_ok(Path::new("."), &["inspect", "--json", path])).unwrap();
+    let without: Vec<i64> = report["files"][0]["without_data"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|w| w["id"].as_i64().unwrap())
+        .collect();
+    assert_eq!(without, [10001, 10013]);
+    let output = crumple_in(Path::new("."), &["histories", path, "--id", "10001"]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("interface 10001 is a single-surface contact"), "{error}");
+    assert!(error.contains("2:surfa \"Contact Force Between Sheets\""), "{error}");
+}
