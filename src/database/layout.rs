@@ -17,13 +17,13 @@ pub const VERSION: i64 = 1;
 /// Encodes a database as the bytes of an HDF5 file.
 pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     let mut file = FileBuilder::new();
-    file.set_attr("format", AttrValue::String(FORMAT.into()));
+    file.set_attr("format", AttrValue::VarLenString(FORMAT.into()));
     file.set_attr("layout_version", AttrValue::I64(VERSION));
-    file.set_attr("written_by", AttrValue::String(concat!("crumple ", env!("CARGO_PKG_VERSION")).into()));
+    file.set_attr("written_by", AttrValue::VarLenString(concat!("crumple ", env!("CARGO_PKG_VERSION")).into()));
     for (name, cases) in &database.groups {
         let mut group = file.create_group(name);
         let names = cases.iter().map(|c| c.name.clone()).collect();
-        group.set_attr("cases", AttrValue::StringArray(names));
+        group.set_attr("cases", AttrValue::VarLenStringArray(names));
         for case in cases {
             let mut builder = group.create_group(&case.name);
             encode_case(case, &mut builder)?;
@@ -35,7 +35,7 @@ pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
 }
 
 fn encode_case(case: &Case, group: &mut GroupBuilder) -> Result<(), DatabaseError> {
-    let text = |s: &str| AttrValue::String(s.into());
+    let text = |s: &str| AttrValue::VarLenString(s.into());
     let json = |value: Result<String, serde_json::Error>| {
         value.map_err(|e| DatabaseError::Encode { detail: e.to_string() })
     };

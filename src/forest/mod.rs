@@ -27,5 +27,7 @@ mod stream;
 mod tree;
 
 pub use forest::{OutOfBag, RegressionForest};
-pub use params::{FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds};
+pub use params::{
+    FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds, Ties,
+};
 pub use tree::{Tree, TreeError};

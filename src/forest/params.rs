@@ -25,6 +25,17 @@ pub enum StopRule {
     StdOverMean(f64),
 }
 
+/// Which of equally good splits on different features is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ties {
+    /// The feature with the lowest index (reference method).
+    LowestFeature,
+    /// Any of them, as scikit-learn does. Splits of two samples are always equally good,
+    /// so the rule shows in the error: by some per cent of it.
+    Random,
+}
+
 /// How many features are candidates at a split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -78,6 +89,7 @@ pub struct ForestValidParams<F> {
     pub(super) min_samples_leaf: usize,
     pub(super) max_depth: Option<usize>,
     pub(super) features_per_split: FeaturesPerSplit,
+    pub(super) ties: Ties,
     pub(super) out_of_bag: bool,
     #[serde(skip)]
     float: std::marker::PhantomData<F>,
@@ -106,6 +118,7 @@ impl<F: Float> ForestParams<F> {
             min_samples_leaf: 1,
             max_depth: None,
             features_per_split: FeaturesPerSplit::All,
+            ties: Ties::LowestFeature,
             out_of_bag: false,
             float: std::marker::PhantomData,
         })
@@ -147,6 +160,11 @@ impl<F: Float> ForestParams<F> {
 
     pub fn features_per_split(mut self, features: FeaturesPerSplit) -> Self {
         self.0.features_per_split = features;
+        self
+    }
+
+    pub fn ties(mut self, ties: Ties) -> Self {
+        self.0.ties = ties;
         self
     }
 

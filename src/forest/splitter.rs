@@ -3,7 +3,7 @@
 use linfa::Float;
 
 use super::criterion::{Sums, proxy};
-use super::params::{FeaturesPerSplit, Thresholds};
+use super::params::{FeaturesPerSplit, Thresholds, Ties};
 use super::stream::Stream;
 
 /// Training data by columns; shared by all trees.
@@ -40,18 +40,17 @@ pub struct Split<F> {
 pub struct Rules {
     pub thresholds: Thresholds,
     pub features: FeaturesPerSplit,
+    pub ties: Ties,
     pub min_samples_leaf: f64,
 }
 
 impl<F: Float> Split<F> {
-    /// Higher gain first; ties go to the lowest feature, then the lowest threshold.
-    fn beats(&self, other: &Option<Self>) -> bool {
-        match other {
-            None => true,
-            Some(best) => {
-                self.gain > best.gain || (self.gain == best.gain && self.feature < best.feature)
-            }
-        }
+    /// Higher gain first. Of ties, the lowest feature wins or, if they are random, the
+    /// one that came first in a random order; within a feature the lowest threshold.
+    fn beats(&self, other: &Option<Self>, ties: Ties) -> bool {
+        let Some(best) = other else { return true };
+        let lower = ties == Ties::LowestFeature && self.feature < best.feature;
+        self.gain > best.gain || (self.gain == best.gain && lower)
     }
 }
 
@@ -81,24 +80,27 @@ pub fn best<F: Float>(
             }
         };
         if let Some(split) = found
-            && split.beats(best)
+            && split.beats(best, rules.ties)
         {
             *best = Some(split);
         }
         true
     };
-    match rules.features {
-        FeaturesPerSplit::Count(count) if count < features => {
-            let mut left: Vec<usize> = (0..features).collect();
-            let mut tried = 0;
-            while tried < count && !left.is_empty() {
-                let feature = left.swap_remove(stream.below(left.len()));
-                tried += usize::from(consider(feature, &mut best, stream));
-            }
-        }
-        _ => (0..features).for_each(|feature| {
+    let wanted = match rules.features {
+        FeaturesPerSplit::All => features,
+        FeaturesPerSplit::Count(count) => count,
+    };
+    if wanted >= features && rules.ties == Ties::LowestFeature {
+        for feature in 0..features {
             consider(feature, &mut best, stream);
-        }),
+        }
+    } else {
+        let mut untried: Vec<usize> = (0..features).collect();
+        let mut tried = 0;
+        while tried < wanted && !untried.is_empty() {
+            let feature = untried.swap_remove(stream.below(untried.len()));
+            tried += usize::from(consider(feature, &mut best, stream));
+        }
     }
     let unsplit = node.target * node.target / node.weight;
     best.filter(|split| split.gain > unsplit)

@@ -60,6 +60,7 @@ impl<F: Float> Tree<F> {
         let rules = Rules {
             thresholds: params.thresholds,
             features: params.features_per_split,
+            ties: params.ties,
             min_samples_leaf: params.min_samples_leaf as f64,
         };
         let count = samples.orders[0].len();
