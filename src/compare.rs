@@ -125,13 +125,9 @@ pub fn compare(
     rows.push(row("fe", format!("FE at {}", km_per_h(speed)), fe, case, &reference)?);
 
     let distance = |v: f64| (v - speed).abs();
-    let nearest = rest
-        .cases
-        .iter()
-        .skip(1)
-        .fold(&rest.cases[0], |best, c| {
-            if distance(c.speed_m_per_s) < distance(best.speed_m_per_s) { c } else { best }
-        });
+    let nearest = rest.cases.iter().skip(1).fold(&rest.cases[0], |best, c| {
+        if distance(c.speed_m_per_s) < distance(best.speed_m_per_s) { c } else { best }
+    });
     let fdrm = Candidate {
         envelope: nearest.envelope.clone(),
         stiffness: nearest.unloading_stiffness_n_per_m,

@@ -17,9 +17,7 @@ use crate::multibody::{
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
 use crate::surrogate::{Model, ModelError, Query, predict};
-use crate::unit::{
-    LengthText, MassText, SpeedKind, SpeedText, StiffnessText, TimeText, km_per_h,
-};
+use crate::unit::{LengthText, MassText, SpeedKind, SpeedText, StiffnessText, TimeText, km_per_h};
 
 /// A scenario as written.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -297,7 +295,9 @@ fn check(scenario: &Scenario) -> Result<f64, String> {
         for vehicle in &train.vehicles {
             let name = &vehicle.name;
             if name.is_empty() || name.contains([',', '|', '[', ']', '"', '\n']) {
-                return Err(format!("vehicle name \"{name}\" may not be empty or contain , | [ ] or quotes"));
+                return Err(format!(
+                    "vehicle name \"{name}\" may not be empty or contain , | [ ] or quotes"
+                ));
             }
             if !names.insert(name) {
                 return Err(format!("two vehicles are named \"{name}\""));
@@ -356,7 +356,10 @@ impl Builder {
             |message: String| ScenarioError::Invalid { path: meeting.path.into(), message };
         let table = scenario.curves.get(curve).ok_or_else(|| {
             let known: Vec<&str> = scenario.curves.keys().map(String::as_str).collect();
-            invalid(format!("there is no curve \"{curve}\" in [curves]: it has {}", known.join(", ")))
+            invalid(format!(
+                "there is no curve \"{curve}\" in [curves]: it has {}",
+                known.join(", ")
+            ))
         })?;
         if !is_contact
             && table.model.is_some()
@@ -431,9 +434,9 @@ fn source(
             })?;
             from_database(&meeting.folder.join(database), case)
         }
-        _ => Err(invalid(format!(
-            "curve \"{name}\" needs exactly one of model, file and database"
-        ))),
+        _ => {
+            Err(invalid(format!("curve \"{name}\" needs exactly one of model, file and database")))
+        }
     }
 }
 
@@ -444,11 +447,8 @@ fn from_model(
     meeting: &Meeting<'_>,
 ) -> Result<Source, ScenarioError> {
     let model = Model::read(path)?;
-    let query = Query {
-        speed_m_per_s: meeting.speed_m_per_s,
-        mass_kg: None,
-        rule: table.max_crush.into(),
-    };
+    let query =
+        Query { speed_m_per_s: meeting.speed_m_per_s, mass_kg: None, rule: table.max_crush.into() };
     let failed = |source| ScenarioError::Predict { curve: name.into(), source };
     let curve = predict(&model, &query).map_err(failed)?;
     Ok(Source {

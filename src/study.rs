@@ -120,8 +120,7 @@ pub struct LocatedRun<'a> {
 /// without for what only the whole shows.
 pub fn load(path: &Path) -> Result<Study, ManifestError> {
     let manifest: Manifest = manifest::load(path)?;
-    check(&manifest)
-        .map_err(|message| ManifestError::Invalid { path: path.into(), message })?;
+    check(&manifest).map_err(|message| ManifestError::Invalid { path: path.into(), message })?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok(Study { manifest, folder })
 }
@@ -137,7 +136,9 @@ fn check(manifest: &Manifest) -> Result<(), String> {
         return Err(format!("study.group \"{group}\" may not contain \"/\""));
     }
     if *kind == StudyKind::Wall && *half_model {
-        return Err("half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair".into());
+        return Err(
+            "half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair".into(),
+        );
     }
     if manifest.run.is_empty() {
         return Err("there is no [[run]]".into());
@@ -263,12 +264,13 @@ impl LocatedRun<'_> {
             file.history(Some(EntityId::new(node)), component).cloned()
         };
         let DeflectionSource { node, minus_node, component, .. } = recipe.deflection;
-        let lacking = |path: &Path, component: &str, file: &SolverFile| ReadError::NoSuchComponent {
-            path: path.into(),
-            format: file.format,
-            component: component.into(),
-            known: file.components.join(", "),
-        };
+        let lacking =
+            |path: &Path, component: &str, file: &SolverFile| ReadError::NoSuchComponent {
+                path: path.into(),
+                format: file.format,
+                component: component.into(),
+                known: file.components.join(", "),
+            };
         let displacement = at(&motion, node, component.name())
             .ok_or_else(|| lacking(&motion_file.path, component.name(), &motion))?;
         let minus_displacement = minus_node.and_then(|n| at(&motion, n, component.name()));
@@ -303,10 +305,8 @@ impl LocatedRun<'_> {
             masses,
             declared_speed_m_per_s: self.entry.speed.map(|s| s.0),
         };
-        let extracted = extract(&measured, &setup).map_err(|source| RunError::Extract {
-            path: force_file.path.clone(),
-            source,
-        })?;
+        let extracted = extract(&measured, &setup)
+            .map_err(|source| RunError::Extract { path: force_file.path.clone(), source })?;
         let mut notes = extracted.notes;
         if let ForceSource::Contact { id, side: None, .. } = recipe.force
             && let Some(side) = force_history.entity.and_then(|e| e.side)

@@ -54,39 +54,17 @@ pub fn km_per_h(m_per_s: f64) -> String {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
     #[error("{what} \"{text}\" has no unit: write for example {example}")]
-    NoUnit {
-        what: &'static str,
-        text: String,
-        example: String,
-    },
+    NoUnit { what: &'static str, text: String, example: String },
     #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
-    UnknownUnit {
-        what: &'static str,
-        text: String,
-        unit: String,
-        known: String,
-    },
+    UnknownUnit { what: &'static str, text: String, unit: String, known: String },
     #[error("{what} \"{text}\" is not a number with a unit: write for example {example}")]
-    NotANumber {
-        what: &'static str,
-        text: String,
-        example: &'static str,
-    },
+    NotANumber { what: &'static str, text: String, example: &'static str },
     #[error("{what} \"{text}\" is out of range: it must be {range}")]
-    OutOfRange {
-        what: &'static str,
-        text: String,
-        range: &'static str,
-    },
+    OutOfRange { what: &'static str, text: String, range: &'static str },
     #[error(
         "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\""
     )]
-    UnknownSystem {
-        text: String,
-        lengths: String,
-        masses: String,
-        times: String,
-    },
+    UnknownSystem { text: String, lengths: String, masses: String, times: String },
 }
 
 /// One kind of quantity: its name for messages, its units with their size in SI.
@@ -107,11 +85,8 @@ pub const SPEED: Dimension = Dimension {
         ("mph", 0.44704),
     ],
 };
-pub const MASS: Dimension = Dimension {
-    what: "mass",
-    example_unit: "t",
-    units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)],
-};
+pub const MASS: Dimension =
+    Dimension { what: "mass", example_unit: "t", units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)] };
 pub const LENGTH: Dimension = Dimension {
     what: "length",
     example_unit: "mm",
@@ -134,11 +109,8 @@ pub const STIFFNESS: Dimension = Dimension {
         ("kN/mm", 1e6),
     ],
 };
-pub const FORCE: Dimension = Dimension {
-    what: "force",
-    example_unit: "kN",
-    units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)],
-};
+pub const FORCE: Dimension =
+    Dimension { what: "force", example_unit: "kN", units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)] };
 
 impl Dimension {
     /// SI value of a number with a unit, such as `"36 km/h"`.
@@ -190,10 +162,7 @@ impl Dimension {
 
     /// SI value of one `unit`, or `None` when the unit is not one of this quantity's.
     pub fn size_of(&self, unit: &str) -> Option<f64> {
-        self.units
-            .iter()
-            .find(|(name, _)| *name == unit)
-            .map(|&(_, size)| size)
+        self.units.iter().find(|(name, _)| *name == unit).map(|&(_, size)| size)
     }
 
     /// Like [`Dimension::parse`], but refuses values that are not above zero.
@@ -202,11 +171,7 @@ impl Dimension {
         if value > 0.0 {
             Ok(value)
         } else {
-            Err(UnitError::OutOfRange {
-                what: self.what,
-                text: text.into(),
-                range: "above zero",
-            })
+            Err(UnitError::OutOfRange { what: self.what, text: text.into(), range: "above zero" })
         }
     }
 
@@ -246,9 +211,9 @@ impl Dimension {
 fn continues_number(text: &str, i: usize, c: char) -> bool {
     match c {
         '0'..='9' | '.' | '+' | '-' => true,
-        'e' | 'E' => text[i + 1..]
-            .trim_start_matches(['+', '-'])
-            .starts_with(|c: char| c.is_ascii_digit()),
+        'e' | 'E' => {
+            text[i + 1..].trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit())
+        }
         _ => false,
     }
 }
@@ -266,11 +231,7 @@ const MASSES: &[(&str, f64)] = &[("kg", 1.0), ("t", 1e3), ("Mg", 1e3), ("g", 1e-
 const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl UnitSystem {
-    pub const SI: Self = Self {
-        length_m: 1.0,
-        mass_kg: 1.0,
-        time_s: 1.0,
-    };
+    pub const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
 
     /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
     pub fn parse(text: &str) -> Result<Self, UnitError> {
@@ -285,24 +246,16 @@ impl UnitSystem {
         };
         let (mut length, mut mass, mut time) = (None, None, None);
         for part in text.split(['-', ' ', ',', '/']).filter(|p| !p.is_empty()) {
-            let slot_and_size = [
-                (&mut length, LENGTHS),
-                (&mut mass, MASSES),
-                (&mut time, TIMES),
-            ]
-            .into_iter()
-            .find_map(|(slot, table)| size_in(table, part).map(|size| (slot, size)));
+            let slot_and_size = [(&mut length, LENGTHS), (&mut mass, MASSES), (&mut time, TIMES)]
+                .into_iter()
+                .find_map(|(slot, table)| size_in(table, part).map(|size| (slot, size)));
             let (slot, size) = slot_and_size.ok_or_else(unknown)?;
             if slot.replace(size).is_some() {
                 return Err(unknown());
             }
         }
         match (length, mass, time) {
-            (Some(length_m), Some(mass_kg), Some(time_s)) => Ok(Self {
-                length_m,
-                mass_kg,
-                time_s,
-            }),
+            (Some(length_m), Some(mass_kg), Some(time_s)) => Ok(Self { length_m, mass_kg, time_s }),
             _ => Err(unknown()),
         }
     }
@@ -339,7 +292,31 @@ impl<'de> Deserialize<'de> for UnitSystem {
     }
 }
 
-/// A value read from text with a unit in a TOML file; `TEXT` picks the quantity.
+/// Reads text with a unit; a bare number gets the message of a missing unit, not that of
+/// a wrong type.
+struct TextVisitor(fn(&str) -> Result<f64, UnitError>);
+
+impl serde::de::Visitor<'_> for TextVisitor {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number with a unit, in quotes")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<f64, E> {
+        (self.0)(text).map_err(E::custom)
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<f64, E> {
+        self.visit_str(&number.to_string())
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<f64, E> {
+        self.visit_str(&number.to_string())
+    }
+}
+
+/// A value read from text with a unit in a TOML file.
 macro_rules! text_quantity {
     ($(#[$doc:meta])* $name:ident, $parse:expr, $pattern:literal) => {
         $(#[$doc])*
@@ -348,8 +325,7 @@ macro_rules! text_quantity {
 
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                let text = String::deserialize(d)?;
-                $parse(&text).map(Self).map_err(serde::de::Error::custom)
+                d.deserialize_any(TextVisitor($parse)).map(Self)
             }
         }
 
@@ -409,26 +385,14 @@ mod tests {
         fn t(dimension: &Dimension, text: &str, expected: &str) {
             assert_eq!(dimension.parse(text).unwrap_err().to_string(), expected);
         }
-        t(
-            &SPEED,
-            "36",
-            "speed \"36\" has no unit: write for example \"36km/h\" or \"36m/s\"",
-        );
+        t(&SPEED, "36", "speed \"36\" has no unit: write for example \"36km/h\" or \"36m/s\"");
         t(
             &SPEED,
             "36kmh",
             "speed \"36kmh\" has the unknown unit \"kmh\": use one of km/h, m/s, mm/ms, mm/s, mph",
         );
-        t(
-            &MASS,
-            "t24",
-            "mass \"t24\" is not a number with a unit: write for example 24t",
-        );
-        t(
-            &SPEED,
-            "1e999m/s",
-            "speed \"1e999m/s\" is out of range: it must be finite",
-        );
+        t(&MASS, "t24", "mass \"t24\" is not a number with a unit: write for example 24t");
+        t(&SPEED, "1e999m/s", "speed \"1e999m/s\" is out of range: it must be finite");
     }
 
     #[test]

@@ -20,11 +20,8 @@ use serde_json::Value;
 /// Runs a script of tests/python and parses what it prints.
 fn run_python(script: &str, arguments: &[&str]) -> Option<Value> {
     let mut command = python()?;
-    let output = command
-        .arg(root().join("tests/python").join(script))
-        .args(arguments)
-        .output()
-        .unwrap();
+    let output =
+        command.arg(root().join("tests/python").join(script)).args(arguments).output().unwrap();
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{script}: {error}");
     Some(serde_json::from_slice(&output.stdout).unwrap())
@@ -148,7 +145,9 @@ fn agrees_with_scikit_learn(name: &str, records: &Array2<f64>, targets: &Array1<
     let theirs = theirs["rmse"].as_f64().unwrap();
     let ratio = our_rmse(records, targets, Ties::Random) / theirs;
     let lowest = our_rmse(records, targets, Ties::LowestFeature) / theirs;
-    println!("{name}: held-out rmse over scikit-learn's {theirs:.4e}: {ratio:.4}, lowest feature first {lowest:.4}");
+    println!(
+        "{name}: held-out rmse over scikit-learn's {theirs:.4e}: {ratio:.4}, lowest feature first {lowest:.4}"
+    );
     assert!((ratio - 1.0).abs() < 0.01, "{name}: {ratio}");
     // The default rule may be better, not worse, by more than this.
     assert!(lowest < 1.03, "{name}: {lowest}");

@@ -21,7 +21,10 @@ fn inspect_names_titles_and_components() {
     assert_eq!(file["title"], "lead car to lead car 36 km/h");
     assert_eq!(file["solver"], "LS-DYNA");
     assert_eq!(file["states"], 400);
-    assert_eq!(file["entities"][0], serde_json::json!({"id": 3, "side": "surfa", "title": "car A against car B"}));
+    assert_eq!(
+        file["entities"][0],
+        serde_json::json!({"id": 3, "side": "surfa", "title": "car A against car B"})
+    );
     assert_eq!(file["problems"], serde_json::json!([]));
 }
 
@@ -37,7 +40,10 @@ fn histories_selects_ids_sides_and_components() {
     assert_eq!(lines[0], "time,x_force[3:surfb]");
     assert_eq!(lines[1], "0.0,-200577.0");
     assert_eq!(lines.len(), 401);
-    let both = crumple_ok(here, &["histories", rcforc.to_str().unwrap(), "--id", "3", "--component", "x_force"]);
+    let both = crumple_ok(
+        here,
+        &["histories", rcforc.to_str().unwrap(), "--id", "3", "--component", "x_force"],
+    );
     assert_eq!(both.lines().next().unwrap(), "time,x_force[3:surfa],x_force[3:surfb]");
 }
 
@@ -45,7 +51,8 @@ fn histories_selects_ids_sides_and_components() {
 fn build_is_incremental_by_content() {
     let folder = tempfile::tempdir().unwrap();
     copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
-    let build = || json(&crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]));
+    let build =
+        || json(&crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]));
     let outcomes = |report: &Value| -> Vec<String> {
         let runs = report["runs"].as_array().unwrap();
         runs.iter().map(|r| r["outcome"].as_str().unwrap().to_string()).collect()
@@ -66,7 +73,8 @@ fn build_is_incremental_by_content() {
     assert_eq!(outcomes(&build()), ["built", "unchanged", "unchanged", "unchanged", "unchanged"]);
     // A run that left the study leaves the database.
     let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.split("[[run]]").take(5).collect::<Vec<_>>().join("[[run]]")).unwrap();
+    std::fs::write(&path, text.split("[[run]]").take(5).collect::<Vec<_>>().join("[[run]]"))
+        .unwrap();
     let report = build();
     assert_eq!(report["removed"], serde_json::json!(["72kmh"]));
 }
@@ -94,8 +102,10 @@ fn speed_is_taken_from_the_first_state_and_said() {
         let text = std::fs::read_to_string(&path).unwrap();
         let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with("speed")).collect();
         std::fs::write(&path, bare.join("\n")).unwrap();
-        let report =
-            json(&crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]));
+        let report = json(&crumple_ok(
+            folder.path(),
+            &["build", "study/study.toml", "-o", "c.h5", "--json"],
+        ));
         let case = &report["runs"][0]["case"];
         let speed = case["speed_m_per_s"].as_f64().unwrap();
         assert!((speed * 3.6 - first_speed).abs() < 1e-4, "{group}: {speed} m/s");
@@ -111,10 +121,14 @@ fn a_wrong_speed_in_the_manifest_is_noticed() {
     let path = folder.path().join("study/study.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replace("\"36km/h\"", "\"38km/h\"")).unwrap();
-    let output = crumple_in(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--strict"]);
+    let output =
+        crumple_in(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--strict"]);
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("36kmh: speed: the manifest says 38 km/h, the first state moves at 36 km/h"), "{error}");
+    assert!(
+        error.contains("36kmh: speed: the manifest says 38 km/h, the first state moves at 36 km/h"),
+        "{error}"
+    );
 }
 
 /// Energy audits of all bundled runs: W/E between 0.99 and 1.05, as the runs' physics has it.
@@ -167,10 +181,14 @@ fn body_force_from_acceleration_and_from_velocity() {
         let text = std::fs::read_to_string(&path).unwrap();
         let contact = "force      = { file = \"rwforc\", id = 1, component = \"normal_force\" }";
         assert!(text.contains(contact));
-        let body = format!("force = {{ file = \"nodout\", node = 900001, component = \"{component}\", times = \"mass\" }}");
+        let body = format!(
+            "force = {{ file = \"nodout\", node = 900001, component = \"{component}\", times = \"mass\" }}"
+        );
         std::fs::write(&path, text.replace(contact, &body)).unwrap();
-        let report =
-            json(&crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]));
+        let report = json(&crumple_ok(
+            folder.path(),
+            &["build", "study/study.toml", "-o", "c.h5", "--json"],
+        ));
         for run in report["runs"].as_array().unwrap() {
             let case = &run["case"];
             assert_eq!(case["force_kind"], "body");
@@ -196,8 +214,10 @@ fn unit_systems_agree() {
         let first = text.split("[[run]]").take(2).collect::<Vec<_>>().join("[[run]]");
         std::fs::write(&manifest, first).unwrap();
         let manifest = manifest.to_str().unwrap();
-        let report =
-            json(&crumple_ok(folder.path(), &["build", manifest, "-o", &format!("{units}.h5"), "--json"]));
+        let report = json(&crumple_ok(
+            folder.path(),
+            &["build", manifest, "-o", &format!("{units}.h5"), "--json"],
+        ));
         report["runs"][0]["case"].clone()
     };
     let given = study("mm-t-s", 1.0, 1.0, 1.0);
@@ -303,11 +323,32 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
     let curve = json(&crumple_ok(
         folder.path(),
-        &["predict", "lead.model", "--speed", "50km/h", "--json", "-o", "a.json", "-o", "a.csv", "-o", "a.k"],
+        &[
+            "predict",
+            "lead.model",
+            "--speed",
+            "50km/h",
+            "--json",
+            "-o",
+            "a.json",
+            "-o",
+            "a.csv",
+            "-o",
+            "a.k",
+        ],
     ));
     for key in [
-        "deflection_m", "force_N", "unloading_stiffness_N_per_m", "max_deflection_m",
-        "speed_m_per_s", "speed_kind", "mass_kg", "energy_J", "model", "warnings", "provenance",
+        "deflection_m",
+        "force_N",
+        "unloading_stiffness_N_per_m",
+        "max_deflection_m",
+        "speed_m_per_s",
+        "speed_kind",
+        "mass_kg",
+        "energy_J",
+        "model",
+        "warnings",
+        "provenance",
     ] {
         assert!(!curve[key].is_null(), "{key}");
     }
@@ -329,10 +370,16 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         .map(|(d, f)| (d.parse().unwrap(), f.parse().unwrap()))
         .collect();
     let deck = std::fs::read_to_string(folder.path().join("a.k")).unwrap();
-    let keyword: Vec<&str> =
-        deck.lines().skip_while(|l| *l != "*DEFINE_CURVE_TITLE").filter(|l| !l.starts_with('$')).collect();
+    let keyword: Vec<&str> = deck
+        .lines()
+        .skip_while(|l| *l != "*DEFINE_CURVE_TITLE")
+        .filter(|l| !l.starts_with('$'))
+        .collect();
     assert_eq!(keyword[1], "lead-car-wall 50 km/h (wall)");
-    assert_eq!(keyword[2], "       101         0       1.0       1.0       0.0       0.0         0         0");
+    assert_eq!(
+        keyword[2],
+        "       101         0       1.0       1.0       0.0       0.0         0         0"
+    );
     for (i, (d, f)) in d.iter().zip(&f).enumerate() {
         let close = |a: f64, b: f64| (a - b).abs() <= 5e-9 * b.abs();
         assert!(close(csv[i].0, *d) && close(csv[i].1, *f), "row {i}");
@@ -383,7 +430,8 @@ fn warnings_stand_in_text_and_json() {
         warnings.iter().map(|w| w["code"].as_str().unwrap().to_string()).collect()
     };
     let text = |speed: &str| {
-        let output = crumple_in(folder.path(), &["predict", "lead.model", "--speed", speed, "--strict"]);
+        let output =
+            crumple_in(folder.path(), &["predict", "lead.model", "--speed", speed, "--strict"]);
         (output.status.code(), String::from_utf8(output.stdout).unwrap())
     };
     assert!(codes("80km/h").contains(&"out_of_range".into()));
@@ -412,7 +460,17 @@ fn energy_rule_takes_up_the_kinetic_energy() {
     for (mass, expected) in [("24t", 24e3), ("20t", 20e3)] {
         let curve = json(&crumple_ok(
             folder.path(),
-            &["predict", "lead.model", "--speed", "50km/h", "--mass", mass, "--max-crush", "energy", "--json"],
+            &[
+                "predict",
+                "lead.model",
+                "--speed",
+                "50km/h",
+                "--mass",
+                mass,
+                "--max-crush",
+                "energy",
+                "--json",
+            ],
         ));
         assert_eq!(curve["mass_kg"], expected);
         let ratio = curve["provenance"]["energy_over_kinetic"].as_f64().unwrap();
@@ -431,7 +489,10 @@ fn simulate_writes_the_promised_columns_and_ledger() {
     crumple_ok(folder.path(), &["simulate", scenario, "-o", "result.csv"]);
     let csv = std::fs::read_to_string(folder.path().join("result.csv")).unwrap();
     let header = csv.lines().next().unwrap();
-    assert_eq!(header, "time_s,x_m[A1],v_m_per_s[A1],a_m_per_s2[A1],deflection_m[A1|wall],force_N[A1|wall]");
+    assert_eq!(
+        header,
+        "time_s,x_m[A1],v_m_per_s[A1],a_m_per_s2[A1],deflection_m[A1|wall],force_N[A1|wall]"
+    );
     assert_eq!(csv.lines().count(), 402);
     let result = json(&crumple_ok(folder.path(), &["simulate", scenario, "--json"]));
     for name in header.split(',') {
@@ -501,8 +562,18 @@ fn wall_curves_do_not_drive_pairs() {
 #[test]
 fn every_command_has_help_with_examples() {
     for command in [
-        "inspect", "histories", "build", "db", "train", "predict", "simulate", "compare",
-        "export", "demo", "completions", "man",
+        "inspect",
+        "histories",
+        "build",
+        "db",
+        "train",
+        "predict",
+        "simulate",
+        "compare",
+        "export",
+        "demo",
+        "completions",
+        "man",
     ] {
         let help = crumple_ok(Path::new("."), &[command, "--help"]);
         assert!(help.contains("Examples:"), "{command}");

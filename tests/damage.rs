@@ -95,7 +95,10 @@ fn a_missing_rotational_block_is_named() {
     let file = read("nodout", &text[..starts[2] + second_line]);
     assert_eq!(file.time.len(), 2);
     let message = file.problems[0].to_string();
-    assert!(message.contains("2 of 2 rotational rows are missing, the first of 1100002"), "{message}");
+    assert!(
+        message.contains("2 of 2 rotational rows are missing, the first of 1100002"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -157,7 +160,12 @@ fn a_node_that_appears_later_is_named_and_left_out() {
     let text = std::fs::read_to_string(fixture("fe/lead-car-wall/25kmh/nodout")).unwrap();
     let at = text.match_indices("   900001 ").nth(7).unwrap().0;
     let line = &text[at..at + text[at..].find('\n').unwrap() + 1];
-    let grown = format!("{}{line}{}{}", &text[..at], line.replace("900001", "900009"), &text[at + line.len()..]);
+    let grown = format!(
+        "{}{line}{}{}",
+        &text[..at],
+        line.replace("900001", "900009"),
+        &text[at + line.len()..]
+    );
     let file = read("nodout", grown.as_bytes());
     assert_eq!(file.time.len(), 400);
     assert_eq!(file.entities.len(), 1);

@@ -11,7 +11,8 @@ fn data() -> Dataset<f64, f64, ndarray::Ix1> {
     let x = Array2::from_shape_fn((300, 3), |(i, k)| {
         (0.5 + i as f64 * [0.819_172_5, 0.671_043_6, 0.549_700_5][k]).fract()
     });
-    let y = x.map_axis(ndarray::Axis(1), |r| (5.0 * r[0]).sin() + if r[1] > 0.5 { 1.0 } else { 0.0 });
+    let y =
+        x.map_axis(ndarray::Axis(1), |r| (5.0 * r[0]).sin() + if r[1] > 0.5 { 1.0 } else { 0.0 });
     Dataset::new(x, y)
 }
 
@@ -62,7 +63,7 @@ fn stop_rules_limit_the_tree() {
     let nodes = |params: ForestParams<f64>| fit(params.bootstrap(false)).trees()[0].nodes();
     let full = nodes(ForestParams::new(1));
     assert_eq!(full, 2 * 300 - 1);
-    assert!(nodes(ForestParams::new(1).min_samples_leaf(10)) <= 2 * 30 - 1);
+    assert!(nodes(ForestParams::new(1).min_samples_leaf(10)) < 2 * 30);
     assert_eq!(nodes(ForestParams::new(1).max_depth(Some(3))), 15);
     assert!(nodes(ForestParams::new(1).stop(StopRule::StdOverMean(0.1))) < full / 2);
     assert!(nodes(ForestParams::new(1).stop(StopRule::VarOverMean(0.1))) < full / 2);
@@ -72,7 +73,10 @@ fn stop_rules_limit_the_tree() {
 #[test]
 fn same_seed_same_forest_on_any_number_of_threads() {
     let params = || {
-        ForestParams::new(20).seed(3).thresholds(Thresholds::Random).features_per_split(FeaturesPerSplit::Count(2))
+        ForestParams::new(20)
+            .seed(3)
+            .thresholds(Thresholds::Random)
+            .features_per_split(FeaturesPerSplit::Count(2))
     };
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -128,8 +132,7 @@ fn f32_and_views_work() {
     let all = data();
     let (x, y) = (all.records().mapv(|v| v as f32), all.targets().mapv(|v| v as f32));
     let forest = ForestParams::<f32>::new(5).fit(&Dataset::new(x.clone(), y.clone())).unwrap();
-    let of_views =
-        ForestParams::<f32>::new(5).fit(&DatasetBase::new(x.view(), y.view())).unwrap();
+    let of_views = ForestParams::<f32>::new(5).fit(&DatasetBase::new(x.view(), y.view())).unwrap();
     assert_eq!(forest, of_views);
     let p: Array1<f32> = forest.predict(&x.view());
     assert_eq!(p, forest.predict(&x));
@@ -141,7 +144,8 @@ fn columns_in_any_memory_order_give_the_same() {
     let mut fortran = Array2::zeros(ndarray::ShapeBuilder::f((300, 3)));
     fortran.assign(all.records());
     let forest = fit(ForestParams::new(5));
-    let other = ForestParams::new(5).fit(&Dataset::new(fortran.clone(), all.targets().clone())).unwrap();
+    let other =
+        ForestParams::new(5).fit(&Dataset::new(fortran.clone(), all.targets().clone())).unwrap();
     assert_eq!(forest, other);
     let p: Array1<f64> = forest.predict(&fortran);
     assert_eq!(p, predicted(&forest));
@@ -166,7 +170,12 @@ fn wrong_parameters_and_data_are_refused() {
     let (x, y) = (array![[1.0], [2.0]], array![1.0, 2.0]);
     let new = ForestParams::new;
     t(new(0), x.clone(), y.clone(), "a forest needs at least 1 tree, found 0");
-    t(new(1).min_samples_leaf(0), x.clone(), y.clone(), "min_samples_leaf must be at least 1, found 0");
+    t(
+        new(1).min_samples_leaf(0),
+        x.clone(),
+        y.clone(),
+        "min_samples_leaf must be at least 1, found 0",
+    );
     t(new(1).max_depth(Some(0)), x.clone(), y.clone(), "max_depth must be at least 1, found 0");
     t(
         new(1).stop(StopRule::StdOverMean(f64::NAN)),

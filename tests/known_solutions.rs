@@ -165,10 +165,8 @@ fn case_6_wall_curve_and_doubled_pair_curve_move_alike() {
     )
     .unwrap();
     let wall = chain(&[(24.0 * TONNES, 8.0)], &[memory(bumpy(), 100.0 * MEGA)]);
-    let pair = chain(
-        &[(24.0 * TONNES, 8.0), (24.0 * TONNES, -8.0)],
-        &[memory(doubled, 50.0 * MEGA)],
-    );
+    let pair =
+        chain(&[(24.0 * TONNES, 8.0), (24.0 * TONNES, -8.0)], &[memory(doubled, 50.0 * MEGA)]);
     let (wall, pair) = (run(&wall, 0.3, STEP_S), run(&pair, 0.3, STEP_S));
     for (a, b) in wall.bodies[0].v_m_per_s.iter().zip(&pair.bodies[0].v_m_per_s) {
         assert!((a - b).abs() < 1e-9, "{a} against {b}");

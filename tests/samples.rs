@@ -165,7 +165,9 @@ fn glstat_values_are_the_files() {
     for path in files {
         let text = std::fs::read_to_string(&path).unwrap();
         let mut theirs = Table::new();
-        for line in text.lines().filter(|l| l.contains("...") || l.contains("..  ") || l.contains(".   ")) {
+        for line in
+            text.lines().filter(|l| l.contains("...") || l.contains("..  ") || l.contains(".   "))
+        {
             let (label, value) = line.split_at(32);
             let label = label.trim_end_matches('.').trim();
             let name = match label {

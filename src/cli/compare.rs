@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(long)]
     group: String,
     /// Speed to leave out, with its unit
-    #[arg(long, value_parser = arguments::speed)]
+    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true)]
     speed: f64,
     /// Seed of the forest
     #[arg(long, default_value_t = 0)]
@@ -77,8 +77,15 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         })
         .collect();
     let heading = [
-        "method", "curve", "velocity", "acceleration", "force", "peak force", "max crush",
-        "fit+predict", "simulation",
+        "method",
+        "curve",
+        "velocity",
+        "acceleration",
+        "force",
+        "peak force",
+        "max crush",
+        "fit+predict",
+        "simulation",
     ];
     output::table(out, &heading, &rows)
 }

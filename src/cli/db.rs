@@ -74,8 +74,7 @@ pub struct CaseRow {
 }
 
 impl CaseRow {
-    pub const HEADING: [&str; 6] =
-        ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
+    pub const HEADING: [&str; 6] = ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
 
     pub fn of(case: &Case) -> Self {
         Self {
@@ -111,8 +110,7 @@ impl CaseRow {
                 if self.truncated { " (truncated)" } else { "" }
             ),
             format!("{:.4}", self.work_over_energy),
-            self.unloading_stiffness_n_per_m
-                .map_or("-".into(), |k| format!("{:.1} MN/m", k / 1e6)),
+            self.unloading_stiffness_n_per_m.map_or("-".into(), |k| format!("{:.1} MN/m", k / 1e6)),
         ]
     }
 }
@@ -183,10 +181,8 @@ fn ls(database: &Database, manners: Manners) -> CommandResult {
 
 fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
     let heading: Vec<&str> = [group].into_iter().chain(CaseRow::HEADING).collect();
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|r| [r.name.clone()].into_iter().chain(r.cells()).collect())
-        .collect();
+    let cells: Vec<Vec<String>> =
+        rows.iter().map(|r| [r.name.clone()].into_iter().chain(r.cells()).collect()).collect();
     output::table(out, &heading, &cells)?;
     writeln!(out)
 }
@@ -316,10 +312,13 @@ fn check_case(case: &Case, add: &mut impl FnMut(&'static str, String)) {
     }
     // The stored audit must follow from the stored curve; only rounding may differ.
     if (audit.work_j - case.audit.work_j).abs() > 1e-9 * audit.work_j.abs() {
-        add("audit_differs", format!(
-            "the stored work {} J is not the curve's {} J",
-            case.audit.work_j, audit.work_j
-        ));
+        add(
+            "audit_differs",
+            format!(
+                "the stored work {} J is not the curve's {} J",
+                case.audit.work_j, audit.work_j
+            ),
+        );
     }
     if case.is_truncated() {
         add("truncated", "the run ended while loading".into());

@@ -250,9 +250,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
             label.into_iter().chain(errors.map(percent)).collect()
         })
         .collect();
-    let heading = [
-        "left out", "speed", "FE curve v", "a", "FDRM v", "a", "forest v", "a",
-    ];
+    let heading = ["left out", "speed", "FE curve v", "a", "FDRM v", "a", "forest v", "a"];
     output::table(out, &heading, &rows)?;
     let p = &document.prediction;
     writeln!(

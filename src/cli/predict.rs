@@ -22,10 +22,10 @@ pub struct Args {
     /// Model file made by crumple train
     model: PathBuf,
     /// Impact speed with its unit, of the kind the model was trained on
-    #[arg(long, value_parser = arguments::speed)]
+    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true)]
     speed: f64,
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
-    #[arg(long, value_parser = arguments::mass)]
+    #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Rule for the maximal crush [default: monotone]
     #[arg(long, value_enum)]
@@ -82,7 +82,13 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     let crush = provenance.max_crush;
     let metres = |d: Option<f64>| d.map_or("-".into(), |d| format!("{d:.4} m"));
     let speed = km_per_h(curve.speed_m_per_s);
-    writeln!(out, "{} at {speed} ({}) by {}", provenance.group, curve.speed_kind.name(), curve.model)?;
+    writeln!(
+        out,
+        "{} at {speed} ({}) by {}",
+        provenance.group,
+        curve.speed_kind.name(),
+        curve.model
+    )?;
     let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
     writeln!(out, "  peak force           {:.3} MN", peak / 1e6)?;
     writeln!(
@@ -101,11 +107,7 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         provenance.energy_over_kinetic * 100.0,
         provenance.kinetic_energy_j / 1e6
     )?;
-    writeln!(
-        out,
-        "  unloading stiffness  {:.1} MN/m",
-        curve.unloading_stiffness_n_per_m / 1e6
-    )?;
+    writeln!(out, "  unloading stiffness  {:.1} MN/m", curve.unloading_stiffness_n_per_m / 1e6)?;
     writeln!(
         out,
         "  nearest training     {} away",

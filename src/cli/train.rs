@@ -161,8 +161,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         })?;
     } else {
         output::print(|out| {
-            let speeds: Vec<String> =
-                set.speeds_m_per_s().iter().map(|&v| km_per_h(v)).collect();
+            let speeds: Vec<String> = set.speeds_m_per_s().iter().map(|&v| km_per_h(v)).collect();
             writeln!(out, "{} on {}", model.options.name(), speeds.join(", "))?;
             if let Some(oob) = out_of_bag {
                 writeln!(out, "out-of-bag: rmse {:.1} kN, r² {:.5}", oob.rmse / 1e3, oob.r2)?;

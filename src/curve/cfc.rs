@@ -75,10 +75,8 @@ pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Vec<f64>, Cf
         return Ok(values.to_vec());
     }
     let interval_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
-    let spread = time_s
-        .windows(2)
-        .map(|w| ((w[1] - w[0]) / interval_s - 1.0).abs())
-        .fold(0.0, f64::max);
+    let spread =
+        time_s.windows(2).map(|w| ((w[1] - w[0]) / interval_s - 1.0).abs()).fold(0.0, f64::max);
     if spread > MAX_SPREAD {
         return Err(CfcError::Uneven { spread_percent: spread * 100.0 });
     }

@@ -8,8 +8,7 @@ use crate::unit::Speed;
 /// and `E`, the kinetic energy of the impact.
 pub fn audit(curve: &Curve, masses: Masses, speed: Speed) -> EnergyAudit {
     let (d, f) = (curve.deflection_m(), curve.force_n());
-    let work_j = (1..=loading_end(curve))
-        .map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1]))
-        .sum();
+    let work_j =
+        (1..=loading_end(curve)).map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1])).sum();
     EnergyAudit { work_j, kinetic_j: masses.kinetic_energy_j(speed) }
 }

@@ -22,7 +22,9 @@ pub enum EnvelopeError {
     NotFinite { point: usize, deflection_m: f64, force_n: f64 },
     #[error("the deflection must begin at 0, found {first_m} m")]
     NotFromZero { first_m: f64 },
-    #[error("the deflection must increase, found {deflection_m} m after {before_m} m at point {point}")]
+    #[error(
+        "the deflection must increase, found {deflection_m} m after {before_m} m at point {point}"
+    )]
     Order { point: usize, deflection_m: f64, before_m: f64 },
 }
 
@@ -87,8 +89,7 @@ impl Envelope {
     pub fn work_to(&self, deflection_m: f64) -> f64 {
         let end = self.deflection_m.len() - 1;
         if deflection_m >= self.deflection_m[end] {
-            return self.work_j[end]
-                + self.force_n[end] * (deflection_m - self.deflection_m[end]);
+            return self.work_j[end] + self.force_n[end] * (deflection_m - self.deflection_m[end]);
         }
         let i = self.segment(deflection_m);
         let d = (deflection_m - self.deflection_m[i]).max(0.0);

@@ -57,15 +57,21 @@ pub struct Extracted {
 pub enum ExtractError {
     #[error("{what} holds {states} states: at least 2 are needed")]
     TooShort { what: &'static str, states: usize },
-    #[error("{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect")]
+    #[error(
+        "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
+    )]
     NotFinite { what: String, state: usize, value: f64 },
-    #[error("the force never exceeds {threshold_n:.0} N (its largest is {largest_n:.0} N): there is no contact in this record")]
+    #[error(
+        "the force never exceeds {threshold_n:.0} N (its largest is {largest_n:.0} N): there is no contact in this record"
+    )]
     NoContact { threshold_n: f64, largest_n: f64 },
     #[error("the histories of deflection and force have no time in common")]
     NoOverlap,
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
-    #[error("the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\"")]
+    #[error(
+        "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
+    )]
     NoSpeed { component: &'static str },
     #[error("the first state does not move: add speed = \"…km/h\" to the run")]
     Standing,
@@ -234,15 +240,13 @@ impl Motion {
                 relative(velocity, measured.minus_velocity, factor, "velocity", notes)?.values
             }
             None => {
-                notes.push("closing speed: displacement differentiated, the file has no velocity".into());
+                notes.push(
+                    "closing speed: displacement differentiated, the file has no velocity".into(),
+                );
                 derivative(&displacement.time_s, &displacement.values)
             }
         };
-        Ok(Self {
-            time_s: displacement.time_s,
-            deflection_m: displacement.values,
-            rate_m_per_s,
-        })
+        Ok(Self { time_s: displacement.time_s, deflection_m: displacement.values, rate_m_per_s })
     }
 }
 
@@ -255,7 +259,9 @@ fn force(
     let units = measured.units;
     let mass = setup.masses.body_kg;
     let mut signal = match measured.force {
-        MeasuredForce::Contact(history) => Signal::of(history, units, units.force(), "force", notes)?,
+        MeasuredForce::Contact(history) => {
+            Signal::of(history, units, units.force(), "force", notes)?
+        }
         MeasuredForce::Body(history, BodyMotion::Acceleration) => {
             Signal::of(history, units, mass * units.acceleration(), "acceleration", notes)?
         }
@@ -398,9 +404,8 @@ fn sample(
             sampling.states
         ));
     }
-    let at_times = |values: &[f64]| {
-        interpolate(at, values, &times).map_err(|_| ExtractError::NoOverlap)
-    };
+    let at_times =
+        |values: &[f64]| interpolate(at, values, &times).map_err(|_| ExtractError::NoOverlap);
     let deflection = at_times(original.deflection_m())?;
     let force = at_times(original.force_n())?;
     let closing = at_times(closing)?;

@@ -58,7 +58,10 @@ mod tests {
     #[test]
     fn interpolates_within_and_refuses_beyond() {
         let (t, v) = ([0.0, 1.0, 3.0], [0.0, 10.0, 30.0]);
-        assert_eq!(interpolate(&t, &v, &[0.0, 0.5, 1.0, 2.0, 3.0]).unwrap(), [0.0, 5.0, 10.0, 20.0, 30.0]);
+        assert_eq!(
+            interpolate(&t, &v, &[0.0, 0.5, 1.0, 2.0, 3.0]).unwrap(),
+            [0.0, 5.0, 10.0, 20.0, 30.0]
+        );
         assert_eq!(
             interpolate(&t, &v, &[3.5]).unwrap_err().to_string(),
             "time 3.5 s lies outside the history (0 s to 3 s)"

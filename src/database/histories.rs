@@ -38,9 +38,8 @@ pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
             dataset.with_f64_data(&channels[0].values);
             continue;
         }
-        let rows: Vec<f64> = (0..states)
-            .flat_map(|state| channels.iter().map(move |h| h.values[state]))
-            .collect();
+        let rows: Vec<f64> =
+            (0..states).flat_map(|state| channels.iter().map(move |h| h.values[state])).collect();
         dataset
             .with_f64_data(&rows)
             .with_shape(&[states as u64, channels.len() as u64])

@@ -19,7 +19,10 @@ pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     let mut file = FileBuilder::new();
     file.set_attr("format", AttrValue::VarLenString(FORMAT.into()));
     file.set_attr("layout_version", AttrValue::I64(VERSION));
-    file.set_attr("written_by", AttrValue::VarLenString(concat!("crumple ", env!("CARGO_PKG_VERSION")).into()));
+    file.set_attr(
+        "written_by",
+        AttrValue::VarLenString(concat!("crumple ", env!("CARGO_PKG_VERSION")).into()),
+    );
     for (name, cases) in &database.groups {
         let mut group = file.create_group(name);
         let names = cases.iter().map(|c| c.name.clone()).collect();
@@ -63,9 +66,7 @@ fn encode_case(case: &Case, group: &mut GroupBuilder) -> Result<(), DatabaseErro
     group.set_attr("notes", text(&json(serde_json::to_string(&case.notes))?));
     group.set_attr("warnings", text(&json(serde_json::to_string(&case.warnings))?));
     encode_curve(&case.sampled, group);
-    group
-        .create_dataset("closing_speed_m_per_s")
-        .with_f64_data(&case.closing_speed_m_per_s);
+    group.create_dataset("closing_speed_m_per_s").with_f64_data(&case.closing_speed_m_per_s);
     let mut original = group.create_group("original");
     encode_curve(&case.original, &mut original);
     group.add_group(original.finish());
@@ -193,7 +194,9 @@ fn decode_case(
         return Err(place.damaged("closing_speed_m_per_s and time_s differ in length"));
     }
     if let Some(i) = closing_speed_m_per_s.iter().position(|v| !v.is_finite()) {
-        return Err(place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1)));
+        return Err(
+            place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1))
+        );
     }
     let original_place = Place { path: place.path, name: format!("{}/original", place.name) };
     let original = decode_curve(&place.check(group.group("original"))?, &original_place)?;

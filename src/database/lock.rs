@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 pub enum LockError {
     #[error("{path} is being written by another process: try again when it has finished")]
     Busy { path: PathBuf },
-    #[error("cannot write beside {path}: {source}")]
+    #[error(
+        "cannot write {path}, because no lock can be made beside it: {source}; check that the folder exists and is writable"
+    )]
     Io { path: PathBuf, source: io::Error },
 }
 

@@ -43,7 +43,9 @@ pub enum DatabaseError {
     NoGroup { path: PathBuf, group: String, known: String },
     #[error("{path}: group \"{group}\" has no case \"{case}\": it has {known}")]
     NoCase { path: PathBuf, group: String, case: String, known: String },
-    #[error("case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this study's run or group differently")]
+    #[error(
+        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this study's run or group differently"
+    )]
     OtherStudy { group: String, name: String, other: String },
     #[error("cannot encode the database: {detail}")]
     Encode { detail: String },
@@ -58,8 +60,8 @@ impl Database {
     /// [`DatabaseError`] if the file is missing, not HDF5, not a curve database, of a
     /// newer layout, or damaged; it names the case and dataset.
     pub fn read(path: &Path) -> Result<Self, DatabaseError> {
-        let bytes = fs::read(path)
-            .map_err(|source| DatabaseError::Io { path: path.into(), source })?;
+        let bytes =
+            fs::read(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
         layout::decode(path, bytes)
     }
 
@@ -149,9 +151,5 @@ fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
 
 /// Turns a curve that breaks its invariant into a database error.
 fn damaged_curve(path: &Path, place: &str, error: CurveError) -> DatabaseError {
-    DatabaseError::Damaged {
-        path: path.into(),
-        place: place.into(),
-        detail: error.to_string(),
-    }
+    DatabaseError::Damaged { path: path.into(), place: place.into(), detail: error.to_string() }
 }

@@ -50,7 +50,9 @@ pub enum CsvError {
     Io { path: PathBuf, source: std::io::Error },
     #[error("{path}: {source}")]
     Csv { path: PathBuf, source: csv::Error },
-    #[error("{path}: line {line}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"")]
+    #[error(
+        "{path}: line {line}: expected a column {wanted} with its unit, such as {example}, found \"{found}\""
+    )]
     Header { path: PathBuf, line: u64, wanted: &'static str, example: &'static str, found: String },
     #[error("{path}: line {line}, field {field}: expected a number, found \"{found}\"")]
     Number { path: PathBuf, line: u64, field: usize, found: String },

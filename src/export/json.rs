@@ -18,7 +18,9 @@ pub fn write(curve: &PredictedCurve, _: &Options) -> Result<Vec<u8>, ExportError
 pub enum CurveFileError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
-    #[error("{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict")]
+    #[error(
+        "{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict"
+    )]
     Json { path: PathBuf, source: serde_json::Error },
     #[error("{path}: {source}")]
     Curve { path: PathBuf, source: PredictError },
@@ -33,8 +35,6 @@ pub fn read(path: &Path) -> Result<PredictedCurve, CurveFileError> {
         fs::read(path).map_err(|source| CurveFileError::Io { path: path.into(), source })?;
     let curve: PredictedCurve = serde_json::from_slice(&bytes)
         .map_err(|source| CurveFileError::Json { path: path.into(), source })?;
-    curve
-        .envelope()
-        .map_err(|source| CurveFileError::Curve { path: path.into(), source })?;
+    curve.envelope().map_err(|source| CurveFileError::Curve { path: path.into(), source })?;
     Ok(curve)
 }

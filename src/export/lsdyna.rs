@@ -17,11 +17,7 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     };
     line(format_args!("*KEYWORD"));
     line(format_args!("$ force over deflection, positive in compression"));
-    line(format_args!(
-        "$ units: length {} m, force {} N",
-        units.length_m,
-        units.force()
-    ));
+    line(format_args!("$ units: length {} m, force {} N", units.length_m, units.force()));
     line(format_args!("$ speed {} m/s ({})", curve.speed_m_per_s, curve.speed_kind.name()));
     line(format_args!("$ mass {} kg", curve.mass_kg));
     line(format_args!(
@@ -32,7 +28,9 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     line(format_args!("$ training set {}", curve.provenance.training_hash));
     line(format_args!("*DEFINE_CURVE_TITLE"));
     line(format_args!("{}", title(&headline(curve))));
-    line(format_args!("$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint"));
+    line(format_args!(
+        "$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint"
+    ));
     line(format_args!(
         "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
         options.id, 0, "1.0", "1.0", "0.0", "0.0", 0, 0

@@ -60,7 +60,9 @@ impl Default for Options {
 pub enum ExportError {
     #[error("there is no export format \"{name}\": use one of {known}")]
     NoSuchFormat { name: String, known: String },
-    #[error("{path}: the extension does not name an export format: use one of {known}, or name the format")]
+    #[error(
+        "{path}: the extension does not name an export format: use one of {known}, or name the format"
+    )]
     NoSuchExtension { path: String, known: String },
     #[error("{format} takes {needs}")]
     Unfit { format: &'static str, needs: String },
@@ -114,13 +116,9 @@ pub fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
             FORMATS.iter().flat_map(|f| f.extensions).map(|e| format!(".{e}")).collect();
         all.join(", ")
     };
-    FORMATS
-        .iter()
-        .find(|f| f.extensions.contains(&extension))
-        .ok_or_else(|| ExportError::NoSuchExtension {
-            path: path.display().to_string(),
-            known: known(),
-        })
+    FORMATS.iter().find(|f| f.extensions.contains(&extension)).ok_or_else(|| {
+        ExportError::NoSuchExtension { path: path.display().to_string(), known: known() }
+    })
 }
 
 /// What a curve is, in one line, for headers and titles.

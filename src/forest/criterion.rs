@@ -43,9 +43,7 @@ pub fn stops(rule: StopRule, sums: &Sums, offset: f64) -> bool {
     match rule {
         StopRule::Unpruned => false,
         StopRule::VarOverMean(threshold) => below((sums.variance() / mean).abs(), threshold),
-        StopRule::StdOverMean(threshold) => {
-            below(sums.variance().sqrt() / mean.abs(), threshold)
-        }
+        StopRule::StdOverMean(threshold) => below(sums.variance().sqrt() / mean.abs(), threshold),
     }
 }
 
@@ -63,9 +61,11 @@ mod tests {
 
     #[test]
     fn proxy_is_the_variance_reduction() {
-        let (left, right, all) = (sums(&[1.0, 2.0]), sums(&[5.0, 9.0, 4.0]), sums(&[1.0, 2.0, 5.0, 9.0, 4.0]));
+        let (left, right, all) =
+            (sums(&[1.0, 2.0]), sums(&[5.0, 9.0, 4.0]), sums(&[1.0, 2.0, 5.0, 9.0, 4.0]));
         let direct = all.variance() - 0.4 * left.variance() - 0.6 * right.variance();
-        let by_proxy = (proxy(left.target, 2.0, right.target, 3.0) - all.target * all.target / 5.0) / 5.0;
+        let by_proxy =
+            (proxy(left.target, 2.0, right.target, 3.0) - all.target * all.target / 5.0) / 5.0;
         assert!((direct - by_proxy).abs() < 1e-12);
     }
 

@@ -1,8 +1,8 @@
 //! The forest: trees grown in parallel, predictions as their mean.
 
+use linfa::Float;
 use linfa::dataset::{AsSingleTargets, DatasetBase};
 use linfa::traits::{Fit, PredictInplace};
-use linfa::Float;
 use ndarray::{Array1, ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -167,9 +167,8 @@ fn draw<F>(table: &Table<F>, bootstrap: bool, stream: &mut Stream) -> Samples {
     for _ in 0..n {
         weights[stream.below(n)] += 1.0;
     }
-    let drawn = |order: &Vec<u32>| {
-        order.iter().copied().filter(|&s| weights[s as usize] > 0.0).collect()
-    };
+    let drawn =
+        |order: &Vec<u32>| order.iter().copied().filter(|&s| weights[s as usize] > 0.0).collect();
     Samples { orders: table.orders.iter().map(drawn).collect(), weights }
 }
 

@@ -58,11 +58,17 @@ pub struct Run {
 pub enum SimulationError {
     #[error("{what} is {value_s} s: expected a time above 0")]
     Time { what: &'static str, value_s: f64 },
-    #[error("the run would take {steps:.0} steps of {step_s:e} s for {outputs:.0} outputs: shorten the duration or lengthen step and output interval")]
+    #[error(
+        "the run would take {steps:.0} steps of {step_s:e} s for {outputs:.0} outputs: shorten the duration or lengthen step and output interval"
+    )]
     TooLong { steps: f64, step_s: f64, outputs: f64 },
-    #[error("interface {interface} is crushed {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\"")]
+    #[error(
+        "interface {interface} is crushed {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\""
+    )]
     CurveEnd { interface: String, deflection_m: f64, time_s: f64, end_m: f64 },
-    #[error("the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds and curves")]
+    #[error(
+        "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds and curves"
+    )]
     Diverged { body: String, time_s: f64 },
 }
 

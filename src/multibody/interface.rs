@@ -45,9 +45,9 @@ impl ForceLaw {
         };
         let unloading = match unloading {
             Unloading::Elastic => Unloading::Elastic,
-            Unloading::Memory { stiffness_n_per_m } => Unloading::Memory {
-                stiffness_n_per_m: stiffness_n_per_m.max(envelope.max_slope()),
-            },
+            Unloading::Memory { stiffness_n_per_m } => {
+                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m.max(envelope.max_slope()) }
+            }
         };
         Self { envelope, unloading, end, end_slope_n_per_m }
     }

@@ -63,7 +63,8 @@ impl Account {
         let masses = || chain.bodies().iter().map(|b| b.mass_kg).zip(speed_m_per_s);
         ledger.kinetic_j = masses().map(|(m, v)| 0.5 * m * v * v).sum();
         (ledger.stored_j, ledger.dissipated_j) = (0.0, 0.0);
-        for ((interface, &d), &largest) in chain.interfaces().iter().zip(deflection_m).zip(largest_m)
+        for ((interface, &d), &largest) in
+            chain.interfaces().iter().zip(deflection_m).zip(largest_m)
         {
             let (stored, dissipated) = interface.law.energies_j(d, largest);
             ledger.stored_j += stored;

@@ -93,15 +93,11 @@ impl Selection {
     }
 
     fn wants(&self, entity: EntityId) -> bool {
-        self.ids
-            .as_ref()
-            .is_none_or(|ids| ids.iter().any(|id| id.matches(entity)))
+        self.ids.as_ref().is_none_or(|ids| ids.iter().any(|id| id.matches(entity)))
     }
 
     fn wants_component(&self, component: &str) -> bool {
-        self.components
-            .as_ref()
-            .is_none_or(|all| all.iter().any(|c| c == component))
+        self.components.as_ref().is_none_or(|all| all.iter().any(|c| c == component))
     }
 }
 
@@ -154,9 +150,7 @@ pub struct SolverFile {
 impl SolverFile {
     /// The history of `component` of `entity` (`None`: a global quantity).
     pub fn history(&self, entity: Option<EntityId>, component: &str) -> Option<&History> {
-        self.histories
-            .iter()
-            .find(|h| h.entity == entity && &*h.component == component)
+        self.histories.iter().find(|h| h.entity == entity && &*h.component == component)
     }
 }
 
@@ -302,9 +296,10 @@ fn check_selection(path: &Path, file: &SolverFile, selection: &Selection) -> Res
         if file.entities.iter().any(|e| wanted.matches(e.id)) {
             continue;
         }
-        let single_surface = file.without_data.iter().any(|w| {
-            w.id == wanted.id && w.reason == NoDataReason::SingleSurfaceContact
-        });
+        let single_surface = file
+            .without_data
+            .iter()
+            .any(|w| w.id == wanted.id && w.reason == NoDataReason::SingleSurfaceContact);
         if single_surface {
             return Err(ReadError::SingleSurface {
                 path: path.into(),

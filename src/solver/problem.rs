@@ -75,10 +75,7 @@ pub struct Place {
 
 impl From<&Line<'_>> for Place {
     fn from(line: &Line<'_>) -> Self {
-        Self {
-            line: line.number,
-            byte: line.byte,
-        }
+        Self { line: line.number, byte: line.byte }
     }
 }
 

@@ -281,10 +281,9 @@ impl<'a> States<'a> {
         // A cut takes labels from the end; labels missing elsewhere are a choice of the solver.
         let last = self.scalars.iter().rev().find(|s| s.absent == 0);
         match last {
-            Some(last) if at_end && self.sealed && last.pending.is_none() => Some(format!(
-                "its labels end before \"{}\"",
-                last.component
-            )),
+            Some(last) if at_end && self.sealed && last.pending.is_none() => {
+                Some(format!("its labels end before \"{}\"", last.component))
+            }
             _ if self.tables.iter().all(|t| t.filled_rows == 0) && pending.labels == 0 => {
                 Some("it has no rows".into())
             }
@@ -419,12 +418,7 @@ impl Table {
 }
 
 /// The field's value; a problem and NaN where it holds no number.
-fn read_field(
-    bytes: &[u8],
-    line: &Line<'_>,
-    columns: [usize; 2],
-    problems: &mut Problems,
-) -> f64 {
+fn read_field(bytes: &[u8], line: &Line<'_>, columns: [usize; 2], problems: &mut Problems) -> f64 {
     let (code, message, value) = match real(bytes) {
         Field::Real(value) => return value,
         Field::NotFinite(value) => (

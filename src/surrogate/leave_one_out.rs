@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::max_crush::MaxCrushRule;
 use super::model::{Model, ModelError, Options};
 use super::predict::{Query, predict};
-use crate::dataset::{GRID_M, TrainingSet};
 use crate::curve::rating::l1_ratio;
+use crate::dataset::{GRID_M, TrainingSet};
 
 /// Errors of a model at a speed it was not trained on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,7 +26,9 @@ pub struct LeftOut {
 /// # Errors
 /// [`ModelError`] if the remaining cases make no model.
 pub fn validate(set: &TrainingSet, options: Options) -> Result<Vec<LeftOut>, ModelError> {
-    (1..set.cases.len().saturating_sub(1)).filter_map(|i| left_out(set, options, i).transpose()).collect()
+    (1..set.cases.len().saturating_sub(1))
+        .filter_map(|i| left_out(set, options, i).transpose())
+        .collect()
 }
 
 fn left_out(set: &TrainingSet, options: Options, i: usize) -> Result<Option<LeftOut>, ModelError> {
@@ -37,11 +39,8 @@ fn left_out(set: &TrainingSet, options: Options, i: usize) -> Result<Option<Left
     let grid: Vec<f64> = (0..=steps).map(|k| end * k as f64 / steps as f64).collect();
     let reference: Vec<f64> = grid.iter().map(|&d| case.envelope.force_at(d)).collect();
     let predicted = model.force_n(case.speed_m_per_s, &grid);
-    let query = Query {
-        speed_m_per_s: case.speed_m_per_s,
-        mass_kg: None,
-        rule: MaxCrushRule::Monotone,
-    };
+    let query =
+        Query { speed_m_per_s: case.speed_m_per_s, mass_kg: None, rule: MaxCrushRule::Monotone };
     // Without a maximal crush (all runs truncated) there is nothing to report.
     let Ok(curve) = predict(&model, &query) else { return Ok(None) };
     Ok(Some(LeftOut {

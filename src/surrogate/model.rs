@@ -93,11 +93,15 @@ pub enum ModelError {
     Dataset(#[from] DatasetError),
     #[error(transparent)]
     Forest(#[from] ForestError),
-    #[error("a forest needs at least 2 speeds, the group has 1: only --model nearest can use a single curve")]
+    #[error(
+        "a forest needs at least 2 speeds, the group has 1: only --model nearest can use a single curve"
+    )]
     OneSpeed,
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
-    #[error("{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train")]
+    #[error(
+        "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train"
+    )]
     NotAModel { path: PathBuf, line: usize, column: usize, detail: String },
     #[error("{path}: model file version {found} is newer than this program reads ({known})", known = VERSION)]
     Version { path: PathBuf, found: u32 },
@@ -157,8 +161,7 @@ impl Model {
     /// # Errors
     /// [`ModelError`] with the place in the file where it is no model of ours.
     pub fn read(path: &Path) -> Result<Self, ModelError> {
-        let text = fs::read(path)
-            .map_err(|source| ModelError::Io { path: path.into(), source })?;
+        let text = fs::read(path).map_err(|source| ModelError::Io { path: path.into(), source })?;
         let no_model = |e: serde_json::Error| ModelError::NotAModel {
             path: path.into(),
             line: e.line(),
@@ -189,7 +192,9 @@ impl Model {
             return Err("it has no cases".into());
         }
         let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
-        if !speeds().zip(speeds().skip(1)).all(|(a, b)| a < b) || !speeds().all(|v| v > 0.0 && v.is_finite()) {
+        if !speeds().zip(speeds().skip(1)).all(|(a, b)| a < b)
+            || !speeds().all(|v| v > 0.0 && v.is_finite())
+        {
             return Err("its speeds are not increasing".into());
         }
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
@@ -217,10 +222,9 @@ impl Model {
     /// # Errors
     /// [`ModelError::Write`] if the target cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ModelError> {
-        let bytes = self.to_json().map_err(|e| ModelError::Damaged {
-            path: path.into(),
-            detail: e.to_string(),
-        })?;
+        let bytes = self
+            .to_json()
+            .map_err(|e| ModelError::Damaged { path: path.into(), detail: e.to_string() })?;
         Ok(write_whole(path, &bytes)?)
     }
 

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Model;
 use super::max_crush::{self, MaxCrushRule};
 use super::warning::Warning;
-use super::Model;
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses};
 use crate::dataset::GRID_M;
 use crate::unit::{Speed, SpeedKind};
@@ -85,7 +85,9 @@ pub struct MaxCrush {
 pub enum PredictError {
     #[error("the speed must be above 0, found {speed_m_per_s} m/s")]
     Speed { speed_m_per_s: f64 },
-    #[error("the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}")]
+    #[error(
+        "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}"
+    )]
     MaxCrush { rule: &'static str, found: String, other: &'static str },
     #[error("the predicted curve is no curve: {0}")]
     Envelope(#[from] EnvelopeError),

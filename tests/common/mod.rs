@@ -65,7 +65,9 @@ pub fn python() -> Option<Command> {
     match std::env::var_os("CRUMPLE_PYTHON") {
         Some(python) => Some(Command::new(python)),
         None => {
-            eprintln!("skipped: CRUMPLE_PYTHON is not set; tests/run installs the clients and sets it");
+            eprintln!(
+                "skipped: CRUMPLE_PYTHON is not set; tests/run installs the clients and sets it"
+            );
             None
         }
     }

@@ -94,11 +94,8 @@ fn assemble(
     let titles: HashMap<i64, &Option<String>> = legend.iter().map(|(id, t)| (*id, t)).collect();
     let title_of = |id: i64| titles.get(&id).and_then(|t| (*t).clone());
     let collected = states.finish();
-    let entities: Vec<Entity> = collected
-        .entities
-        .iter()
-        .map(|&id| Entity { id, title: title_of(id.id) })
-        .collect();
+    let entities: Vec<Entity> =
+        collected.entities.iter().map(|&id| Entity { id, title: title_of(id.id) }).collect();
     let with_data: std::collections::HashSet<i64> = entities.iter().map(|e| e.id.id).collect();
     let mut without_data: Vec<WithoutData> = body
         .single_surfaces()
@@ -112,14 +109,13 @@ fn assemble(
         .collect();
     let single: std::collections::HashSet<i64> = without_data.iter().map(|w| w.id).collect();
     without_data.extend(
-        legend
-            .iter()
-            .filter(|(id, _)| !with_data.contains(id) && !single.contains(id))
-            .map(|(id, title)| WithoutData {
+        legend.iter().filter(|(id, _)| !with_data.contains(id) && !single.contains(id)).map(
+            |(id, title)| WithoutData {
                 id: *id,
                 title: title.clone(),
                 reason: NoDataReason::LegendOnly,
-            }),
+            },
+        ),
     );
     SolverFile {
         format,

@@ -77,7 +77,10 @@ mod tests {
             "                    ls-dyna smp d R13 R13.1.1_27_8731a0 date 07/28/2023",
             Some("smp d R13 R13.1.1_27_8731a0"),
         );
-        t("                         ls-dyna (version 970)     date 1/1/2004", Some("(version 970)"));
+        t(
+            "                         ls-dyna (version 970)     date 1/1/2004",
+            Some("(version 970)"),
+        );
         t("                    ls-dyna smp d R16", Some("smp d R16"));
         t(" some other text", None);
     }

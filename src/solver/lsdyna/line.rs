@@ -42,12 +42,7 @@ pub struct Lines<R> {
 
 impl<R: BufRead> Lines<R> {
     pub fn new(input: R) -> Self {
-        Self {
-            input,
-            buffer: Vec::with_capacity(256),
-            number: 0,
-            byte: 0,
-        }
+        Self { input, buffer: Vec::with_capacity(256), number: 0, byte: 0 }
     }
 
     /// Bytes read so far.
@@ -94,13 +89,7 @@ impl<R: BufRead> Lines<R> {
             self.buffer.pop();
         }
         self.number += 1;
-        Ok(Some(Line {
-            text: &self.buffer,
-            number: self.number,
-            byte: start,
-            ended,
-            overlong,
-        }))
+        Ok(Some(Line { text: &self.buffer, number: self.number, byte: start, ended, overlong }))
     }
 }
 
@@ -137,11 +126,7 @@ pub fn real(field: &[u8]) -> Field {
 }
 
 fn finite(value: f64) -> Field {
-    if value.is_finite() {
-        Field::Real(value)
-    } else {
-        Field::NotFinite(value)
-    }
+    if value.is_finite() { Field::Real(value) } else { Field::NotFinite(value) }
 }
 
 /// Stars, `NaN`, `Infinity`.

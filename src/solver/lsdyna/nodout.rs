@@ -18,15 +18,29 @@ const STATE: &[u8] = b" n o d a l   p r i n t   o u t   f o r   t i m e  s t e p
 const COLUMN_LINE: &[u8] = b" nodal point";
 
 const TRANSLATIONS: [&str; 12] = [
-    "x_displacement", "y_displacement", "z_displacement",
-    "x_velocity", "y_velocity", "z_velocity",
-    "x_acceleration", "y_acceleration", "z_acceleration",
-    "x_coordinate", "y_coordinate", "z_coordinate",
+    "x_displacement",
+    "y_displacement",
+    "z_displacement",
+    "x_velocity",
+    "y_velocity",
+    "z_velocity",
+    "x_acceleration",
+    "y_acceleration",
+    "z_acceleration",
+    "x_coordinate",
+    "y_coordinate",
+    "z_coordinate",
 ];
 const ROTATIONS: [&str; 9] = [
-    "rx_displacement", "ry_displacement", "rz_displacement",
-    "rx_velocity", "ry_velocity", "rz_velocity",
-    "rx_acceleration", "ry_acceleration", "rz_acceleration",
+    "rx_displacement",
+    "ry_displacement",
+    "rz_displacement",
+    "rx_velocity",
+    "ry_velocity",
+    "rz_velocity",
+    "rx_acceleration",
+    "ry_acceleration",
+    "rz_acceleration",
 ];
 
 /// "id columns 1–9, first value columns 10–22 (13 wide), then eleven fields of 12":

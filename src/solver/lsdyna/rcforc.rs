@@ -141,11 +141,7 @@ impl Rcforc {
     }
 }
 
-fn new_table(
-    text: &[u8],
-    at: usize,
-    states: &mut States<'_>,
-) -> (TableId, Vec<&'static Column>) {
+fn new_table(text: &[u8], at: usize, states: &mut States<'_>) -> (TableId, Vec<&'static Column>) {
     let columns: Vec<&Column> = COLUMNS.iter().filter(|c| c.always || c.fits(text, at)).collect();
     let names: Vec<&str> = columns.iter().map(|c| c.component).collect();
     (states.table("sides", &names), columns)

@@ -90,9 +90,7 @@ impl Rwforc {
             );
             return;
         };
-        let table = *self
-            .table
-            .get_or_insert_with(|| states.table("walls", &COMPONENTS));
+        let table = *self.table.get_or_insert_with(|| states.table("walls", &COMPONENTS));
         let entity = EntityId::new(wall);
         if states.pending_time() != Some(time) || states.has_row(table, entity) {
             states.begin(Some(time), line.into());

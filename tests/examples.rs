@@ -1,0 +1,72 @@
+//! Every example is run as a user would.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::{fixture, root};
+
+/// The example's program; cargo builds all examples before it runs the tests.
+fn example(name: &str, arguments: &[&str]) -> String {
+    let folder = Path::new(env!("CARGO_BIN_EXE_crumple")).parent().unwrap().join("examples");
+    let program: PathBuf = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    let output = Command::new(&program)
+        .args(arguments)
+        .output()
+        .unwrap_or_else(|e| panic!("{}: {e}; run cargo test without --test", program.display()));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name}: {error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn read_histories() {
+    let path = fixture("fe/lead-car-wall/25kmh/nodout");
+    let text = example("read_histories", &[path.to_str().unwrap(), "900001", "x_velocity"]);
+    assert_eq!(text.lines().count(), 400);
+    assert_eq!(text.lines().next(), Some("0.0 -6944.44"));
+}
+
+#[test]
+fn cross_validation() {
+    let text = example("cross_validation", &[]);
+    let r2: Vec<f64> = text
+        .lines()
+        .map(|l| l.split("R² ").nth(1).unwrap().split(',').next().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(r2.len(), 5);
+    assert!(r2[3] > r2[0] && r2[3] > 0.95, "{text}");
+    assert!((r2[4] - r2[3]).abs() < 0.02, "out-of-bag agrees with cross-validation: {text}");
+}
+
+#[test]
+fn wall_impact() {
+    let text = example("wall_impact", &[]);
+    // Kinetic energy 2.3148 MJ: 0.15 up to the peak, 0.48 down to 0.3 m, and 1.6848 on the
+    // rising line 1.8 + 0.5 (d − 0.3) MN: crush 0.3 + (sqrt(1.8² + 1.6848) − 1.8)/0.5.
+    assert!(text.contains("peak force 3.000 MN"), "{text}");
+    assert!(text.contains("max crush  1.1384 m"), "{text}");
+}
+
+/// The README's picture is what the example draws.
+#[test]
+fn picture() {
+    let committed = std::fs::read_to_string(root().join("examples/picture.svg")).unwrap();
+    assert!(
+        example("picture", &[]) == committed,
+        "draw it again: cargo run --example picture > examples/picture.svg"
+    );
+}
+
+#[test]
+fn every_example_is_run_here() {
+    let here = std::fs::read_to_string(root().join("tests/examples.rs")).unwrap();
+    for entry in root().join("examples").read_dir().unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "rs") {
+            let name = path.file_stem().unwrap().to_str().unwrap().to_string();
+            assert!(here.contains(&format!("example(\"{name}\"")), "{name} is not run");
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! House rules that the compiler does not know: layering, schemas, what a file says first,
+//! what a repository must not carry.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::root;
+
+/// Which module may name which others. One way only: a change here is a change of
+/// architecture and belongs into ARCHITECTURE.md.
+const MAY_NAME: [(&str, &[&str]); 16] = [
+    ("unit", &[]),
+    ("history", &[]),
+    ("file", &[]),
+    ("manifest", &[]),
+    ("forest", &[]),
+    ("solver", &["history", "unit"]),
+    ("curve", &["history", "unit"]),
+    ("study", &["curve", "solver", "history", "manifest", "unit"]),
+    ("database", &["curve", "solver", "history", "file", "unit"]),
+    ("build", &["study", "database", "curve", "manifest"]),
+    ("dataset", &["curve", "unit"]),
+    ("surrogate", &["dataset", "forest", "curve", "file", "unit"]),
+    ("multibody", &["curve", "unit"]),
+    ("export", &["surrogate", "curve", "unit"]),
+    ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
+    ("compare", &["multibody", "surrogate", "dataset", "curve", "unit"]),
+];
+
+fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in folder.read_dir().unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path, extension));
+        } else if path.extension().is_some_and(|e| e == extension) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The module a file of src/ belongs to.
+fn module(path: &Path) -> String {
+    let relative = path.strip_prefix(root().join("src")).unwrap();
+    let first = relative.components().next().unwrap().as_os_str().to_str().unwrap();
+    first.trim_end_matches(".rs").to_string()
+}
+
+#[test]
+fn layers_name_only_what_is_below() {
+    let rules: BTreeMap<&str, &[&str]> = MAY_NAME.into_iter().collect();
+    for path in files(&root().join("src"), "rs") {
+        let this = module(&path);
+        let text = fs::read_to_string(&path).unwrap();
+        if ["lib", "main", "cli"].contains(&this.as_str()) {
+            // The command line sees only the public API.
+            assert!(this == "lib" || !text.contains("crate::"), "{}", path.display());
+            continue;
+        }
+        let allowed = rules.get(this.as_str()).unwrap_or_else(|| panic!("{this} has no rule"));
+        for (at, _) in text.match_indices("crate::") {
+            let named: String = text[at + 7..]
+                .chars()
+                .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+                .collect();
+            assert!(
+                named == this || allowed.contains(&named.as_str()),
+                "{} names {named}, which is not below it",
+                path.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn rules_are_one_way() {
+    let position = |name: &str| MAY_NAME.iter().position(|(m, _)| *m == name);
+    for (k, (module, below)) in MAY_NAME.iter().enumerate() {
+        for name in *below {
+            assert!(position(name).unwrap() < k, "{module} and {name} could form a circle");
+        }
+    }
+}
+
+#[test]
+fn only_the_database_names_hdf5() {
+    for path in files(&root().join("src"), "rs") {
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(!text.contains("hdf5_pure") || module(&path) == "database", "{}", path.display());
+    }
+}
+
+#[test]
+fn the_library_never_prints_and_holds_no_unsafe_code() {
+    for path in files(&root().join("src"), "rs") {
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(!text.contains("unsafe "), "{}", path.display());
+        if module(&path) != "cli" {
+            for macro_name in ["print!(", "println!(", "eprint!(", "eprintln!(", "dbg!("] {
+                assert!(!text.contains(macro_name), "{} has {macro_name}", path.display());
+            }
+        }
+    }
+}
+
+/// What a user's file can reach must not panic: no unwrap or expect outside tests.
+#[test]
+fn no_unwrap_outside_tests() {
+    for path in files(&root().join("src"), "rs") {
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let code: String = code
+            .lines()
+            .filter(|l| !l.trim_start().starts_with("//"))
+            .collect::<Vec<_>>()
+            .join("\n");
+        for call in
+            [".unwrap()", ".expect(", "panic!(", "unreachable!(", "todo!(", "unimplemented!("]
+        {
+            assert!(!code.contains(call), "{} has {call}", path.display());
+        }
+    }
+}
+
+#[test]
+fn every_source_file_says_first_what_it_is_for() {
+    for folder in ["src", "tests", "examples", "benches"] {
+        for path in files(&root().join(folder), "rs") {
+            let text = fs::read_to_string(&path).unwrap();
+            assert!(text.starts_with("//! "), "{}", path.display());
+        }
+    }
+}
+
+#[test]
+fn dependencies_have_fixed_minor_versions() {
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    for table in ["dependencies", "dev-dependencies"] {
+        for (name, entry) in manifest[table].as_table().unwrap() {
+            let version = entry.as_str().or_else(|| entry.get("version")?.as_str()).unwrap();
+            assert!(version.matches('.').count() >= 1, "{name} = {version}");
+        }
+    }
+}
+
+/// Schemas are generated from the types. To write them again:
+/// CRUMPLE_WRITE_SCHEMAS=1 cargo test --test house_rules schemas
+#[test]
+fn schemas_are_those_of_the_types() {
+    let schemas = [
+        ("study.schema.json", schemars::schema_for!(crumple::study::Manifest)),
+        ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
+    ];
+    for (name, schema) in schemas {
+        let path = root().join("schemas").join(name);
+        let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
+        if std::env::var_os("CRUMPLE_WRITE_SCHEMAS").is_some() {
+            fs::write(&path, &text).unwrap();
+        }
+        let committed = fs::read_to_string(&path).unwrap_or_default();
+        assert!(committed == text, "{name} is not what the types say; see this test on writing it");
+    }
+}
+
+/// The layout's description names every attribute and dataset that is written.
+#[test]
+fn the_database_layout_is_described() {
+    let described = fs::read_to_string(root().join("schemas/curve_database.md")).unwrap();
+    let code = fs::read_to_string(root().join("src/database/layout.rs")).unwrap();
+    let mut names = Vec::new();
+    for call in ["set_attr(\"", "create_dataset(\"", "create_group(\""] {
+        names.extend(code.match_indices(call).map(|(at, _)| {
+            let rest = &code[at + call.len()..];
+            &rest[..rest.find('"').unwrap()]
+        }));
+    }
+    // Calls broken over lines.
+    names.extend(["closing_speed_m_per_s"]);
+    assert!(names.len() > 25);
+    for name in names {
+        assert!(described.contains(&format!("`{name}`")), "{name} is not described");
+    }
+}

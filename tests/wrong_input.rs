@@ -1,0 +1,406 @@
+//! Wrong input: the message names file, place and remedy, the exit code is 1 or 2, and
+//! nothing half-written stays behind.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
+
+/// A study of one run, changed by one replacement.
+struct Study {
+    folder: tempfile::TempDir,
+}
+
+impl Study {
+    fn new(group: &str, from: &str, to: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let source = fixture(&format!("fe/{group}"));
+        let text = fs::read_to_string(source.join("study.toml")).unwrap();
+        assert!(text.contains(from), "{from} is in the manifest");
+        let parts: Vec<&str> = text.splitn(3, "[[run]]").collect();
+        let one_run = format!("{}[[run]]{}", parts[0], parts[1]);
+        assert!(one_run.contains(from));
+        fs::write(folder.path().join("study.toml"), one_run.replace(from, to)).unwrap();
+        let run = text.split("path  = \"").nth(1).unwrap().split('"').next().unwrap();
+        fs::create_dir(folder.path().join(run)).unwrap();
+        for entry in source.join(run).read_dir().unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), folder.path().join(run).join(entry.file_name())).unwrap();
+        }
+        Self { folder }
+    }
+
+    /// Builds, which must fail and leave nothing; returns the message.
+    fn fails(&self) -> String {
+        let before = entries(self.folder.path());
+        let error = crumple_fails(self.folder.path(), 1, &["build", "study.toml", "-o", "c.h5"]);
+        assert_eq!(entries(self.folder.path()), before, "nothing is left behind");
+        error
+    }
+}
+
+fn entries(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = folder
+        .read_dir()
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn manifests() {
+    fn t(from: &str, to: &str, expected: &str) {
+        let error = Study::new("lead-car-wall", from, to).fails();
+        assert!(error.contains(expected), "{from} → {to} said:\n{error}");
+    }
+    t(
+        "group = \"lead",
+        "grop = \"lead",
+        "study.toml: line 5, columns 1-4: unknown field `grop`, expected one of `name`, `units`, `group`",
+    );
+    t(
+        "mm-t-s",
+        "mm-t-fortnight",
+        "study.toml: line 4, columns 9-24: unit system \"mm-t-fortnight\" is not known: write \"SI\" or",
+    );
+    t(
+        "\"25km/h\"",
+        "\"25\"",
+        "study.toml: line 16, columns 9-12: speed \"25\" has no unit: write for example \"25km/h\" or \"25m/s\"",
+    );
+    t(
+        "\"25km/h\"",
+        "25",
+        "study.toml: line 16, columns 9-10: speed \"25\" has no unit: write for example \"25km/h\"",
+    );
+    t(
+        "\"24t\"",
+        "\"24tons\"",
+        "mass \"24tons\" has the unknown unit \"tons\": use one of t, kg, g",
+    );
+    t("\"24t\"", "\"-24t\"", "mass \"-24t\" is out of range: it must be above zero");
+    t(
+        "\"none\"",
+        "\"CFC61\"",
+        "line 11, columns 14-20: filter \"CFC61\" is not known: write \"CFC60\"",
+    );
+    t("id = 1, ", "", "a force needs either id = … (a wall or contact) or node = …");
+    t("states = 400", "states = 1", "sampling needs states from 2 to 1000000, found 1");
+    t("kind  = \"wall\"", "kind  = \"wal\"", "unknown variant `wal`, expected `wall` or `pair`");
+    t(
+        "kind  = \"wall\"",
+        "kind  = \"wall\"\nhalf_model = true",
+        "half_model = true needs kind = \"pair\"",
+    );
+    t("[study]", "[study", "study.toml: line 2");
+}
+
+#[test]
+fn runs() {
+    fn t(group: &str, from: &str, to: &str, expected: &str) {
+        let error = Study::new(group, from, to).fails();
+        assert!(error.contains(expected), "{from} → {to} said:\n{error}");
+    }
+    let wall = "lead-car-wall";
+    t(
+        wall,
+        "path  = \"25kmh\"",
+        "path  = \"26kmh\"",
+        "the run's folder 26kmh does not exist: check path in the manifest",
+    );
+    t(wall, "\"rwforc\"", "\"rcforc\"", "has no file \"rcforc\": it has nodout, rwforc");
+    t(
+        wall,
+        "node = 900001",
+        "node = 900011",
+        "25kmh/nodout: nodout has no node 900011: it has 900001 \"COG of the rigid trailing mass\"",
+    );
+    t(
+        wall,
+        "id = 1,",
+        "id = 2,",
+        "25kmh/rwforc: rwforc has no rigid wall 2: it has 1 \"rigid wall\"",
+    );
+    t(
+        wall,
+        "normal_force",
+        "norm_force",
+        "rwforc has no component \"norm_force\": it has normal_force, x_force",
+    );
+    t(wall, "\"none\"", "\"CFC180\"", "is too long for CFC180: at most");
+    t(
+        "lead-car-pair",
+        "id = 3",
+        "id = 1",
+        "interface 1 is a single-surface contact, for which LS-DYNA prints no resultants: ask for a two-sided contact or a force transducer (it has 3:surfa \"car A against car B\"",
+    );
+}
+
+#[test]
+fn near_ids_come_first() {
+    let Some(folder) = common::shared("samples/lsdyna/nodout") else { return };
+    let path = folder.join("mlp6_113151_smp_d_1000nodes");
+    let error =
+        crumple_fails(Path::new("."), 1, &["histories", path.to_str().unwrap(), "--id", "1004"]);
+    assert!(
+        error.contains("nodout has no node 1004: the nearest of its ids are 1000, 999, 998"),
+        "{error}"
+    );
+}
+
+/// One bad run among good ones is reported; the others are built.
+#[test]
+fn the_other_runs_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = fixture("fe/lead-car-wall");
+    let text = fs::read_to_string(source.join("study.toml")).unwrap();
+    let absolute = text.replace("path  = \"", &format!("path  = \"{}/", source.display()));
+    let absolute = absolute.replace("/36kmh\"", "/37kmh\"");
+    fs::write(folder.path().join("study.toml"), absolute).unwrap();
+    let error = crumple_fails(folder.path(), 1, &["build", "study.toml", "-o", "c.h5"]);
+    assert!(error.contains("37kmh does not exist"), "{error}");
+    let list = crumple_ok(folder.path(), &["db", "ls", "c.h5", "--json"]);
+    let list: serde_json::Value = serde_json::from_str(&list).unwrap();
+    assert_eq!(list["groups"]["lead-car-wall"].as_array().unwrap().len(), 4);
+}
+
+/// A run that died: its complete states are used, and it is said.
+#[test]
+fn a_cut_run_is_used_as_far_as_it_goes() {
+    let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");
+    let path = study.folder.path().join("25kmh/nodout");
+    let text = fs::read(&path).unwrap();
+    fs::write(&path, &text[..text.len() - 250]).unwrap();
+    let output =
+        crumple_in(study.folder.path(), &["build", "study.toml", "-o", "c.h5", "--strict"]);
+    assert_eq!(output.status.code(), Some(3));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("state 400 at time 0.2992515"), "{error}");
+    assert!(error.contains("is not complete and is left out"), "{error}");
+}
+
+#[test]
+fn files_that_are_not_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("text.h5"), "hello\n").unwrap();
+    build_fixture(here, "lead-car-wall");
+    crumple_ok(
+        here,
+        &["train", "curves.h5", "--group", "lead-car-wall", "--model", "nearest", "-o", "m.model"],
+    );
+    let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
+    crumple_ok(here, &["histories", nodout.to_str().unwrap(), "-o", "histories.h5"]);
+    let study = fixture("fe/lead-car-wall/study.toml");
+    let study = study.to_str().unwrap();
+    fn t(here: &Path, arguments: &[&str], expected: &str) {
+        let before = entries(here);
+        let error = crumple_fails(here, 1, arguments);
+        assert!(error.contains(expected), "{arguments:?} said:\n{error}");
+        assert_eq!(entries(here), before);
+    }
+    t(here, &["db", "ls", "text.h5"], "text.h5: this is no HDF5 file");
+    t(here, &["db", "ls", "histories.h5"], "histories.h5: this HDF5 file is no curve database");
+    t(here, &["build", study, "-o", "text.h5"], "text.h5: this is no HDF5 file");
+    assert_eq!(
+        fs::read(here.join("text.h5")).unwrap(),
+        b"hello\n",
+        "a file that is not ours stays"
+    );
+    t(here, &["db", "ls", "none.h5"], "none.h5: No such file");
+    t(
+        here,
+        &["train", "curves.h5", "--group", "wall", "-o", "x"],
+        "there is no group \"wall\": it has lead-car-wall",
+    );
+    t(
+        here,
+        &["predict", "curves.h5", "--speed", "50km/h"],
+        "curves.h5: line 1, column 1: this is no model file",
+    );
+    t(here, &["export", "m.model", "--to", "csv"], "m.model: this is no predicted curve");
+    t(here, &["inspect", "curves.h5"], "this is an HDF5 file: the readers take nodout, rcforc");
+    t(here, &["inspect", "text.h5"], "no solver output is recognised in it");
+    t(
+        here,
+        &["compare", "curves.h5", "--group", "lead-car-wall", "--speed", "50km/h"],
+        "has no case at 50 km/h: it has 25 km/h, 36 km/h",
+    );
+    t(
+        here,
+        &["db", "show", "curves.h5", "--group", "lead-car-wall", "--case", "x"],
+        "has no case \"x\": it has 25kmh, 36kmh",
+    );
+    fs::write(
+        here.join("m2.model"),
+        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":1", "\"version\":9"),
+    )
+    .unwrap();
+    t(
+        here,
+        &["predict", "m2.model", "--speed", "50km/h"],
+        "version 9 is newer than this program reads (1)",
+    );
+}
+
+#[test]
+fn command_lines() {
+    fn t(arguments: &[&str], expected: &str) {
+        let error = crumple_fails(Path::new("."), 2, arguments);
+        assert!(error.contains(expected), "{arguments:?} said:\n{error}");
+    }
+    t(
+        &["predict", "m", "--speed", "36"],
+        "speed \"36\" has no unit: write for example \"36km/h\" or \"36m/s\"",
+    );
+    t(&["predict", "m", "--speed", "-3m/s"], "it must be above zero");
+    t(&["predict", "m", "--speed", "36km/h", "--mass", "24"], "mass \"24\" has no unit");
+    t(
+        &["predict", "m", "--speed", "36km/h", "-o", "a.xyz"],
+        "use one of .json, .csv, .k, .key, .dyn",
+    );
+    t(
+        &["export", "m", "--to", "xyz"],
+        "there is no export format \"xyz\": use one of json, csv, lsdyna",
+    );
+    t(&["export", "m"], "name the format with --to (json, csv, lsdyna)");
+    t(&["histories", "f", "--id", "x"], "\"x\" is not an id: write for example 900001 or 3:surfa");
+    t(&["histories", "f", "-o", "a.parquet"], "histories are written as .csv, .h5 or .hdf5");
+    t(&["train", "d", "--group", "g", "-o", "m", "--paper", "--trees", "3"], "cannot be used with");
+    t(&["frobnicate"], "unrecognized subcommand");
+}
+
+#[test]
+fn scenarios() {
+    fn t(change: impl Fn(String) -> String, expected: &str) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("c.csv"), "d_m,force_N\n0,0\n1,2e6\n").unwrap();
+        let text = "[run]\nduration = \"100ms\"\n[curves]\nc = { file = \"c.csv\" }\n\
+            [[train]]\nname = \"A\"\nspeed = \"10m/s\"\nvehicles = [ { name = \"A1\", mass = \"24t\" } ]\n\
+            [wall]\n[contact]\ncurve = \"c\"\n";
+        fs::write(folder.path().join("s.toml"), change(text.into())).unwrap();
+        let error = crumple_fails(folder.path(), 1, &["simulate", "s.toml", "-o", "out.csv"]);
+        assert!(error.contains(expected), "expected {expected}, found:\n{error}");
+        assert!(!folder.path().join("out.csv").exists());
+    }
+    t(|s| s.replace("10m/s", "10"), "s.toml: line 7, columns 9-12: speed \"10\" has no unit");
+    t(
+        |s| s.replace("curve = \"c\"", "curve = \"d\""),
+        "there is no curve \"d\" in [curves]: it has c",
+    );
+    t(|s| s.replace("[wall]\n", ""), "expected two [[train]], or one and a [wall]");
+    t(|s| s.replace("file = \"c.csv\"", "model = \"no.model\""), "no.model: No such file");
+    t(|s| s.replace("file = \"c.csv\"", ""), "needs exactly one of model, file and database");
+    t(|s| s.replace("10m/s", "0m/s"), "never meets what is in front of it");
+    t(|s| s.replace("100ms", "1000000000s"), "shorten the duration");
+    t(|s| s.replace("c.csv\"", "c.csv\", lawn = 3"), "unknown field `lawn`");
+}
+
+#[test]
+fn curve_files() {
+    fn t(csv: &str, expected: &str) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("c.csv"), csv).unwrap();
+        let text = "[run]\nduration = \"100ms\"\n[curves]\nc = { file = \"c.csv\" }\n\
+            [[train]]\nname = \"A\"\nspeed = \"10m/s\"\nvehicles = [ { name = \"A1\", mass = \"24t\" } ]\n\
+            [wall]\n[contact]\ncurve = \"c\"\n";
+        fs::write(folder.path().join("s.toml"), text).unwrap();
+        let error = crumple_fails(folder.path(), 1, &["simulate", "s.toml"]);
+        assert!(error.contains(expected), "expected {expected}, found:\n{error}");
+    }
+    t("d_m,force_N\n0,0\n1,x\n", "c.csv: line 3, field 2: expected a number, found \"x\"");
+    t(
+        "d,force_N\n0,0\n1,1\n",
+        "line 1: expected a column deflection with its unit, such as d_m or d_mm, found \"d\"",
+    );
+    t(
+        "d_m,force_N\n0,0\n1,1\n1,2\n",
+        "the deflection must increase, found 1 m after 1 m at point 3",
+    );
+    t("d_m,force_N\n0.1,0\n1,1\n", "the deflection must begin at 0, found 0.1 m");
+    t("d_m,force_N\n0,5\n1,5\n", "never rises, so its unloading stiffness must be given");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn full_disk_and_unwritable_targets() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
+    let nodout = nodout.to_str().unwrap();
+    let study = fixture("fe/lead-car-wall/study.toml");
+    let study = study.to_str().unwrap();
+    let full = "cannot write /dev/full: No space left on device";
+    for (arguments, expected) in [
+        (vec!["histories", nodout, "-o", "/dev/full"], full),
+        (vec!["build", study, "-o", "/dev/full"], full),
+        (vec!["train", "curves.h5", "--group", "lead-car-wall", "-o", "/dev/full"], full),
+        (vec!["build", study, "-o", "/no/such/c.h5"], "cannot write /no/such/c.h5"),
+        (vec!["histories", nodout, "-o", "/no/such/a.csv"], "cannot write /no/such/a.csv"),
+        (vec!["build", study, "-o", "."], "cannot write ."),
+    ] {
+        let error = crumple_fails(here, 1, &arguments);
+        assert!(error.contains(expected), "{arguments:?} said:\n{error}");
+    }
+    assert_eq!(entries(here), ["curves.h5"]);
+}
+
+/// The old database survives a target that cannot be replaced.
+#[test]
+fn a_second_writer_is_told_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = build_fixture(folder.path(), "lead-car-wall");
+    let before = fs::read(&path).unwrap();
+    let lock = crumple::database::WriterLock::take(&path).unwrap();
+    let study = fixture("fe/lead-car-pair/study.toml");
+    let error =
+        crumple_fails(folder.path(), 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
+    assert!(error.contains("is being written by another process: try again"), "{error}");
+    drop(lock);
+    assert_eq!(fs::read(&path).unwrap(), before);
+}
+
+/// Flipped bits in a database: an error or a result, never a panic.
+#[test]
+fn damaged_databases_never_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = build_fixture(folder.path(), "lead-car-wall");
+    let bytes = fs::read(&path).unwrap();
+    let damaged = folder.path().join("damaged.h5");
+    let mut state = 1u64;
+    for _ in 0..1_500 {
+        let mut copy = bytes.clone();
+        for _ in 0..3 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let at = (state >> 20) as usize % copy.len();
+            copy[at] ^= 1 << (state >> 60 & 7);
+        }
+        if state.is_multiple_of(5) {
+            copy.truncate((state >> 15) as usize % copy.len());
+        }
+        fs::write(&damaged, &copy).unwrap();
+        let _ = crumple::database::Database::read(&damaged);
+    }
+}
+
+/// h5py's own files of the newest layout are refused or read, not crashed on.
+#[test]
+fn foreign_hdf5_files_are_refused() {
+    let Some(mut python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let script = "import h5py\n\
+        for v in ['earliest', 'latest']:\n    \
+        with h5py.File(v + '.h5', 'w', libver=v) as f:\n        f['a'] = [1, 2, 3]\n        f.create_dataset('b', data=range(100), chunks=(10,), compression='gzip')\n";
+    assert!(python.arg("-c").arg(script).current_dir(folder.path()).status().unwrap().success());
+    for name in ["earliest.h5", "latest.h5"] {
+        let error = crumple_fails(folder.path(), 1, &["db", "ls", name]);
+        assert!(error.contains("is no curve database"), "{error}");
+    }
+}
