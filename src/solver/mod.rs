@@ -1,4 +1,4 @@
-//! Solver files: from bytes to [`History`](crate::history::History).
+//! Solver files: from bytes to [`History`].
 //!
 //! A reader takes `BufRead` and a [`Selection`], returns a [`SolverFile`], and treats
 //! damage as part of the result ([`Problem`]): complete states are returned, what is

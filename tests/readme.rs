@@ -1,0 +1,67 @@
+//! The README's commands do what it says, and its numbers are the program's.
+
+mod common;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use common::{crumple_ok, root};
+
+fn readme() -> String {
+    std::fs::read_to_string(root().join("README.md")).unwrap()
+}
+
+/// Lines of the fenced blocks of one language.
+fn blocks(language: &str) -> Vec<String> {
+    let text = readme();
+    let fence = format!("```{language}\n");
+    let inside = text.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap());
+    inside.flat_map(str::lines).map(str::to_string).collect()
+}
+
+#[test]
+fn commands_of_the_readme_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut here: PathBuf = folder.path().into();
+    let mut run = 0;
+    for line in blocks("sh") {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            ["cd", to] => here = here.join(to),
+            ["crumple", ref arguments @ ..] => {
+                let output = Command::new(env!("CARGO_BIN_EXE_crumple"))
+                    .args(arguments)
+                    .current_dir(&here)
+                    .output()
+                    .unwrap();
+                let error = String::from_utf8_lossy(&output.stderr);
+                assert!(output.status.success(), "{line}\n{error}");
+                run += 1;
+            }
+            [] | ["#", ..] => {}
+            // The two commands of a fresh clone: CI runs them.
+            ["cargo", "run", "--release", "--", "demo"] | ["tests/run"] => {}
+            _ => panic!("nothing runs this line of the README: {line}"),
+        }
+    }
+    assert!(run >= 12, "{run} commands");
+}
+
+/// CI runs the two commands of a fresh clone.
+#[test]
+fn ci_runs_the_two_commands() {
+    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
+    assert!(ci.contains("cargo run --locked --release -- demo"));
+    assert!(ci.lines().any(|l| l == "tests/run"));
+}
+
+#[test]
+fn table_of_the_readme_is_the_demos() {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = crumple_ok(folder.path(), &["demo"]);
+    let table = blocks("text");
+    assert_eq!(table.len(), 11);
+    for line in table {
+        assert!(demo.lines().any(|l| l == line), "the demo does not print: {line}\n{demo}");
+    }
+}
