@@ -31,7 +31,7 @@
 //! ```
 //!
 //! The modules below stand in the order worth reading. Inside is SI; units enter at the
-//! edges ([`unit`]). A speed always says what it is measured against.
+//! edges ([`unit`](mod@unit)). A speed always says what it is measured against.
 
 pub mod unit;
 

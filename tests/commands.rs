@@ -156,6 +156,26 @@ fn energy_audits_of_all_groups() {
     assert_eq!(check, "16 cases checked, 0 findings\n");
 }
 
+/// The full runs give the curves of the thinned ones, bit for bit.
+#[test]
+fn full_runs_and_bundled_runs_agree() {
+    let Some(full) = common::shared("fe") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for group in [WALL, "lead-car-pair", "vehicle-pair"] {
+        build_fixture(folder.path(), group);
+        let study = full.join(group).join("study.toml");
+        crumple_ok(folder.path(), &["build", study.to_str().unwrap(), "-o", "full.h5"]);
+    }
+    let curves = |database: &str| -> Vec<Value> {
+        let shown = json(&crumple_ok(folder.path(), &["db", "show", database, "--json"]));
+        let groups = shown["groups"].as_object().unwrap();
+        let cases = groups.values().flat_map(|cases| cases.as_array().unwrap());
+        cases.map(|c| serde_json::json!([c["name"], c["original"], c["work_J"]])).collect()
+    };
+    assert_eq!(curves("full.h5"), curves("curves.h5"));
+    assert_eq!(curves("full.h5").len(), 16);
+}
+
 /// Two lead cars closing at 72 km/h are each like one against a wall at 36 km/h.
 #[test]
 fn pair_and_wall_agree_by_symmetry() {

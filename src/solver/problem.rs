@@ -27,6 +27,8 @@ pub enum ProblemCode {
     UnexpectedEntity,
     /// A component is missing from some states; its values there are NaN.
     AbsentComponent,
+    /// A label that a state already has; its first value is kept.
+    RepeatedLabel,
     /// A state's time is before the one of the state above it; the order of the file is kept.
     TimeGoesBack,
     /// Rows of a layout that is not read.

@@ -225,6 +225,15 @@ impl<'a> States<'a> {
             });
             self.scalars.len() - 1
         });
+        if self.scalars[index].pending.is_some() {
+            self.problems.add(
+                ProblemCode::RepeatedLabel,
+                Some(line.into()),
+                None,
+                format!("{component} appears twice in one state; its first value is kept"),
+            );
+            return;
+        }
         let value = read_field(bytes, line, columns, &mut self.problems);
         self.scalars[index].pending = Some(value);
     }

@@ -3,7 +3,7 @@
 use std::io::{self, BufRead};
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, real};
+use super::line::{Field, Line, integer, real};
 use crate::solver::problem::Place;
 use crate::solver::states::States;
 use crate::solver::{Selection, SolverFile};
@@ -44,9 +44,13 @@ impl Body for Glstat {
             states.damage(line, None, "the line is cut by the end of the file".into());
             return;
         }
-        let Some(component) = component else {
+        let Some(mut component) = component else {
             return; // Text between the labels: mass properties, warnings.
         };
+        // With several walls the label repeats, and the wall follows the value.
+        if let Some(wall) = wall_number(line.text) {
+            component = format!("{component}_wall_{wall}");
+        }
         let value = line.columns(VALUE.0, VALUE.1);
         if component != "time" {
             states.scalar(&component, value, line, [VALUE.0, VALUE.1]);
@@ -63,6 +67,12 @@ impl Body for Glstat {
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}
+
+/// The number behind `wall#`, which follows the value of a stonewall energy.
+fn wall_number(text: &[u8]) -> Option<i64> {
+    let rest = text.get(VALUE.1..)?.trim_ascii_start();
+    integer(rest.strip_prefix(b"wall#")?)
 }
 
 /// The component a label names, as binout does; `None` if the line has no label.
@@ -84,6 +94,16 @@ fn component(text: &[u8]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_wall_has_its_own_energy() {
+        fn t(line: &str, expected: Option<i64>) {
+            assert_eq!(wall_number(line.as_bytes()), expected, "{line:?}");
+        }
+        t(" stonewall energy...............   1.00000E+00 wall# 1", Some(1));
+        t(" stonewall energy...............   1.00000E+00 wall#12", Some(12));
+        t(" stonewall energy...............   1.00000E+00", None);
+    }
 
     #[test]
     fn labels_become_binout_names() {

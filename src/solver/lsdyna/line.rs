@@ -16,7 +16,7 @@ pub struct Line<'a> {
     pub byte: u64,
     /// Whether a line end follows; only the last line of a cut file has none.
     pub ended: bool,
-    /// Whether bytes beyond [`MAX_LINE`] were skipped.
+    /// Whether bytes beyond the first 4096 were skipped.
     pub overlong: bool,
 }
 
