@@ -26,7 +26,8 @@ fn main() -> Result<(), ForestError> {
     let forest: RegressionForest<f64> =
         ForestParams::new(50).seed(1).out_of_bag(true).fit(&data)?;
     if let Some(out_of_bag) = forest.out_of_bag() {
-        println!("out of bag: R² {:.4}, rmse {:.4}", out_of_bag.r2, out_of_bag.rmse);
+        let r2 = out_of_bag.r2.unwrap_or(f64::NAN);
+        println!("out of bag: R² {r2:.4}, rmse {:.4}", out_of_bag.rmse);
     }
     Ok(())
 }

@@ -13,7 +13,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("expected: file, id, component".into());
     };
     let selection =
-        Selection { ids: Some(vec![id.parse()?]), components: Some(vec![component.clone()]) };
+        Selection {
+        ids: Some(vec![id.parse()?]),
+        components: Some(vec![component.clone()]),
+        audit: false,
+    };
     let file = solver::read(Path::new(path), None, &selection)?;
     for problem in &file.problems {
         eprintln!("{problem}");

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::curve::rating::l1_ratio;
 use crate::curve::resample::{derivative, interpolate};
 use crate::curve::{Case, Envelope, EnvelopeError};
-use crate::dataset::{DatasetError, TrainingSet};
+use crate::dataset::{DatasetError, TrainingSet, nearest};
 use crate::multibody::integrator::DEFAULT_STEP_S;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
@@ -124,10 +124,8 @@ pub fn compare(
     let fe = Candidate { envelope: own.envelope.clone(), stiffness, time_s: 0.0 };
     rows.push(row("fe", format!("FE at {}", km_per_h(speed)), fe, case, &reference)?);
 
-    let distance = |v: f64| (v - speed).abs();
-    let nearest = rest.cases.iter().skip(1).fold(&rest.cases[0], |best, c| {
-        if distance(c.speed_m_per_s) < distance(best.speed_m_per_s) { c } else { best }
-    });
+    let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
+    let nearest = &rest.cases[nearest(speeds, speed)];
     let fdrm = Candidate {
         envelope: nearest.envelope.clone(),
         stiffness: nearest.unloading_stiffness_n_per_m,

@@ -19,6 +19,7 @@ pub struct TrainingCase {
     pub sampled: Envelope,
     pub truncated: bool,
     pub unloading_stiffness_n_per_m: Option<f64>,
+    pub fingerprint: String,
 }
 
 /// The cases of one group.
@@ -33,8 +34,6 @@ pub struct TrainingSet {
     pub masses: Masses,
     pub equal_masses: bool,
     pub cases: Vec<TrainingCase>,
-    /// Hash over the fingerprints of the cases.
-    pub hash: String,
 }
 
 /// Why cases are no training set.
@@ -63,6 +62,15 @@ pub enum TableKind {
 /// Coarsest deflection grid for training: at 20 m/s one state each 0.75 ms is 15 mm, a
 /// third of the way to the first peak.
 pub const GRID_M: f64 = 2e-3;
+
+/// Index of the speed nearest to `v`; of two equally near ones the first.
+pub fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
+    let closer = |best: (usize, f64), (i, s): (usize, f64)| {
+        let distance = (s - v).abs();
+        if distance < best.1 { (i, distance) } else { best }
+    };
+    speeds_m_per_s.enumerate().fold((0, f64::INFINITY), closer).0
+}
 
 impl TrainingSet {
     /// Checks the cases of a group.
@@ -96,12 +104,7 @@ impl TrainingSet {
                 return Err(DatasetError::Mixed { first, second, what });
             }
         }
-        let mut hash = blake3::Hasher::new();
-        let mut training = Vec::new();
-        for case in &cases {
-            hash.update(case.fingerprint.as_bytes());
-            training.push(TrainingCase::new(case)?);
-        }
+        let training = cases.iter().map(|c| TrainingCase::new(c)).collect::<Result<_, _>>()?;
         Ok(Self {
             group: group.into(),
             speed_kind: first.speed.kind,
@@ -109,8 +112,16 @@ impl TrainingSet {
             masses: first.masses,
             equal_masses: cases.iter().all(|c| c.masses == first.masses),
             cases: training,
-            hash: hash.finalize().to_hex().to_string(),
         })
+    }
+
+    /// Hash over the fingerprints of the cases.
+    pub fn hash(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        for case in &self.cases {
+            hash.update(case.fingerprint.as_bytes());
+        }
+        hash.finalize().to_hex().to_string()
     }
 
     pub fn speeds_m_per_s(&self) -> Vec<f64> {
@@ -147,6 +158,7 @@ impl TrainingCase {
             sampled: loading_branch(&case.sampled).map_err(named)?.envelope,
             truncated: case.is_truncated(),
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            fingerprint: case.fingerprint.clone(),
         })
     }
 

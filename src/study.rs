@@ -17,7 +17,7 @@ use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
 use crate::unit::{MassText, SpeedKind, SpeedText, UnitSystem};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
-const EXTRACTION_VERSION: u32 = 1;
+const EXTRACTION_VERSION: u32 = 2;
 
 /// A study manifest as written (TOML).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -305,8 +305,10 @@ impl LocatedRun<'_> {
             masses,
             declared_speed_m_per_s: self.entry.speed.map(|s| s.0),
         };
-        let extracted = extract(&measured, &setup)
-            .map_err(|source| RunError::Extract { path: force_file.path.clone(), source })?;
+        let extracted = extract(&measured, &setup).map_err(|source| {
+            let file = if source.is_of_force() { force_file } else { motion_file };
+            RunError::Extract { path: file.path.clone(), source }
+        })?;
         let mut notes = extracted.notes;
         if let ForceSource::Contact { id, side: None, .. } = recipe.force
             && let Some(side) = force_history.entity.and_then(|e| e.side)
@@ -411,6 +413,7 @@ fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, 
     let select = |components: Vec<String>| Selection {
         ids: Some(ids.clone()),
         components: Some(components),
+        audit: false,
     };
     let both = select(vec![component.name().into(), component.velocity().into()]);
     match solver::read(&file.path, None, &both) {
@@ -427,7 +430,7 @@ fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadEr
         ForceSource::Body { node, .. } => WantedId { id: node, side: None },
     };
     let component = force_component(source).to_string();
-    let selection = Selection { ids: Some(vec![id]), components: Some(vec![component]) };
+    let selection = Selection { ids: Some(vec![id]), components: Some(vec![component]), audit: false };
     solver::read(&file.path, None, &selection)
 }
 

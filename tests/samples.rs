@@ -173,7 +173,7 @@ fn glstat_values_are_the_files() {
             let name = match label {
                 "total energy / initial energy" => "energy_ratio".to_string(),
                 "energy ratio w/o eroded energy" => "energy_ratio_wo_eroded".to_string(),
-                "time per zone cycle.(nanosec)" => "time_per_zone_cycle".to_string(),
+                "time per zone cycle.(nanosec)" => "nzc".to_string(),
                 _ => label.replace(' ', "_"),
             };
             push(&mut theirs, name, value.trim().parse().unwrap());

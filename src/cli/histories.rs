@@ -42,6 +42,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let selection = Selection {
         ids: some(args.ids.is_empty()).then(|| args.ids.clone()),
         components: some(args.components.is_empty()).then(|| args.components.clone()),
+        audit: false,
     };
     let target = args.output.as_deref().map(Target::of).transpose()?;
     let file = solver::read(&args.file, args.format.as_deref(), &selection)?;

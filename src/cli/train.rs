@@ -164,7 +164,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             let speeds: Vec<String> = set.speeds_m_per_s().iter().map(|&v| km_per_h(v)).collect();
             writeln!(out, "{} on {}", model.options.name(), speeds.join(", "))?;
             if let Some(oob) = out_of_bag {
-                writeln!(out, "out-of-bag: rmse {:.1} kN, r² {:.5}", oob.rmse / 1e3, oob.r2)?;
+                let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
+                writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;
             }
             if !model.validation.is_empty() {
                 let heading = ["left out", "force error", "energy", "max crush"];

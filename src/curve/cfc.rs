@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
+use super::resample::interpolate;
+
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CfcError {
@@ -10,14 +12,27 @@ pub enum CfcError {
     )]
     TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
     #[error(
-        "the filter needs equal intervals, but they differ by up to {spread_percent:.1} % of their mean: use filter = \"none\""
+        "the filter needs about equal intervals, but they differ by up to {spread_percent:.0} % of their mean: use filter = \"none\""
     )]
     Uneven { spread_percent: f64 },
 }
 
 /// Largest deviation of an interval from the mean that still counts as equal.
 /// Explicit solvers write at the first cycle past each multiple.
-const MAX_SPREAD: f64 = 0.05;
+const EQUAL: f64 = 0.02;
+/// Largest deviation at which the history is resampled to the mean interval: late cycles
+/// and times of six digits, but not a change of the output interval.
+const MAX_SPREAD: f64 = 0.6;
+
+/// A filtered history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filtered {
+    pub values: Vec<f64>,
+    /// Whether the intervals differed so much that it was filtered at their mean.
+    pub resampled: bool,
+    /// Largest deviation of an interval from the mean, as a share of it.
+    pub spread: f64,
+}
 
 /// Length of the mirrored pad at each end: the longer of these.
 const PAD_S: f64 = 0.010;
@@ -65,14 +80,15 @@ impl Coefficients {
 
 /// `values` at `time_s` (s, increasing, equal intervals), filtered without phase shift.
 ///
-/// Both ends are padded by point reflection `2 x_0 − x_j`, so that the ends keep their level.
+/// Intervals that differ (by up to 60 % of their mean) are resampled linearly to their mean
+/// and back. Both ends are padded by point reflection `2 x_0 − x_j`, so that the ends keep their level.
 ///
 /// # Errors
 /// [`CfcError`] if the interval is over `1/(10 CFC)` or the intervals differ.
-pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Vec<f64>, CfcError> {
+pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
     let n = values.len();
     if n < 2 {
-        return Ok(values.to_vec());
+        return Ok(Filtered { values: values.to_vec(), resampled: false, spread: 0.0 });
     }
     let interval_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
     let spread =
@@ -84,6 +100,26 @@ pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Vec<f64>, Cf
     if interval_s > longest_s * (1.0 + 1e-9) {
         return Err(CfcError::TooCoarse { class, interval_s, longest_s });
     }
+    let resampled = spread > EQUAL;
+    if !resampled {
+        let values = at_equal_intervals(class, interval_s, values);
+        return Ok(Filtered { values, resampled, spread });
+    }
+    let last_s = time_s[n - 1];
+    let even: Vec<f64> =
+        (0..n).map(|i| (time_s[0] + interval_s * i as f64).min(last_s)).collect();
+    // Both sets of times span the same range, so none lies outside.
+    let uneven = |_| CfcError::Uneven { spread_percent: spread * 100.0 };
+    let values = interpolate(time_s, values, &even).map_err(uneven)?;
+    let filtered = at_equal_intervals(class, interval_s, &values);
+    let back: Vec<f64> = time_s.iter().map(|t| t.min(even[n - 1])).collect();
+    let values = interpolate(&even, &filtered, &back).map_err(uneven)?;
+    Ok(Filtered { values, resampled, spread })
+}
+
+/// The filter proper, over the padded history.
+fn at_equal_intervals(class: u32, interval_s: f64, values: &[f64]) -> Vec<f64> {
+    let n = values.len();
     let pad = ((PAD_S / interval_s).round() as usize).max(PAD_SAMPLES).min(n - 1);
     let (first, last) = (values[0], values[n - 1]);
     let mut padded = Vec::with_capacity(n + 2 * pad);
@@ -95,7 +131,7 @@ pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Vec<f64>, Cf
     padded.reverse();
     coefficients.pass(&mut padded);
     padded.reverse();
-    Ok(padded[pad..pad + n].to_vec())
+    padded[pad..pad + n].to_vec()
 }
 
 #[cfg(test)]
@@ -113,7 +149,7 @@ mod tests {
     fn gain_at(frequency_hz: f64) -> f64 {
         let time_s: Vec<f64> = (0..20_000).map(|i| f64::from(i) * 1e-4).collect();
         let wave: Vec<f64> = time_s.iter().map(|t| (2.0 * PI * frequency_hz * t).sin()).collect();
-        let filtered = filter(60, &time_s, &wave).unwrap();
+        let filtered = filter(60, &time_s, &wave).unwrap().values;
         filtered[5_000..15_000].iter().fold(0.0, |m: f64, v| m.max(v.abs()))
     }
 
@@ -129,7 +165,7 @@ mod tests {
     fn keeps_a_straight_line() {
         let time_s: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.75e-3).collect();
         let line: Vec<f64> = time_s.iter().map(|t| 3.0 - 20.0 * t).collect();
-        for (a, b) in filter(60, &time_s, &line).unwrap().iter().zip(&line) {
+        for (a, b) in filter(60, &time_s, &line).unwrap().values.iter().zip(&line) {
             assert!((a - b).abs() < 1e-6, "{a} against {b}");
         }
     }
@@ -138,7 +174,20 @@ mod tests {
     fn refuses_what_the_standard_does_not_allow() {
         let time_s: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.75e-3).collect();
         assert!(matches!(filter(180, &time_s, &time_s), Err(CfcError::TooCoarse { .. })));
-        let uneven: Vec<f64> = time_s.iter().map(|t| t * t).collect();
+        let uneven: Vec<f64> = time_s.iter().map(|t| t * t / 10.0).collect();
         assert!(matches!(filter(60, &uneven, &uneven), Err(CfcError::Uneven { .. })));
+    }
+
+    /// States at the first cycle past each multiple of 10 µs, up to 1 µs late.
+    #[test]
+    fn late_cycles_are_filtered_at_the_mean_interval() {
+        let late = |i: u32| 1e-6 * f64::from(i * 7 % 10) / 10.0;
+        let time_s: Vec<f64> = (0..4_000).map(|i| f64::from(i) * 1e-5 + late(i)).collect();
+        let wave: Vec<f64> = time_s.iter().map(|t| (2.0 * PI * 10.0 * t).sin()).collect();
+        let filtered = filter(60, &time_s, &wave).unwrap();
+        assert!(filtered.resampled && filtered.spread > 0.05);
+        for (a, b) in filtered.values.iter().zip(&wave).skip(1_200).take(1_600) {
+            assert!((a - b).abs() < 2e-3, "{a} against {b}");
+        }
     }
 }

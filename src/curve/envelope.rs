@@ -53,13 +53,33 @@ impl Envelope {
             let (before_m, deflection_m) = (deflection_m[i], deflection_m[i + 1]);
             return Err(EnvelopeError::Order { point: i + 2, deflection_m, before_m });
         }
+        let mut envelope = Self { deflection_m, force_n, work_j: Vec::new() };
+        envelope.integrate();
+        Ok(envelope)
+    }
+
+    fn integrate(&mut self) {
+        let (d, f) = (&self.deflection_m, &self.force_n);
         let mut work = 0.0;
-        let mut work_j = vec![0.0];
-        for i in 1..deflections {
-            work += 0.5 * (force_n[i - 1] + force_n[i]) * (deflection_m[i] - deflection_m[i - 1]);
-            work_j.push(work);
+        self.work_j = vec![0.0];
+        for i in 1..d.len() {
+            work += 0.5 * (f[i - 1] + f[i]) * (d[i] - d[i - 1]);
+            self.work_j.push(work);
         }
-        Ok(Self { deflection_m, force_n, work_j })
+    }
+
+    /// The first point whose force is below zero, counted from 1.
+    pub fn first_pulling_point(&self) -> Option<usize> {
+        self.force_n.iter().position(|&f| f < 0.0).map(|i| i + 1)
+    }
+
+    /// The envelope with forces below zero raised to zero.
+    pub fn pushing(mut self) -> Self {
+        if self.first_pulling_point().is_some() {
+            self.force_n.iter_mut().for_each(|f| *f = f.max(0.0));
+            self.integrate();
+        }
+        self
     }
 
     pub fn deflection_m(&self) -> &[f64] {

@@ -56,11 +56,11 @@ pub struct Extracted {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExtractError {
     #[error("{what} holds {states} states: at least 2 are needed")]
-    TooShort { what: &'static str, states: usize },
+    TooShort { origin: Origin, what: &'static str, states: usize },
     #[error(
         "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
     )]
-    NotFinite { what: String, state: usize, value: f64 },
+    NotFinite { origin: Origin, what: String, state: usize, value: f64 },
     #[error(
         "the force never exceeds {threshold_n:.0} N (its largest is {largest_n:.0} N): there is no contact in this record"
     )]
@@ -91,8 +91,8 @@ const SAME_SPEED: f64 = 0.01;
 
 /// Extracts the curve of one run.
 ///
-/// Order of work: SI, common times, filter (force only, at its original rate), signs
-/// (compression positive), contact, loading end, resampling, energy audit.
+/// Order of work: SI, common times, signs (compression positive), contact, filter (force
+/// only, at its original rate), loading end, resampling, energy audit.
 ///
 /// # Errors
 /// [`ExtractError`] says which history cannot be used and what to change.
@@ -109,10 +109,24 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
     }
     let force_n: Vec<f64> = record.force_n.iter().map(|f| sign * f).collect();
     let threshold_n = CONTACT_FORCE_N.max(CONTACT_SHARE * largest_n);
+    // Before the filter, which without phase shift begins ahead of the contact.
     let contact = force_n
         .iter()
         .position(|&f| f > threshold_n)
         .ok_or(ExtractError::NoContact { threshold_n, largest_n })?;
+    let force_n = match setup.recipe.filter {
+        Filter::None => force_n,
+        Filter::Cfc(class) => {
+            let filtered = cfc::filter(class, &record.time_s, &force_n)?;
+            if filtered.resampled {
+                notes.push(format!(
+                    "filter: intervals differ by up to {:.1} %, so the force was filtered at their mean",
+                    filtered.spread * 100.0
+                ));
+            }
+            filtered.values
+        }
+    };
 
     let at_contact_m = record.deflection_m[contact];
     let travel: Vec<f64> =
@@ -173,17 +187,38 @@ struct Signal {
     values: Vec<f64>,
 }
 
+impl ExtractError {
+    /// Whether it speaks of the force's file rather than of the motion's.
+    pub fn is_of_force(&self) -> bool {
+        match self {
+            Self::TooShort { origin, .. } | Self::NotFinite { origin, .. } => {
+                *origin == Origin::Force
+            }
+            Self::NoContact { .. } | Self::Filter(_) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Which history an error speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    Motion,
+    Force,
+}
+
 impl Signal {
     fn of(
         history: &History,
         units: UnitSystem,
         factor: f64,
         what: &'static str,
+        origin: Origin,
         notes: &mut Vec<String>,
     ) -> Result<Self, ExtractError> {
         if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
             let what = history.label();
-            return Err(ExtractError::NotFinite { what, state: i + 1, value: history.values[i] });
+            return Err(ExtractError::NotFinite { origin, what, state: i + 1, value: history.values[i] });
         }
         let (mut time_s, mut values) = (Vec::new(), Vec::new());
         for (&t, &v) in history.time.iter().zip(&history.values) {
@@ -198,7 +233,7 @@ impl Signal {
             notes.push(format!("{what}: {skipped} states left out because time did not increase"));
         }
         if time_s.len() < 2 {
-            return Err(ExtractError::TooShort { what, states: time_s.len() });
+            return Err(ExtractError::TooShort { origin, what, states: time_s.len() });
         }
         Ok(Self { time_s, values })
     }
@@ -220,9 +255,9 @@ impl Motion {
         let units = measured.units;
         let twice = if setup.half_model { 2.0 } else { 1.0 };
         let relative = |node: &History, minus: Option<&History>, factor, what, notes: &mut _| {
-            let mut signal = Signal::of(node, units, factor, what, notes)?;
+            let mut signal = Signal::of(node, units, factor, what, Origin::Motion, notes)?;
             if let Some(minus) = minus {
-                let minus = Signal::of(minus, units, factor, what, notes)?;
+                let minus = Signal::of(minus, units, factor, what, Origin::Motion, notes)?;
                 for (value, minus) in signal.values.iter_mut().zip(&minus.values) {
                     *value -= minus;
                 }
@@ -250,7 +285,7 @@ impl Motion {
     }
 }
 
-/// The force in N, in the direction of the file, filtered at its own rate.
+/// The force in N, in the direction of the file, at its own rate.
 fn force(
     measured: &Measured<'_>,
     setup: &Setup<'_>,
@@ -258,23 +293,19 @@ fn force(
 ) -> Result<Signal, ExtractError> {
     let units = measured.units;
     let mass = setup.masses.body_kg;
-    let mut signal = match measured.force {
+    Ok(match measured.force {
         MeasuredForce::Contact(history) => {
-            Signal::of(history, units, units.force(), "force", notes)?
+            Signal::of(history, units, units.force(), "force", Origin::Force, notes)?
         }
         MeasuredForce::Body(history, BodyMotion::Acceleration) => {
-            Signal::of(history, units, mass * units.acceleration(), "acceleration", notes)?
+            Signal::of(history, units, mass * units.acceleration(), "acceleration", Origin::Force, notes)?
         }
         MeasuredForce::Body(history, BodyMotion::Velocity) => {
-            let velocity = Signal::of(history, units, mass * units.speed(), "velocity", notes)?;
+            let velocity = Signal::of(history, units, mass * units.speed(), "velocity", Origin::Force, notes)?;
             notes.push("body force: mass times the central difference of the velocity".into());
             Signal { values: derivative(&velocity.time_s, &velocity.values), ..velocity }
         }
-    };
-    if let Filter::Cfc(class) = setup.recipe.filter {
-        signal.values = cfc::filter(class, &signal.time_s, &signal.values)?;
-    }
-    Ok(signal)
+    })
 }
 
 /// Motion and force at the same times.

@@ -58,6 +58,8 @@ pub enum CsvError {
     Number { path: PathBuf, line: u64, field: usize, found: String },
     #[error("{path}: {source}")]
     Envelope { path: PathBuf, source: EnvelopeError },
+    #[error("{path}: the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0")]
+    Pulling { path: PathBuf, point: usize },
 }
 
 /// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`), its
@@ -97,6 +99,10 @@ pub fn read(path: &Path) -> Result<Envelope, CsvError> {
         deflection_m.push(number(0)? * length);
         force_n.push(number(1)? * force);
     }
-    Envelope::new(deflection_m, force_n)
-        .map_err(|source| CsvError::Envelope { path: path.into(), source })
+    let envelope = Envelope::new(deflection_m, force_n)
+        .map_err(|source| CsvError::Envelope { path: path.into(), source })?;
+    match envelope.first_pulling_point() {
+        Some(point) => Err(CsvError::Pulling { path: path.into(), point }),
+        None => Ok(envelope),
+    }
 }

@@ -8,6 +8,8 @@ pub struct Sums {
     pub weight: f64,
     pub target: f64,
     pub target_squared: f64,
+    /// Whether all targets so far are equal, and to what.
+    equal: Option<Option<f64>>,
 }
 
 impl Sums {
@@ -15,6 +17,21 @@ impl Sums {
         self.weight += weight;
         self.target += weight * target;
         self.target_squared += weight * target * target;
+        self.equal = match self.equal {
+            None => Some(Some(target)),
+            Some(Some(before)) if before == target => Some(Some(target)),
+            Some(_) => Some(None),
+        };
+    }
+
+    /// Whether all targets are equal. The variance would say so only up to rounding.
+    pub fn is_pure(&self) -> bool {
+        !matches!(self.equal, Some(None))
+    }
+
+    /// Difference of gains that is rounding and not gain.
+    pub fn rounding(&self) -> f64 {
+        1e-13 * self.target_squared
     }
 
     pub fn mean(&self) -> f64 {

@@ -26,8 +26,8 @@ pub struct RegressionForest<F> {
 pub struct OutOfBag {
     /// Root of the mean squared error, in the unit of the target.
     pub rmse: f64,
-    /// Coefficient of determination.
-    pub r2: f64,
+    /// Coefficient of determination; `None` if all targets are equal.
+    pub r2: Option<f64>,
     /// Samples that at least one tree did not see.
     pub samples: usize,
 }
@@ -200,7 +200,7 @@ fn out_of_bag<F: Float>(
         samples += 1;
     }
     let count = f64::from(samples.max(1));
-    let r2 = if spread > 0.0 { 1.0 - error / spread } else { f64::NAN };
+    let r2 = (spread > 0.0).then(|| 1.0 - error / spread);
     OutOfBag { rmse: (error / count).sqrt(), r2, samples: samples as usize }
 }
 

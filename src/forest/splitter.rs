@@ -47,10 +47,12 @@ pub struct Rules {
 impl<F: Float> Split<F> {
     /// Higher gain first. Of ties, the lowest feature wins or, if they are random, the
     /// one that came first in a random order; within a feature the lowest threshold.
-    fn beats(&self, other: &Option<Self>, ties: Ties) -> bool {
+    /// Gains that differ by less than `rounding` tie.
+    fn beats(&self, other: &Option<Self>, ties: Ties, rounding: f64) -> bool {
         let Some(best) = other else { return true };
         let lower = ties == Ties::LowestFeature && self.feature < best.feature;
-        self.gain > best.gain || (self.gain == best.gain && lower)
+        let difference = self.gain - best.gain;
+        difference > rounding || (difference >= -rounding && lower)
     }
 }
 
@@ -80,7 +82,7 @@ pub fn best<F: Float>(
             }
         };
         if let Some(split) = found
-            && split.beats(best, rules.ties)
+            && split.beats(best, rules.ties, node.rounding())
         {
             *best = Some(split);
         }
@@ -103,7 +105,7 @@ pub fn best<F: Float>(
         }
     }
     let unsplit = node.target * node.target / node.weight;
-    best.filter(|split| split.gain > unsplit)
+    best.filter(|split| split.gain > unsplit + node.rounding())
 }
 
 /// The best of all midpoints between consecutive distinct values.
@@ -119,6 +121,7 @@ fn midpoints<F: Float>(
     let (mut left_weight, mut left_target) = (0.0, 0.0);
     let mut best: Option<(f64, F, F)> = None;
     let mut best_gain = f64::NEG_INFINITY;
+    let rounding = node.rounding();
     let mut value = column[order[0] as usize];
     for pair in order.windows(2) {
         let sample = pair[0] as usize;
@@ -136,7 +139,7 @@ fn midpoints<F: Float>(
             continue;
         }
         let gain = proxy(left_target, left_weight, node.target - left_target, right_weight);
-        if gain > best_gain {
+        if gain > best_gain + rounding {
             best_gain = gain;
             best = Some((gain, low, high));
         }

@@ -78,7 +78,7 @@ impl<F: Float> Tree<F> {
         let mut open = vec![Open { start: 0, end: count, depth: 0, node, sums: root }];
         while let Some(Open { start, end, depth, node, sums }) = open.pop() {
             let done = end - start < 2
-                || sums.variance() == 0.0
+                || sums.is_pure()
                 || params.max_depth == Some(depth)
                 || sums.weight < 2.0 * rules.min_samples_leaf
                 || stops(params.stop, &sums, table.offset);

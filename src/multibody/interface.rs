@@ -16,7 +16,7 @@ pub enum Unloading {
 pub enum EnvelopeEnd {
     /// The last force is held.
     Hold,
-    /// The last segment is continued.
+    /// The last segment is continued if it rises, else the last force is held.
     Slope,
     /// The run ends with an error that names the interface.
     Error,
@@ -35,8 +35,10 @@ pub struct ForceLaw {
 }
 
 impl ForceLaw {
-    /// A softer unloading than the envelope's steepest rise is raised to it.
+    /// A softer unloading than the envelope's steepest rise is raised to it; forces below
+    /// zero become zero, because an interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
+        let envelope = envelope.pushing();
         let n = envelope.deflection_m().len();
         let (d, f) = (envelope.deflection_m(), envelope.force_n());
         let end_slope_n_per_m = match end {
@@ -109,6 +111,9 @@ impl ForceLaw {
 
     /// Stored and dissipated energy in J at a deflection, given the largest so far.
     pub fn energies_j(&self, deflection_m: f64, largest_m: f64) -> (f64, f64) {
+        if largest_m <= 0.0 {
+            return (0.0, 0.0); // never in contact
+        }
         match self.unloading {
             Unloading::Elastic => (self.envelope_work_j(deflection_m.max(0.0)), 0.0),
             Unloading::Memory { stiffness_n_per_m } => {

@@ -79,6 +79,9 @@ impl std::str::FromStr for WantedId {
 pub struct Selection {
     pub ids: Option<Vec<WantedId>>,
     pub components: Option<Vec<String>>,
+    /// Whether fields that are not kept are read as well, so that the problems of the
+    /// whole file are found.
+    pub audit: bool,
 }
 
 impl Selection {
@@ -87,9 +90,9 @@ impl Selection {
         Self::default()
     }
 
-    /// No history: only what the file says of itself.
+    /// No history: only what the file says of itself, and all its problems.
     pub fn nothing() -> Self {
-        Self { ids: Some(Vec::new()), components: Some(Vec::new()) }
+        Self { ids: Some(Vec::new()), components: Some(Vec::new()), audit: true }
     }
 
     fn wants(&self, entity: EntityId) -> bool {
@@ -259,16 +262,17 @@ fn detect(path: &Path) -> Result<&'static Format, ReadError> {
         return Err(unknown("this is an LSDA container such as binout, which is not read yet"));
     }
     let mut lines = lsdyna::line::Lines::new(BufReader::new(io::Cursor::new(head).chain(file)));
-    let mut legend = lsdyna::header::LegendFence::default();
     let mut is_lsdyna = false;
     while let Some(line) = lines.next_line().map_err(io)? {
         if line.number > DETECT_LINES {
             return Err(unknown("no solver output is recognised in it"));
         }
         is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
-        if line.number <= 2 || legend.covers(line.text) {
+        if line.number <= 2 {
             continue;
         }
+        // Titles in a legend are free text, but none begins like a line of a body, whose
+        // signature also ends a legend that lost its closing line.
         if let Some(format) = FORMATS.iter().find(|f| (f.signature)(line.text)) {
             return Ok(format);
         }

@@ -21,12 +21,17 @@ pub struct Collected {
     pub problems: Vec<Problem>,
 }
 
+/// Labels kept of a file of labels; real ones have about thirty.
+const MAX_LABELS: usize = 500;
+
 /// Rows of the same components.
 struct Table {
     name: &'static str,
     components: Vec<Arc<str>>,
     /// Indices into `components` that are selected.
     wanted_columns: Vec<usize>,
+    /// Whether any row of a kept state had the column.
+    seen_columns: Vec<bool>,
     rows: Vec<EntityId>,
     row_of: HashMap<EntityId, usize>,
     /// Per row: its first channel in `channels`, or `None` if the entity is not selected.
@@ -42,6 +47,9 @@ struct Table {
 struct Channel {
     values: Vec<f64>,
     pending: f64,
+    /// Kept states in which its row had this column.
+    seen: usize,
+    pending_seen: bool,
 }
 
 /// Global quantities, which appear by label rather than by row.
@@ -98,6 +106,7 @@ impl<'a> States<'a> {
             .collect();
         self.tables.push(Table {
             name,
+            seen_columns: vec![false; components.len()],
             components,
             wanted_columns,
             rows: Vec::new(),
@@ -166,13 +175,13 @@ impl<'a> States<'a> {
     }
 
     /// Stores the selected fields of one row. `field(k)` gives the first and last
-    /// column (from 1) of the table's k-th component.
+    /// column (from 1) of the table's k-th component, `None` if this row does not have it.
     pub fn row(
         &mut self,
         table: TableId,
         entity: EntityId,
         line: &Line<'_>,
-        field: impl Fn(usize) -> (usize, usize),
+        field: impl Fn(usize) -> Option<(usize, usize)>,
     ) {
         let table = &mut self.tables[table.0];
         let row = match table.find(entity) {
@@ -195,12 +204,22 @@ impl<'a> States<'a> {
         }
         table.filled_rows += 1;
         table.next_row = row + 1;
+        for column in 0..table.components.len() {
+            table.seen_columns[column] |= field(column).is_some();
+        }
+        if self.selection.audit {
+            for (from, to) in (0..table.components.len()).filter_map(&field) {
+                read_field(line.columns(from, to), line, [from, to], &mut self.problems);
+            }
+        }
         let Some(first) = table.channel_of[row] else { return };
         for (i, &column) in table.wanted_columns.iter().enumerate() {
-            let (from, to) = field(column);
-            let bytes = line.columns(from, to);
-            let value = read_field(bytes, line, [from, to], &mut self.problems);
-            table.channels[first + i].pending = value;
+            let channel = &mut table.channels[first + i];
+            let place = field(column);
+            channel.pending_seen = place.is_some();
+            channel.pending = place.map_or(f64::NAN, |(from, to)| {
+                read_field(line.columns(from, to), line, [from, to], &mut self.problems)
+            });
         }
     }
 
@@ -214,6 +233,15 @@ impl<'a> States<'a> {
             Some(s) if &*s.component == component => Some(guess),
             _ => self.scalars.iter().position(|s| &*s.component == component),
         };
+        if found.is_none() && self.scalars.len() == MAX_LABELS {
+            self.problems.add(
+                ProblemCode::UnreadRows,
+                Some(line.into()),
+                None,
+                format!("{component} is left out: the file has more than {MAX_LABELS} labels"),
+            );
+            return;
+        }
         let index = found.unwrap_or_else(|| {
             let kept = self.selection.wants_component(component);
             self.scalars.push(Scalar {
@@ -316,6 +344,7 @@ impl<'a> States<'a> {
         self.time.push(time);
         for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
             channel.values.push(channel.pending);
+            channel.seen += usize::from(channel.pending_seen);
         }
         for scalar in &mut self.scalars {
             scalar.absent += usize::from(scalar.pending.is_none());
@@ -337,7 +366,7 @@ impl<'a> States<'a> {
             problems: Vec::new(),
         };
         if self.sealed {
-            collect_tables(self.tables, &mut collected);
+            collect_tables(self.tables, &mut collected, &mut self.problems);
             for scalar in self.scalars {
                 if scalar.absent > 0 {
                     self.problems.add(
@@ -369,7 +398,9 @@ impl<'a> States<'a> {
 }
 
 /// Histories entity by entity, each with the components of all tables in order.
-fn collect_tables(tables: Vec<Table>, collected: &mut Collected) {
+/// Columns that an entity's rows never have make no history of it.
+fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut Problems) {
+    let states = collected.time.len();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
     for table in tables {
         if table.rows.is_empty() {
@@ -385,6 +416,21 @@ fn collect_tables(tables: Vec<Table>, collected: &mut Collected) {
                 continue;
             }
             for (&column, channel) in table.wanted_columns.iter().zip(channels.by_ref()) {
+                if channel.seen == 0 {
+                    continue;
+                }
+                if channel.seen < states {
+                    problems.add(
+                        ProblemCode::AbsentComponent,
+                        None,
+                        None,
+                        format!(
+                            "{} of {entity} is missing from {} of {states} states; its values there are NaN",
+                            table.components[column],
+                            states - channel.seen
+                        ),
+                    );
+                }
                 histories.push(History {
                     entity: Some(entity),
                     component: table.components[column].clone(),
@@ -393,7 +439,8 @@ fn collect_tables(tables: Vec<Table>, collected: &mut Collected) {
                 });
             }
         }
-        collected.components.extend(table.components);
+        let seen = table.components.into_iter().zip(table.seen_columns);
+        collected.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
     }
     for entity in &collected.entities {
         collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
@@ -419,7 +466,12 @@ impl Table {
             self.channels.extend(
                 self.wanted_columns
                     .iter()
-                    .map(|_| Channel { values: Vec::new(), pending: f64::NAN }),
+                    .map(|_| Channel {
+                        values: Vec::new(),
+                        pending: f64::NAN,
+                        seen: 0,
+                        pending_seen: false,
+                    }),
             );
         }
         row

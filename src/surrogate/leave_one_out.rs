@@ -43,13 +43,16 @@ fn left_out(set: &TrainingSet, options: Options, i: usize) -> Result<Option<Left
         Query { speed_m_per_s: case.speed_m_per_s, mass_kg: None, rule: MaxCrushRule::Monotone };
     // Without a maximal crush (all runs truncated) there is nothing to report.
     let Ok(curve) = predict(&model, &query) else { return Ok(None) };
-    Ok(Some(LeftOut {
+    let left_out = LeftOut {
         case: case.name.clone(),
         speed_m_per_s: case.speed_m_per_s,
         force_l1: l1_ratio(&reference, &predicted),
         energy_error: curve.energy_j / case.envelope.work() - 1.0,
         max_crush_error: curve.max_deflection_m / end - 1.0,
-    }))
+    };
+    // A reference without force has no relative errors; JSON could not hold them either.
+    let errors = [left_out.force_l1, left_out.energy_error, left_out.max_crush_error];
+    Ok(errors.iter().all(|e| e.is_finite()).then_some(left_out))
 }
 
 /// The set without its `i`-th case.

@@ -148,7 +148,7 @@ impl Model {
             force_kind: set.force_kind,
             mass_kg: set.masses.body_kg,
             other_mass_kg: set.masses.other_kg,
-            training_hash: set.hash.clone(),
+            training_hash: set.hash(),
             cases: set.cases.iter().map(case).collect(),
             options,
             validation: Vec::new(),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Surrogate, Warning};
 use crate::curve::Envelope;
-use crate::dataset::TrainingSet;
+use crate::dataset::{TrainingSet, nearest};
 
 /// The measured curves, one of which answers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use super::Model;
 use super::max_crush::{self, MaxCrushRule};
 use super::warning::Warning;
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses};
-use crate::dataset::GRID_M;
+use crate::dataset::{GRID_M, nearest};
 use crate::unit::{Speed, SpeedKind};
 
 /// Points of a predicted curve beside (0, 0), as in the reference data.
@@ -129,11 +129,7 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
         warnings.push(Warning::energy_mismatch(energy_over_kinetic));
     }
     let (low, high) = model.range_m_per_s();
-    let nearest = model
-        .cases
-        .iter()
-        .map(|c| c.speed_m_per_s)
-        .fold(low, |best, s| if (s - v).abs() < (best - v).abs() { s } else { best });
+    let nearest = model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
     Ok(PredictedCurve {
         // A softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),
@@ -239,6 +235,25 @@ impl PredictedCurve {
                 "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
             )));
         }
-        Ok(Envelope::new(self.deflection_m.clone(), self.force_n.clone())?)
+        for (name, band) in
+            [("force_low_N", &self.force_low_n), ("force_high_N", &self.force_high_n)]
+        {
+            if let Some(band) = band
+                && band.len() != self.force_n.len()
+            {
+                return Err(PredictError::Damaged(format!(
+                    "{name} has {} values, force_N {}",
+                    band.len(),
+                    self.force_n.len()
+                )));
+            }
+        }
+        let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
+        match envelope.first_pulling_point() {
+            Some(point) => Err(PredictError::Damaged(format!(
+                "force_N of point {point} is below 0: an interface only pushes"
+            ))),
+            None => Ok(envelope),
+        }
     }
 }

@@ -11,6 +11,9 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
 pub trait Body {
+    /// Whether a line can only stand below the header.
+    fn is_signature(&self, line: &[u8]) -> bool;
+
     /// One line below the header, outside a legend.
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>);
 
@@ -64,6 +67,15 @@ pub fn read(
                 "the line is longer than any line of this file can be; its end is left out".into(),
             );
         }
+        if fence.is_open() && body.is_signature(line.text) {
+            fence.close();
+            states.problems.add(
+                ProblemCode::BadLine,
+                Some((&line).into()),
+                None,
+                "expected {END LEGEND} before the first state".into(),
+            );
+        }
         if fence.covers(line.text) {
             legend.extend(header::legend_entry(line.text));
         } else {
@@ -76,6 +88,14 @@ pub fn read(
             None,
             None,
             "the file ends before its header (title and version line) is complete".into(),
+        );
+    }
+    if fence.is_open() {
+        states.problems.add(
+            ProblemCode::BadLine,
+            None,
+            None,
+            "the file ends within its legend: expected {END LEGEND}".into(),
         );
     }
     let end = Place { line: lines.number(), byte: lines.byte() };

@@ -17,7 +17,7 @@ const VALUE: (usize, usize) = (33, 46);
 const NAMES: [(&str, &str); 3] = [
     ("total energy / initial energy", "energy_ratio"),
     ("energy ratio w/o eroded energy", "energy_ratio_wo_eroded"),
-    ("time per zone cycle.(nanosec)", "time_per_zone_cycle"),
+    ("time per zone cycle.(nanosec)", "nzc"),
 ];
 
 pub fn signature(line: &[u8]) -> bool {
@@ -31,6 +31,10 @@ pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<Solver
 struct Glstat;
 
 impl Body for Glstat {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
@@ -85,9 +89,11 @@ fn component(text: &[u8]) -> Option<String> {
     let label = label.trim_end_matches('.').trim();
     let known = NAMES.iter().find(|(l, _)| *l == label);
     known.map(|(_, name)| name.to_string()).or_else(|| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == ' ';
-        (!label.is_empty() && label.chars().all(plain))
-            .then(|| label.split_whitespace().collect::<Vec<_>>().join("_"))
+        // The tables of mass properties ("row1= …") can have a point in that column.
+        let is_label = label.starts_with(|c: char| c.is_ascii_alphabetic())
+            && !label.contains('=');
+        let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+        is_label.then(|| words.collect::<Vec<_>>().join("_"))
     })
 }
 
@@ -114,7 +120,7 @@ mod tests {
         t(" hourglass energy ..............   0.00000E+00", Some("hourglass_energy"));
         t(" total energy / initial energy..   1.00000E+00", Some("energy_ratio"));
         t(" energy ratio w/o eroded energy.   1.00000E+00", Some("energy_ratio_wo_eroded"));
-        t(" time per zone cycle.(nanosec)..             0", Some("time_per_zone_cycle"));
+        t(" time per zone cycle.(nanosec)..             0", Some("nzc"));
         t(" number of shell elements that  ", None);
         t("     total mass of body          = 1.24485715E-07", None);
         t(" ************************************************************", None);

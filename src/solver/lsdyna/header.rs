@@ -27,6 +27,16 @@ pub struct LegendFence {
 }
 
 impl LegendFence {
+    /// Whether a legend was opened and not closed.
+    pub fn is_open(&self) -> bool {
+        self.inside
+    }
+
+    /// Ends the legend without its closing line.
+    pub fn close(&mut self) {
+        self.inside = false;
+    }
+
     /// Whether this line belongs to a legend (its two fence lines included).
     pub fn covers(&mut self, line: &[u8]) -> bool {
         let text = line.trim_ascii();

@@ -72,6 +72,10 @@ struct Block {
 }
 
 impl Body for Nodout {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         if line.is_blank() {
             // The blank line between state line and column line ends nothing.
@@ -172,33 +176,36 @@ impl Nodout {
     }
 }
 
-/// One node. Field ends are taken from the right, because ids of more than nine digits
-/// push l2a's rows to the right.
+/// One node. Ids of more than nine digits push l2a's rows to the right, so the first
+/// field begins where the id ends; a row of any other width is damaged or cut.
 fn row(block: Block, line: &Line<'_>, states: &mut States<'_>) {
-    let width = line.text.trim_ascii_end().len();
-    let values = block.fields * FIELD_WIDTH;
-    if width < ID_WIDTH + values {
+    let text = line.text.trim_ascii_end();
+    let id_end = id_end(text);
+    let first = id_end.max(ID_WIDTH - 1) + 1;
+    let width = first + block.fields * FIELD_WIDTH;
+    let id = integer(&text[..id_end]);
+    let (Some(id), true) = (id, text.len() == width) else {
         states.damage(
             line,
-            Some([1, ID_WIDTH + values]),
+            Some([1, width]),
             format!(
-                "expected a node id and {} numbers of {FIELD_WIDTH} columns, found {width} columns",
-                block.fields
+                "expected a node id and {} numbers in {width} columns, found {} columns, \"{}\"",
+                block.fields,
+                text.len(),
+                shown(line.columns(1, 40)).trim_end()
             ),
-        );
-        return;
-    }
-    let first = width - values;
-    let Some(id) = integer(&line.text[..first]) else {
-        states.damage(
-            line,
-            Some([1, first]),
-            format!("expected a node id, found \"{}\"", shown(&line.text[..first])),
         );
         return;
     };
     states.row(block.table, EntityId::new(id), line, |k| {
         let from = first + k * FIELD_WIDTH;
-        (from + 1, from + FIELD_WIDTH)
+        Some((from + 1, from + FIELD_WIDTH))
     });
+}
+
+/// Where the leading blanks and digits of a row end.
+fn id_end(text: &[u8]) -> usize {
+    let digits = text.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(text.len());
+    let after = text[digits..].iter().position(|b| !b.is_ascii_digit());
+    after.map_or(text.len(), |n| digits + n)
 }

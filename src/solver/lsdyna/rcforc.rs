@@ -58,12 +58,17 @@ pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<Solver
 
 #[derive(Default)]
 struct Rcforc {
-    /// The columns that the first row has.
-    table: Option<(TableId, Vec<&'static Column>)>,
+    table: Option<TableId>,
+    /// Whether a row had moments: then a row without them is cut.
+    moments: bool,
     undefined: Vec<i64>,
 }
 
 impl Body for Rcforc {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         if line.is_blank() {
             return;
@@ -116,9 +121,9 @@ impl Rcforc {
             states.damage(line, Some([9, 36]), "expected an interface id and a time".into());
             return;
         };
-        let (table, columns) = self.table.get_or_insert_with(|| new_table(text, at, states));
-        let table = *table;
-        if let Some(bad) = columns.iter().find(|c| !c.fits(text, at)) {
+        let missing = COLUMNS.iter().find(|c| c.always && !c.fits(text, at));
+        let moments = COLUMNS.iter().filter(|c| c.is_moment()).all(|c| c.fits(text, at));
+        if let Some(bad) = missing {
             let label = shown(bad.label);
             states.damage(
                 line,
@@ -127,6 +132,21 @@ impl Rcforc {
             );
             return;
         }
+        // Text behind the last whole column, or a cut file's row that is shorter than others.
+        let end = COLUMNS.iter().filter(|c| c.fits(text, at)).map(|c| at + c.offset + c.width).max();
+        let rest = text.get(end.unwrap_or(0)..).unwrap_or_default();
+        if !rest.trim_ascii().is_empty() || (!moments && (self.moments || !line.ended)) {
+            states.damage(
+                line,
+                Some([end.unwrap_or(0) + 1, text.len().max(end.unwrap_or(0) + 1)]),
+                "expected the row's further columns, or its end".into(),
+            );
+            return;
+        }
+        self.moments |= moments;
+        let table = *self.table.get_or_insert_with(|| {
+            states.table("sides", &COLUMNS.each_ref().map(|c| c.component))
+        });
         let entity = EntityId { id, side: Some(side) };
         // Times have six digits, so two states can print the same one: a repeated side
         // begins a state as well.
@@ -135,19 +155,18 @@ impl Rcforc {
             states.begin(Some(time), line.into());
         }
         states.row(table, entity, line, |k| {
-            let from = at + columns[k].offset;
-            (from + 1, from + columns[k].width)
+            let column = &COLUMNS[k];
+            let from = at + column.offset;
+            column.fits(text, at).then_some((from + 1, from + column.width))
         });
     }
 }
 
-fn new_table(text: &[u8], at: usize, states: &mut States<'_>) -> (TableId, Vec<&'static Column>) {
-    let columns: Vec<&Column> = COLUMNS.iter().filter(|c| c.always || c.fits(text, at)).collect();
-    let names: Vec<&str> = columns.iter().map(|c| c.component).collect();
-    (states.table("sides", &names), columns)
-}
-
 impl Column {
+    fn is_moment(&self) -> bool {
+        self.component.ends_with("moment")
+    }
+
     /// Whether the label stands in its place and the number behind it is all there.
     fn fits(&self, text: &[u8], at: usize) -> bool {
         let number = at + self.offset;

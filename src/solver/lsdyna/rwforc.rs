@@ -14,7 +14,6 @@ const COMPONENTS: [&str; 4] = ["normal_force", "x_force", "y_force", "z_force"];
 const TIME: (usize, usize) = (1, 12);
 const WALL: (usize, usize) = (13, 20);
 const VALUE_WIDTH: usize = 15;
-const ROW_WIDTH: usize = WALL.1 + COMPONENTS.len() * VALUE_WIDTH;
 
 pub fn signature(line: &[u8]) -> bool {
     is_column_line(line) || is_node_set_heading(line)
@@ -34,6 +33,10 @@ struct Rwforc {
 }
 
 impl Body for Rwforc {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         let text = line.text;
         if line.is_blank() {
@@ -72,18 +75,23 @@ impl Body for Rwforc {
 
 impl Rwforc {
     fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        let text = line.text.trim_ascii_end();
+        // A wide wall id pushes the forces to the right.
+        let forces = text.len().saturating_sub(COMPONENTS.len() * VALUE_WIDTH).max(WALL.1);
+        let wall_field = text.get(TIME.1..forces).unwrap_or_default();
+        let wall_width = wall_field.trim_ascii().len().max(WALL.1 - TIME.1);
+        let width = TIME.1 + wall_width + COMPONENTS.len() * VALUE_WIDTH;
         let time = match real(line.columns(TIME.0, TIME.1)) {
             Field::Real(time) => Some(time),
             _ => None,
         };
-        let wall = integer(line.columns(WALL.0, WALL.1));
-        let whole = line.text.len() >= ROW_WIDTH;
-        let (Some(time), Some(wall), true) = (time, wall, whole) else {
+        let (Some(time), Some(wall), true) = (time, integer(wall_field), text.len() == width)
+        else {
             states.damage(
                 line,
-                Some([1, ROW_WIDTH]),
+                Some([1, width]),
                 format!(
-                    "expected time, wall and {} forces in {ROW_WIDTH} columns, found \"{}\"",
+                    "expected time, wall and {} forces in {width} columns, found \"{}\"",
                     COMPONENTS.len(),
                     shown(line.columns(1, 40)).trim_end()
                 ),
@@ -96,8 +104,8 @@ impl Rwforc {
             states.begin(Some(time), line.into());
         }
         states.row(table, entity, line, |k| {
-            let from = WALL.1 + k * VALUE_WIDTH;
-            (from + 1, from + VALUE_WIDTH)
+            let from = forces + k * VALUE_WIDTH;
+            Some((from + 1, from + VALUE_WIDTH))
         });
     }
 }
