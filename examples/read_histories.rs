@@ -12,8 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [_, path, id, component] = &arguments[..] else {
         return Err("expected: file, id, component".into());
     };
-    let selection =
-        Selection {
+    let selection = Selection {
         ids: Some(vec![id.parse()?]),
         components: Some(vec![component.clone()]),
         audit: false,

@@ -4,6 +4,8 @@ use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
+
 /// A file could not be written; whatever stood there before still does.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}; what was there before is unchanged")]
@@ -20,16 +22,45 @@ pub struct WriteError {
 /// # Errors
 /// [`WriteError`] names the path; nothing half-written stays behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    write(path, bytes).map_err(|source| WriteError { path: path.into(), source })
+    write_all_whole(&[(path, bytes)])
 }
 
-fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// Writes several files as [`write_whole`] does: none is renamed into place before all of
+/// them are written.
+///
+/// # Errors
+/// [`WriteError`] names the first path that cannot be written.
+pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
+    let named = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| WriteError { path, source }
+    };
+    let mut prepared = Vec::new();
+    for (path, bytes) in files {
+        prepared.push((path, prepare(path, bytes).map_err(named(path))?));
+    }
+    for (path, file) in prepared {
+        if let Some((temporary, target)) = file {
+            temporary.persist(target).map_err(|e| e.error).map_err(named(path))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether two paths name the same existing file.
+pub fn is_same(a: &Path, b: &Path) -> bool {
+    matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Writes the bytes to a temporary file beside their target; to a device at once.
+fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathBuf)>> {
     let existing = match fs::metadata(path) {
         Ok(meta) if meta.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Ok(meta) if !meta.is_file() => {
             let mut device = OpenOptions::new().write(true).open(path)?;
             device.write_all(bytes)?;
-            return device.flush();
+            device.flush()?;
+            return Ok(None);
         }
         Ok(meta) => Some(meta.permissions()),
         Err(_) => None,
@@ -53,8 +84,7 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut temporary = builder.tempfile_in(folder)?;
     temporary.write_all(bytes)?;
     temporary.as_file().sync_all()?;
-    temporary.persist(&target).map_err(|e| e.error)?;
-    Ok(())
+    Ok(Some((temporary, target)))
 }
 
 #[cfg(test)]

@@ -85,7 +85,7 @@ pub struct CurveTable {
     #[serde(default)]
     pub end: EndName,
     #[serde(default)]
-    pub max_crush: MaxCrushName,
+    pub max_crush: MaxCrushRule,
 }
 
 /// Force law of an interface.
@@ -110,26 +110,6 @@ pub enum EndName {
     Slope,
     /// Ends the run with an error.
     Error,
-}
-
-/// Rule for the maximal crush of a model's curve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MaxCrushName {
-    Spline,
-    #[default]
-    Monotone,
-    Energy,
-}
-
-impl From<MaxCrushName> for MaxCrushRule {
-    fn from(name: MaxCrushName) -> Self {
-        match name {
-            MaxCrushName::Spline => Self::Spline,
-            MaxCrushName::Monotone => Self::Monotone,
-            MaxCrushName::Energy => Self::Energy,
-        }
-    }
 }
 
 /// A train.
@@ -219,7 +199,6 @@ pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
         folder: &folder,
         path,
         speed_m_per_s: scenario.train[0].speed.0 - obstacle_speed,
-        kind: if scenario.wall.is_some() { SpeedKind::Wall } else { SpeedKind::Closing },
     };
     let mut builder = Builder::default();
     // From the back of the first train to its nose.
@@ -227,24 +206,23 @@ pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
     for (i, vehicle) in first.vehicles.iter().enumerate().rev() {
         builder.body(vehicle, first.speed.0);
         if i > 0 {
-            let name = format!("{}|{}", first.vehicles[i - 1].name, vehicle.name);
-            builder.interface(&scenario, &meeting, inner(first), name, None, false)?;
+            let sides = Sides::Vehicles(&first.vehicles[i - 1], vehicle);
+            builder.interface(&scenario, &meeting, inner(first), sides, None)?;
         }
     }
-    let ahead = match (&scenario.wall, scenario.train.get(1)) {
-        (Some(wall), _) => wall.name.clone(),
-        (None, Some(second)) => second.vehicles[0].name.clone(),
-        (None, None) => String::new(),
+    let nose = &first.vehicles[0];
+    let contact = match (&scenario.wall, scenario.train.get(1)) {
+        (None, Some(second)) => Sides::Noses(nose, &second.vehicles[0]),
+        (wall, _) => Sides::Wall(nose, wall.as_ref().map_or("wall", |w| &w.name)),
     };
-    let contact = format!("{}|{ahead}", first.vehicles[0].name);
     let gap = scenario.contact.gap.map(|g| g.0);
-    builder.interface(&scenario, &meeting, &scenario.contact.curve, contact, gap, true)?;
+    builder.interface(&scenario, &meeting, &scenario.contact.curve, contact, gap)?;
     if let Some(second) = scenario.train.get(1) {
         for (i, vehicle) in second.vehicles.iter().enumerate() {
             builder.body(vehicle, second.speed.0);
             if let Some(next) = second.vehicles.get(i + 1) {
-                let name = format!("{}|{}", vehicle.name, next.name);
-                builder.interface(&scenario, &meeting, inner(second), name, None, false)?;
+                let sides = Sides::Vehicles(vehicle, next);
+                builder.interface(&scenario, &meeting, inner(second), sides, None)?;
             }
         }
     }
@@ -265,6 +243,18 @@ fn inner(train: &TrainTable) -> &str {
     train.inner.as_deref().unwrap_or_default()
 }
 
+/// Names stand in the columns of the result.
+fn check_name(name: &str) -> Result<(), String> {
+    let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);
+    if name.is_empty() || name.contains(breaks) {
+        return Err(format!(
+            "the name \"{}\" may not be empty or contain , | [ ] or quotes",
+            name.escape_debug()
+        ));
+    }
+    Ok(())
+}
+
 /// Checks what a single key cannot show; returns the speed of the obstacle.
 fn check(scenario: &Scenario) -> Result<f64, String> {
     let obstacle_speed = match (&scenario.wall, scenario.train.as_slice()) {
@@ -280,6 +270,9 @@ fn check(scenario: &Scenario) -> Result<f64, String> {
             ));
         }
     };
+    if let Some(wall) = &scenario.wall {
+        check_name(&wall.name)?;
+    }
     let mut names = std::collections::HashSet::new();
     for train in &scenario.train {
         if train.vehicles.is_empty() {
@@ -294,11 +287,7 @@ fn check(scenario: &Scenario) -> Result<f64, String> {
         }
         for vehicle in &train.vehicles {
             let name = &vehicle.name;
-            if name.is_empty() || name.contains([',', '|', '[', ']', '"', '\n']) {
-                return Err(format!(
-                    "vehicle name \"{name}\" may not be empty or contain , | [ ] or quotes"
-                ));
-            }
+            check_name(name)?;
             if !names.insert(name) {
                 return Err(format!("two vehicles are named \"{name}\""));
             }
@@ -319,7 +308,34 @@ struct Meeting<'a> {
     folder: &'a Path,
     path: &'a Path,
     speed_m_per_s: f64,
-    kind: SpeedKind,
+}
+
+/// What an interface lies between.
+#[derive(Clone, Copy)]
+enum Sides<'a> {
+    Wall(&'a VehicleTable, &'a str),
+    Noses(&'a VehicleTable, &'a VehicleTable),
+    /// Of one train, the one nearer to the nose first.
+    Vehicles(&'a VehicleTable, &'a VehicleTable),
+}
+
+impl Sides<'_> {
+    fn name(&self) -> String {
+        match self {
+            Self::Wall(vehicle, wall) => format!("{}|{wall}", vehicle.name),
+            Self::Noses(a, b) | Self::Vehicles(a, b) => format!("{}|{}", a.name, b.name),
+        }
+    }
+
+    /// Mass of the body, or of each of two equal bodies with the same reduced mass.
+    fn mass_kg(&self) -> f64 {
+        match self {
+            Self::Wall(vehicle, _) => vehicle.mass.0,
+            Self::Noses(a, b) | Self::Vehicles(a, b) => {
+                2.0 * a.mass.0 * b.mass.0 / (a.mass.0 + b.mass.0)
+            }
+        }
+    }
 }
 
 #[derive(Default)]
@@ -348,10 +364,10 @@ impl Builder {
         scenario: &Scenario,
         meeting: &Meeting<'_>,
         curve: &str,
-        name: String,
+        sides: Sides<'_>,
         gap: Option<f64>,
-        is_contact: bool,
     ) -> Result<(), ScenarioError> {
+        let name = sides.name();
         let invalid =
             |message: String| ScenarioError::Invalid { path: meeting.path.into(), message };
         let table = scenario.curves.get(curve).ok_or_else(|| {
@@ -361,7 +377,7 @@ impl Builder {
                 known.join(", ")
             ))
         })?;
-        if !is_contact
+        if matches!(sides, Sides::Vehicles(..))
             && table.model.is_some()
             && scenario.run.interface_speed == InterfaceSpeed::Local
         {
@@ -369,8 +385,11 @@ impl Builder {
                 "interface {name} takes its curve from a model at its own closing speed, which this version does not iterate: write interface_speed = \"train\" in [run], or give curve \"{curve}\" as a file or database case"
             )));
         }
-        let source = source(table, curve, meeting, &invalid)?;
-        let expected = if is_contact { meeting.kind } else { SpeedKind::Closing };
+        let source = source(table, curve, sides.mass_kg(), meeting, &invalid)?;
+        let expected = match sides {
+            Sides::Wall(..) => SpeedKind::Wall,
+            Sides::Noses(..) | Sides::Vehicles(..) => SpeedKind::Closing,
+        };
         if let Some(kind) = source.kind
             && kind != expected
         {
@@ -422,11 +441,14 @@ impl Builder {
 fn source(
     table: &CurveTable,
     name: &str,
+    mass_kg: f64,
     meeting: &Meeting<'_>,
     invalid: &impl Fn(String) -> ScenarioError,
 ) -> Result<Source, ScenarioError> {
     match (&table.model, &table.file, &table.database) {
-        (Some(model), None, None) => from_model(&meeting.folder.join(model), table, name, meeting),
+        (Some(model), None, None) => {
+            from_model(&meeting.folder.join(model), table, name, mass_kg, meeting)
+        }
         (None, Some(file), None) => from_file(&meeting.folder.join(file)),
         (None, None, Some(database)) => {
             let case = table.case.as_deref().and_then(|c| c.split_once('/')).ok_or_else(|| {
@@ -444,11 +466,15 @@ fn from_model(
     path: &Path,
     table: &CurveTable,
     name: &str,
+    mass_kg: f64,
     meeting: &Meeting<'_>,
 ) -> Result<Source, ScenarioError> {
     let model = Model::read(path)?;
-    let query =
-        Query { speed_m_per_s: meeting.speed_m_per_s, mass_kg: None, rule: table.max_crush.into() };
+    let query = Query {
+        speed_m_per_s: meeting.speed_m_per_s,
+        mass_kg: Some(mass_kg),
+        rule: table.max_crush,
+    };
     let failed = |source| ScenarioError::Predict { curve: name.into(), source };
     let curve = predict(&model, &query).map_err(failed)?;
     Ok(Source {

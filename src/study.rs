@@ -14,7 +14,7 @@ use crate::curve::{Case, ForceKind, Masses, Source};
 use crate::history::{EntityId, Side};
 use crate::manifest::{self, ManifestError};
 use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
-use crate::unit::{MassText, SpeedKind, SpeedText, UnitSystem};
+use crate::unit::{ImpactSpeedText, MassText, SpeedKind, UnitSystem};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
 const EXTRACTION_VERSION: u32 = 2;
@@ -65,7 +65,7 @@ pub struct RunEntry {
     /// Name of the case; the path if absent.
     pub name: Option<String>,
     /// Impact speed; taken from the first state if absent.
-    pub speed: Option<SpeedText>,
+    pub speed: Option<ImpactSpeedText>,
     /// Mass of the body, or of each body of a pair.
     pub mass: MassText,
     /// Mass of the other body, if the bodies of a pair differ.
@@ -127,13 +127,17 @@ pub fn load(path: &Path) -> Result<Study, ManifestError> {
 
 fn check(manifest: &Manifest) -> Result<(), String> {
     let Head { name, group, kind, half_model, .. } = &manifest.study;
-    for (key, value) in [("name", name), ("group", group)] {
-        if value.trim().is_empty() {
-            return Err(format!("study.{key} is empty"));
+    check_name("study.name", name, true)?;
+    check_name("study.group", group, false)?;
+    let minus_node = manifest.recipe.deflection.minus_node.is_some();
+    match (kind, half_model, minus_node) {
+        (StudyKind::Pair, false, false) => {
+            return Err("a pair needs the other body: deflection.minus_node = …, or half_model = true in [study] for one body against its symmetry plane".into());
         }
-    }
-    if group.contains('/') || group == "." {
-        return Err(format!("study.group \"{group}\" may not contain \"/\""));
+        (StudyKind::Pair, true, true) => {
+            return Err("half_model = true doubles the deflection, which a minus_node already makes whole: keep one of them".into());
+        }
+        _ => {}
     }
     if *kind == StudyKind::Wall && *half_model {
         return Err(
@@ -151,12 +155,30 @@ fn check(manifest: &Manifest) -> Result<(), String> {
         if *kind == StudyKind::Wall && run.other_mass.is_some() {
             return Err(format!("run \"{}\": other_mass needs kind = \"pair\"", run.path));
         }
+        if check_name("run.name", &run.case_name(), false).is_err() {
+            return Err(format!(
+                "run \"{}\" gives no name for its case: add name = \"…\" to it",
+                run.path.escape_debug()
+            ));
+        }
         if !names.insert(run.case_name()) {
             return Err(format!(
                 "two runs are named \"{}\": give one of them a name = …",
                 run.case_name()
             ));
         }
+    }
+    Ok(())
+}
+
+/// Names stand in files, tables and HDF5 paths.
+fn check_name(key: &str, name: &str, slash: bool) -> Result<(), String> {
+    let shown = name.escape_debug();
+    if name.trim().is_empty() || name == "." || name == ".." {
+        return Err(format!("{key} = \"{shown}\" is no name"));
+    }
+    if name.contains(|c: char| c.is_control() || (c == '/' && !slash)) {
+        return Err(format!("{key} = \"{shown}\" may not contain \"/\" or control characters"));
     }
     Ok(())
 }
@@ -430,7 +452,8 @@ fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadEr
         ForceSource::Body { node, .. } => WantedId { id: node, side: None },
     };
     let component = force_component(source).to_string();
-    let selection = Selection { ids: Some(vec![id]), components: Some(vec![component]), audit: false };
+    let selection =
+        Selection { ids: Some(vec![id]), components: Some(vec![component]), audit: false };
     solver::read(&file.path, None, &selection)
 }
 

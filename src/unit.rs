@@ -345,6 +345,10 @@ text_quantity!(
     SpeedText, |t: &str| SPEED.parse_not_negative(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
 );
 text_quantity!(
+    /// A speed in m/s, above zero, written like `"36km/h"`.
+    ImpactSpeedText, |t: &str| SPEED.parse_positive(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
+);
+text_quantity!(
     /// A mass in kg, above zero, written like `"24t"`.
     MassText, |t: &str| MASS.parse_positive(t), "^[0-9.eE+-]+ *(t|kg|g)$"
 );

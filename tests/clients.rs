@@ -161,8 +161,6 @@ fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
     let set = TrainingSet::new("lead-car-wall", database.cases("lead-car-wall")).unwrap();
     let table = set.table(TableKind::Samples);
     agrees_with_scikit_learn("FE table, states", table.records(), table.targets());
-    let table = set.table(TableKind::Samples);
-    agrees_with_scikit_learn("FE table, states", table.records(), table.targets());
     let table = set.table(TableKind::Grid);
     agrees_with_scikit_learn("FE table, grid", table.records(), table.targets());
 }

@@ -176,6 +176,88 @@ fn full_runs_and_bundled_runs_agree() {
     assert_eq!(curves("full.h5").len(), 16);
 }
 
+/// A rwforc and a nodout of a body that meets a wall with a constant force, each 0.1 ms.
+fn constant_force_run(folder: &Path, contact_s: f64, speed: f64, force: f64) {
+    use std::fmt::Write;
+    let mass = 24e3;
+    let e = |value: f64, width: usize, decimals: usize| {
+        let text = format!("{value:.decimals$E}");
+        let (mantissa, exponent) = text.split_once('E').unwrap();
+        let exponent: i32 = exponent.parse().unwrap();
+        let sign = if exponent < 0 { '-' } else { '+' };
+        format!("{:>width$}", format!("{mantissa}E{sign}{:02}", exponent.abs()))
+    };
+    let header =
+        " made up\n                    ls-dyna smp d R14 R14.0_515_8a12796 date 12/12/2022\n\n";
+    let (mut nodout, mut rwforc) = (header.to_string(), header.to_string());
+    rwforc += "    time       wall#   normal-force    x-force        y-force        z-force\n";
+    let stop_s = contact_s + mass * speed / force;
+    let states = (stop_s / 1e-4) as usize + 400;
+    for i in 0..states {
+        let t = i as f64 * 1e-4;
+        let pushed = (t.min(stop_s) - contact_s).max(0.0);
+        let v = speed - force / mass * pushed;
+        let x = speed * t.min(stop_s) - 0.5 * force / mass * pushed * pushed;
+        let f = if t > contact_s && t < stop_s { force } else { 0.0 };
+        let zero = e(0.0, 12, 5);
+        write!(
+            nodout,
+            "\n n o d a l   p r i n t   o u t   f o r   t i m e  s t e p{i:8}                              ( at time {} )\n\n\
+             nodal point  x-disp     y-disp\n        1 {}{zero}{zero}{}{}{}\n",
+            e(t, 13, 7),
+            e(x, 12, 5),
+            e(v, 12, 5),
+            zero.repeat(6),
+            zero.repeat(2),
+        )
+        .unwrap();
+        writeln!(rwforc, "{}{:8}{}{}", e(t, 12, 5), 1, e(f, 15, 6), e(0.0, 15, 6).repeat(3))
+            .unwrap();
+    }
+    let nodout = nodout.replace("\nnodal point", "\n nodal point");
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(folder.join("nodout"), nodout).unwrap();
+    std::fs::write(folder.join("rwforc"), rwforc).unwrap();
+}
+
+/// Exact case 1 through the whole chain: contact after a gap, with and without the filter,
+/// and a model of curves that are constant.
+#[test]
+fn constant_force_through_the_whole_chain() {
+    let folder = tempfile::tempdir().unwrap();
+    let speeds = [8.0, 10.0, 12.0];
+    for speed in speeds {
+        constant_force_run(&folder.path().join(format!("v{speed}")), 0.05, speed, 2e6);
+    }
+    for filter in ["none", "CFC60"] {
+        let mut text = format!(
+            "[study]\nname = \"constant\"\nunits = \"SI\"\ngroup = \"g\"\nkind = \"wall\"\n\
+             [recipe]\ndeflection = {{ file = \"nodout\", node = 1, component = \"x_displacement\" }}\n\
+             force = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}\nfilter = \"{filter}\"\n"
+        );
+        for speed in speeds {
+            text += &format!("[[run]]\npath = \"v{speed}\"\nmass = \"24t\"\n");
+        }
+        std::fs::write(folder.path().join("study.toml"), text).unwrap();
+        let report =
+            json(&crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]));
+        for (run, speed) in report["runs"].as_array().unwrap().iter().zip(speeds) {
+            let case = &run["case"];
+            let value = |key: &str| case[key].as_f64().unwrap();
+            assert!((value("speed_m_per_s") - speed).abs() < 1e-6);
+            // The first state after the contact, one or two intervals later.
+            assert!((value("contact_time_s") - 0.05).abs() < 2.1e-4, "{filter}: {case}");
+            let crush = 24e3 * speed * speed / (2.0 * 2e6);
+            let missed = speed * 2.1e-4;
+            assert!((value("max_deflection_m") - crush).abs() < missed, "{filter}: {case}");
+        }
+    }
+    // The forest's out-of-bag r² does not exist here, and the model still reads back.
+    crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5"]);
+    crumple_ok(folder.path(), &["train", "c.h5", "--group", "g", "-o", "c.model"]);
+    crumple_ok(folder.path(), &["predict", "c.model", "--speed", "11m/s"]);
+}
+
 /// Two lead cars closing at 72 km/h are each like one against a wall at 36 km/h.
 #[test]
 fn pair_and_wall_agree_by_symmetry() {
@@ -242,7 +324,7 @@ fn unit_systems_agree() {
     };
     let given = study("mm-t-s", 1.0, 1.0, 1.0);
     for other in [study("kg-mm-ms", 1.0, 1e3, 1e-3), study("SI", 1e-3, 1.0, 1.0)] {
-        for key in ["max_deflection_m", "peak_force_n", "work_over_energy", "speed_m_per_s"] {
+        for key in ["max_deflection_m", "peak_force_N", "work_over_energy", "speed_m_per_s"] {
             let (a, b) = (given[key].as_f64().unwrap(), other[key].as_f64().unwrap());
             // The rescaled text has six digits as well, so the last may round differently.
             assert!((a / b - 1.0).abs() < 2e-5, "{key}: {a} against {b}");
@@ -398,7 +480,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     assert_eq!(keyword[1], "lead-car-wall 50 km/h (wall)");
     assert_eq!(
         keyword[2],
-        "       101         0       1.0       1.0       0.0       0.0         0         0"
+        "       101         0       1.0       1.0       0.0       0.0         0       401"
     );
     for (i, (d, f)) in d.iter().zip(&f).enumerate() {
         let close = |a: f64, b: f64| (a - b).abs() <= 5e-9 * b.abs();
@@ -598,6 +680,38 @@ fn every_command_has_help_with_examples() {
         let help = crumple_ok(Path::new("."), &[command, "--help"]);
         assert!(help.contains("Examples:"), "{command}");
         assert!(help.contains(&format!("crumple {command}")), "{command}");
+    }
+}
+
+/// One JSON document from every command that can print one without further input.
+#[test]
+fn json_is_one_document() {
+    let folder = tempfile::tempdir().unwrap();
+    crumple_ok(folder.path(), &["demo"]);
+    let here = folder.path().join("crumple-demo");
+    for line in [
+        "inspect fe/lead-car-wall/36kmh/nodout",
+        "histories fe/lead-car-wall/36kmh/rwforc",
+        "histories fe/lead-car-wall/36kmh/rwforc -o a.csv",
+        "build fe/lead-car-wall/study.toml -o curves.h5",
+        "db ls curves.h5",
+        "db show curves.h5",
+        "db check curves.h5",
+        "train curves.h5 --group lead-car-wall -o lead.model",
+        "predict lead.model --speed 50km/h -o b.csv",
+        "simulate scenario.toml",
+        "compare curves.h5 --group lead-car-wall --speed 48km/h",
+        "export lead50.json --to csv",
+        "export lead50.json --to csv -o c.csv",
+        "export --list",
+        "demo",
+        "completions bash",
+        "man",
+    ] {
+        let mut arguments: Vec<&str> = line.split(' ').collect();
+        arguments.push("--json");
+        let text = crumple_ok(&here, &arguments);
+        assert!(serde_json::from_str::<Value>(&text).is_ok_and(|v| v.is_object()), "{line}");
     }
 }
 

@@ -47,6 +47,27 @@ fn splits_by_hand() {
     assert_eq!(p, array![0.0, 0.5]);
 }
 
+/// Targets that are equal are one leaf, whatever rounding says of their variance.
+#[test]
+fn plateaus_are_not_split() {
+    let x = Array2::from_shape_fn((100, 1), |(i, _)| i as f64);
+    let y = Array1::from_shape_fn(100, |i| if i < 37 { 0.1 } else { 1.0 / 3.0 * 1e6 });
+    let forest = ForestParams::new(20).fit(&Dataset::new(x, y)).unwrap();
+    assert!(forest.trees().iter().all(|t| t.nodes() == 3));
+}
+
+#[test]
+fn one_sample_and_equal_records_are_one_leaf() {
+    let fit = |x: Array2<f64>, y: Array1<f64>| {
+        ForestParams::new(1).bootstrap(false).fit(&Dataset::new(x, y)).unwrap()
+    };
+    let one = fit(array![[1.0]], array![5.0]);
+    assert_eq!(one.trees()[0].nodes(), 1);
+    let equal = fit(array![[1.0], [1.0]], array![5.0, 7.0]);
+    let p: Array1<f64> = equal.predict(&array![[9.0]]);
+    assert_eq!(p, array![6.0]);
+}
+
 #[test]
 fn gain_counts_repeated_samples() {
     // Ten copies of one point weigh more than one: the split follows them.

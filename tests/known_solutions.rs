@@ -149,6 +149,39 @@ fn chain_of_springs_follows_its_modes_while_it_is_pressed() {
     }
 }
 
+/// A gap shifts x, not the time: t = 0 is the first contact, and the ledger closes from
+/// there although the constant force begins at full height.
+#[test]
+fn a_gap_is_closed_before_time_begins() {
+    let settings = RunSettings { duration_s: 0.1, output_interval_s: 0.75e-3, step_s: STEP_S };
+    let with_gap = |gap_m: f64| {
+        let interface =
+            Interface { name: "I0".into(), law: memory(constant(2.0 * MEGA), 80.0 * MEGA), gap_m };
+        let bodies = [("A", 10.0), ("B", 0.0)].map(|(name, speed_m_per_s)| Body {
+            name: name.into(),
+            mass_kg: 24.0 * TONNES,
+            speed_m_per_s,
+        });
+        simulate(&Chain::new(bodies.to_vec(), vec![interface]).unwrap(), &settings).unwrap()
+    };
+    let (touching, apart) = (with_gap(0.0), with_gap(0.5));
+    for (a, b) in touching.interfaces[0].force_n.iter().zip(&apart.interfaces[0].force_n) {
+        assert!((a - b).abs() < 1.0, "{a} N against {b} N");
+    }
+    assert!((apart.bodies[0].x_m[0] - 0.5).abs() < 1e-12);
+    assert_eq!(apart.interfaces[0].deflection_m[0], 0.0);
+    assert!(apart.ledger.max_energy_error < 1e-3, "{:e}", apart.ledger.max_energy_error);
+    digits(apart.interfaces[0].max_deflection_m, "0.300");
+}
+
+/// An interface only pushes: forces below zero in a curve do not pull.
+#[test]
+fn a_curve_never_pulls() {
+    let wavy = Envelope::new(vec![0.0, 0.1, 0.2, 1.0], vec![0.0, MEGA, -MEGA, MEGA]).unwrap();
+    let run = run(&chain(&[(24.0 * TONNES, 5.0)], &[memory(wavy, 0.0)]), 0.3, STEP_S);
+    assert!(run.interfaces[0].force_n.iter().all(|&f| f >= 0.0));
+}
+
 /// A curve with peaks, for the cases without closed form.
 fn bumpy() -> Envelope {
     let d = vec![0.0, 0.02, 0.05, 0.1, 0.2, 0.6, 1.2];

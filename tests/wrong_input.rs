@@ -96,6 +96,20 @@ fn manifests() {
         "kind  = \"wall\"\nhalf_model = true",
         "half_model = true needs kind = \"pair\"",
     );
+    t(
+        "\"25km/h\"",
+        "\"0km/h\"",
+        "line 16, columns 9-15: speed \"0km/h\" is out of range: it must be above zero",
+    );
+    t("group = \"lead-car-wall\"", "group = \"a/b\"", "study.group = \"a/b\" may not contain");
+    t("group = \"lead-car-wall\"", "group = \"a\\u0000b\"", "may not contain");
+    t("path  = \"25kmh\"", "path  = \".\"", "run \".\" gives no name for its case: add name = ");
+    t(
+        "component = \"normal_force\"",
+        "component = \"mass\"",
+        "\"mass\" of a wall or contact is no force: use normal_force",
+    );
+    t("kind  = \"wall\"", "kind  = \"pair\"", "a pair needs the other body: deflection.minus_node");
     t("[study]", "[study", "study.toml: line 2");
 }
 
@@ -322,7 +336,44 @@ fn curve_files() {
         "the deflection must increase, found 1 m after 1 m at point 3",
     );
     t("d_m,force_N\n0.1,0\n1,1\n", "the deflection must begin at 0, found 0.1 m");
+    t("d_m,force_N\n0,0\n1,-5\n", "the force of point 2 is below 0");
     t("d_m,force_N\n0,5\n1,5\n", "never rises, so its unloading stiffness must be given");
+}
+
+/// A band that does not fit its curve is an error, not a panic.
+#[test]
+fn a_damaged_predicted_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    crumple_ok(folder.path(), &["demo"]);
+    let curve = fs::read_to_string(folder.path().join("crumple-demo/lead50.json")).unwrap();
+    let mut curve: serde_json::Value = serde_json::from_str(&curve).unwrap();
+    curve["force_low_N"] = serde_json::json!([1.0, 2.0]);
+    curve["force_high_N"] = serde_json::json!([1.0, 2.0]);
+    fs::write(folder.path().join("band.json"), curve.to_string()).unwrap();
+    let error = crumple_fails(folder.path(), 1, &["export", "band.json", "--to", "csv"]);
+    assert!(error.contains("force_low_N has 2 values, force_N 401"), "{error}");
+}
+
+#[test]
+fn outputs_do_not_destroy_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    crumple_ok(folder.path(), &["demo"]);
+    let here = folder.path().join("crumple-demo");
+    for line in [
+        "train curves.h5 --group lead-car-wall -o ./curves.h5",
+        "histories fe/lead-car-wall/36kmh/rwforc -o fe/lead-car-wall/36kmh/rwforc",
+        "export lead50.json --to csv -o lead50.json",
+        "simulate scenario.toml -o scenario.toml",
+    ] {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let error = crumple_fails(&here, 2, &arguments);
+        assert!(error.contains("names the input itself"), "{line}: {error}");
+    }
+    // Several outputs: none is written if one cannot be.
+    let line =
+        ["predict", "lead.model", "--speed", "50km/h", "-o", "new.json", "-o", "/no/such/a.csv"];
+    crumple_fails(&here, 1, &line);
+    assert!(!here.join("new.json").exists());
 }
 
 #[cfg(target_os = "linux")]
@@ -361,6 +412,13 @@ fn a_second_writer_is_told_and_changes_nothing() {
     let error =
         crumple_fails(folder.path(), 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
     assert!(error.contains("is being written by another process: try again"), "{error}");
+    // A link to the database is the database.
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(&path, folder.path().join("link.h5")).unwrap();
+        let arguments = ["build", study.to_str().unwrap(), "-o", "link.h5"];
+        assert!(crumple_fails(folder.path(), 1, &arguments).contains("being written"));
+    }
     drop(lock);
     assert_eq!(fs::read(&path).unwrap(), before);
 }

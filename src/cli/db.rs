@@ -27,11 +27,17 @@ pub struct Args {
 #[derive(clap::Subcommand)]
 enum Command {
     /// List groups and cases by speed
+    #[command(
+        after_help = "Examples:\n  crumple db ls curves.h5\n  crumple db ls curves.h5 --json"
+    )]
     Ls {
         /// Curve database
         database: PathBuf,
     },
     /// Show cases with their curves: a terminal plot, or everything with --json
+    #[command(after_help = "Examples:
+  crumple db show curves.h5 --group lead-car-wall --case 36kmh
+  crumple db show curves.h5 --json > curves.json")]
     Show {
         /// Curve database
         database: PathBuf,
@@ -43,6 +49,9 @@ enum Command {
         case: Option<String>,
     },
     /// Audit every case: energy, end of loading, order, warnings of the extraction
+    #[command(after_help = "Examples:
+  crumple db check curves.h5
+  crumple db check curves.h5 --strict    # exit code 3 if there is a finding")]
     Check {
         /// Curve database
         database: PathBuf,
@@ -60,12 +69,16 @@ pub struct CaseRow {
     other_mass_kg: Option<f64>,
     force_kind: crumple::curve::ForceKind,
     states: usize,
+    #[serde(rename = "peak_force_N")]
     peak_force_n: f64,
     max_deflection_m: f64,
     loading_end: usize,
     truncated: bool,
+    #[serde(rename = "unloading_stiffness_N_per_m")]
     unloading_stiffness_n_per_m: Option<f64>,
+    #[serde(rename = "work_J")]
     work_j: f64,
+    #[serde(rename = "kinetic_energy_J")]
     kinetic_energy_j: f64,
     work_over_energy: f64,
     contact_time_s: f64,

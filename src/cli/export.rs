@@ -8,7 +8,7 @@ use crumple::unit::UnitSystem;
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
 /// Write a predicted curve for another tool
 #[derive(clap::Args)]
@@ -82,6 +82,13 @@ struct Listed {
     description: &'static str,
 }
 
+/// A file that would go to standard output, within a JSON document.
+#[derive(Serialize)]
+struct Text {
+    format: &'static str,
+    text: String,
+}
+
 #[derive(Serialize)]
 struct Document {
     format: &'static str,
@@ -94,9 +101,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         return list(manners);
     };
     let format = args.target.format(args.output.as_deref())?;
+    let output = args.output.as_deref().filter(|path| !is_stdout(path));
+    if let Some(output) = output {
+        keep_input(curve, output)?;
+    }
     let curve = export::json::read(curve)?;
     let bytes = format.encode(&curve, &args.target.options()?)?;
-    match &args.output {
+    match output {
+        None if manners.json => {
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            output::print_json(&Text { format: format.name, text })?;
+        }
         None => output::print(|out| out.write_all(&bytes))?,
         Some(path) => {
             write_whole(path, &bytes)?;

@@ -9,7 +9,7 @@ use crumple::solver::{self, Problem, Selection, SolverFile, WantedId};
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
 /// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units
 #[derive(clap::Args)]
@@ -44,7 +44,11 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         components: some(args.components.is_empty()).then(|| args.components.clone()),
         audit: false,
     };
-    let target = args.output.as_deref().map(Target::of).transpose()?;
+    let output = args.output.as_deref().filter(|path| !is_stdout(path));
+    if let Some(output) = output {
+        keep_input(&args.file, output)?;
+    }
+    let target = output.map(Target::of).transpose()?;
     let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
     if let Some(section) = &args.section
         && section != file.format
@@ -58,7 +62,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     for problem in &file.problems {
         manners.warn(&format!("{}: {problem}", args.file.display()));
     }
-    match (&args.output, target) {
+    match (output, target) {
         (Some(path), Some(Target::Csv)) => {
             let mut csv = Vec::new();
             write_csv(&mut csv, &file)?;

@@ -17,9 +17,11 @@ mod simulate;
 mod train;
 
 use std::error::Error;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use crumple::file::is_same;
 
 /// Everything went well.
 const DONE: u8 = 0;
@@ -94,6 +96,22 @@ impl<E: Error + 'static> From<E> for Failure {
 }
 
 pub type CommandResult = Result<Outcome, Failure>;
+
+/// Refuses to write over what is read.
+fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
+    match is_same(input, output) {
+        true => Err(Failure::Usage(format!(
+            "-o {} names the input itself: name another file",
+            output.display()
+        ))),
+        false => Ok(()),
+    }
+}
+
+/// Whether an output argument means standard output.
+fn is_stdout(output: &Path) -> bool {
+    output == Path::new("-")
+}
 
 impl Manners {
     /// A warning on standard error.

@@ -3,14 +3,14 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::file::write_whole;
+use crumple::file::write_all_whole;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, PredictedCurve, Query, predict};
 use crumple::unit::km_per_h;
 
 use super::arguments::{self, MaxCrush};
 use super::output;
-use super::{CommandResult, Manners, Outcome};
+use super::{CommandResult, Manners, Outcome, keep_input};
 
 /// Predict the force-deflection curve at a speed, with energy audit and warnings
 #[derive(clap::Args)]
@@ -52,6 +52,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         .iter()
         .map(|path| args.target.format(Some(path)))
         .collect::<Result<Vec<_>, _>>()?;
+    args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     let model = Model::read(&args.model)?;
     let query = Query { speed_m_per_s: args.speed, mass_kg: args.mass, rule };
     let curve = predict(&model, &query)?;
@@ -60,9 +61,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         .iter()
         .map(|format| format.encode(&curve, &options))
         .collect::<Result<Vec<_>, _>>()?;
-    for (path, bytes) in args.output.iter().zip(&files) {
-        write_whole(path, bytes)?;
-    }
+    let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
+    write_all_whole(&named.collect::<Vec<_>>())?;
     for warning in &curve.warnings {
         manners.warn(&warning.message);
     }

@@ -1,6 +1,7 @@
 //! `crumple completions` and `crumple man`: made from the command line's own definition.
 
 use clap::CommandFactory;
+use serde::Serialize;
 
 use super::output;
 use super::{Cli, CommandResult, Manners, Outcome};
@@ -22,16 +23,28 @@ pub struct Completions {
   crumple man | man -l -")]
 pub struct Man {}
 
-pub fn completions(args: &Completions, _: Manners) -> CommandResult {
+pub fn completions(args: &Completions, manners: Manners) -> CommandResult {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "crumple", &mut script);
-    output::print(|out| out.write_all(&script))?;
-    Ok(Outcome::Clean)
+    print(&script, manners)
 }
 
-pub fn man(_: &Man, _: Manners) -> CommandResult {
+pub fn man(_: &Man, manners: Manners) -> CommandResult {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
-    output::print(|out| out.write_all(&page))?;
+    print(&page, manners)
+}
+
+#[derive(Serialize)]
+struct Text {
+    text: String,
+}
+
+fn print(bytes: &[u8], manners: Manners) -> CommandResult {
+    if manners.json {
+        output::print_json(&Text { text: String::from_utf8_lossy(bytes).into_owned() })?;
+    } else {
+        output::print(|out| out.write_all(bytes))?;
+    }
     Ok(Outcome::Clean)
 }

@@ -1,7 +1,7 @@
 //! `crumple simulate`: the multi-body run of a scenario.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crumple::file::write_whole;
 use crumple::multibody::integrator::BodyHistory;
@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::output;
-use super::{CommandResult, Manners, Outcome};
+use super::{CommandResult, Manners, Outcome, is_stdout, keep_input};
 
 /// Run a scenario and write the histories of every body and interface
 #[derive(clap::Args)]
@@ -57,15 +57,27 @@ struct InterfaceSummary {
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    if let Some(output) = &args.output {
+        keep_input(&args.scenario, output)?;
+    }
     let prepared = scenario::load(&args.scenario)?;
     let run = simulate(&prepared.chain, &prepared.settings)?;
     let mut warnings = prepared.warnings.clone();
     warnings.extend(ledger_warnings(&run.ledger));
+    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
+        let (crush, end) = (history.max_deflection_m, interface.law.end_m());
+        if crush > end {
+            warnings.push(format!(
+                "interface {} is crushed {crush:.4} m, beyond the end of its curve at {end:.4} m",
+                interface.name
+            ));
+        }
+    }
     for warning in &warnings {
         manners.warn(warning);
     }
     let columns = columns(&prepared, &run);
-    let to_stdout = args.output.as_deref() == Some(Path::new("-"));
+    let to_stdout = args.output.as_deref().is_some_and(is_stdout);
     if let Some(path) = args.output.as_ref().filter(|_| !to_stdout) {
         let mut csv = Vec::new();
         write_csv(&mut csv, &columns)?;

@@ -12,7 +12,7 @@ use crumple::unit::km_per_h;
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, Manners, Outcome, keep_input};
 
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
@@ -127,6 +127,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             args.stop_threshold
         )));
     }
+    keep_input(&args.database, &args.output)?;
     let database = Database::read(&args.database)?;
     let cases = database.group(&args.database, &args.group)?;
     let set = TrainingSet::new(&args.group, cases)?;

@@ -106,8 +106,7 @@ pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, Cf
         return Ok(Filtered { values, resampled, spread });
     }
     let last_s = time_s[n - 1];
-    let even: Vec<f64> =
-        (0..n).map(|i| (time_s[0] + interval_s * i as f64).min(last_s)).collect();
+    let even: Vec<f64> = (0..n).map(|i| (time_s[0] + interval_s * i as f64).min(last_s)).collect();
     // Both sets of times span the same range, so none lies outside.
     let uneven = |_| CfcError::Uneven { spread_percent: spread * 100.0 };
     let values = interpolate(time_s, values, &even).map_err(uneven)?;

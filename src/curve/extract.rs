@@ -218,7 +218,12 @@ impl Signal {
     ) -> Result<Self, ExtractError> {
         if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
             let what = history.label();
-            return Err(ExtractError::NotFinite { origin, what, state: i + 1, value: history.values[i] });
+            return Err(ExtractError::NotFinite {
+                origin,
+                what,
+                state: i + 1,
+                value: history.values[i],
+            });
         }
         let (mut time_s, mut values) = (Vec::new(), Vec::new());
         for (&t, &v) in history.time.iter().zip(&history.values) {
@@ -297,11 +302,17 @@ fn force(
         MeasuredForce::Contact(history) => {
             Signal::of(history, units, units.force(), "force", Origin::Force, notes)?
         }
-        MeasuredForce::Body(history, BodyMotion::Acceleration) => {
-            Signal::of(history, units, mass * units.acceleration(), "acceleration", Origin::Force, notes)?
-        }
+        MeasuredForce::Body(history, BodyMotion::Acceleration) => Signal::of(
+            history,
+            units,
+            mass * units.acceleration(),
+            "acceleration",
+            Origin::Force,
+            notes,
+        )?,
         MeasuredForce::Body(history, BodyMotion::Velocity) => {
-            let velocity = Signal::of(history, units, mass * units.speed(), "velocity", Origin::Force, notes)?;
+            let velocity =
+                Signal::of(history, units, mass * units.speed(), "velocity", Origin::Force, notes)?;
             notes.push("body force: mass times the central difference of the velocity".into());
             Signal { values: derivative(&velocity.time_s, &velocity.values), ..velocity }
         }

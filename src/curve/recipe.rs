@@ -108,6 +108,9 @@ impl TryFrom<ForceTable> for ForceSource {
     fn try_from(table: ForceTable) -> Result<Self, String> {
         let ForceTable { file, id, side, node, component, times } = table;
         match (id, node, times.as_deref()) {
+            (Some(_), None, None) if !component.ends_with("_force") => Err(format!(
+                "\"{component}\" of a wall or contact is no force: use normal_force, x_force, y_force or z_force"
+            )),
             (Some(id), None, None) => {
                 let side = side
                     .map(|s| {
@@ -117,6 +120,9 @@ impl TryFrom<ForceTable> for ForceSource {
                     })
                     .transpose()?;
                 Ok(Self::Contact { file, id, side, component })
+            }
+            (None, Some(_), _) if side.is_some() => {
+                Err("a node has no side: take side away, or give the id of an interface".into())
             }
             (None, Some(node), Some("mass")) => {
                 let motion = match component.as_str() {

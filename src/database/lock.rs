@@ -30,9 +30,11 @@ impl WriterLock {
     /// [`LockError::Busy`] if another process holds it.
     pub fn take(database: &Path) -> Result<Self, LockError> {
         let error = |source| LockError::Io { path: database.into(), source };
-        let mut name = database.file_name().unwrap_or_default().to_os_string();
+        // A link and its target are one database.
+        let real = fs::canonicalize(database).unwrap_or_else(|_| database.to_path_buf());
+        let mut name = real.file_name().unwrap_or_default().to_os_string();
         name.push(".lock");
-        let path = database.with_file_name(name);
+        let path = real.with_file_name(name);
         loop {
             let file = OpenOptions::new()
                 .create(true)

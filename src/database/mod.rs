@@ -44,7 +44,7 @@ pub enum DatabaseError {
     #[error("{path}: group \"{group}\" has no case \"{case}\": it has {known}")]
     NoCase { path: PathBuf, group: String, case: String, known: String },
     #[error(
-        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this study's run or group differently"
+        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": if the study was renamed, build into a new database; else name this run or group differently"
     )]
     OtherStudy { group: String, name: String, other: String },
     #[error("cannot encode the database: {detail}")]

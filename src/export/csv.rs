@@ -58,7 +58,9 @@ pub enum CsvError {
     Number { path: PathBuf, line: u64, field: usize, found: String },
     #[error("{path}: {source}")]
     Envelope { path: PathBuf, source: EnvelopeError },
-    #[error("{path}: the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0")]
+    #[error(
+        "{path}: the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+    )]
     Pulling { path: PathBuf, point: usize },
 }
 

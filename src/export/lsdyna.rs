@@ -17,7 +17,11 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     };
     line(format_args!("*KEYWORD"));
     line(format_args!("$ force over deflection, positive in compression"));
-    line(format_args!("$ units: length {} m, force {} N", units.length_m, units.force()));
+    line(format_args!(
+        "$ units: length {} m, force {} N",
+        nine_digits(units.length_m),
+        nine_digits(units.force())
+    ));
     line(format_args!("$ speed {} m/s ({})", curve.speed_m_per_s, curve.speed_kind.name()));
     line(format_args!("$ mass {} kg", curve.mass_kg));
     line(format_args!(
@@ -33,7 +37,14 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     ));
     line(format_args!(
         "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
-        options.id, 0, "1.0", "1.0", "0.0", "0.0", 0, 0
+        options.id,
+        0,
+        "1.0",
+        "1.0",
+        "0.0",
+        "0.0",
+        0,
+        discretisation(curve.deflection_m.len())
     ));
     line(format_args!("$#                a1                  o1"));
     for (d, f) in curve.deflection_m.iter().zip(&curve.force_n) {
@@ -47,7 +58,18 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     Ok(out.into_bytes())
 }
 
+/// LS-DYNA resamples a curve to LCINT even points, 100 by default: a curve with more would
+/// lose its peaks. Predicted curves are even, so as many points keep every one.
+fn discretisation(points: usize) -> usize {
+    if points > 100 { points } else { 0 }
+}
+
 /// A title that fits its line; LS-DYNA reads ASCII.
 fn title(text: &str) -> String {
-    text.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' }).take(TITLE_WIDTH).collect()
+    // A line that began with * or $ would be a keyword or a comment.
+    text.trim_start_matches(['*', '$', ' '])
+        .chars()
+        .map(|c| if c.is_ascii_graphic() { c } else { ' ' })
+        .take(TITLE_WIDTH)
+        .collect()
 }

@@ -82,7 +82,10 @@ struct State {
     force_n: Vec<f64>,
 }
 
-/// Runs the chain from contact, x = 0 for every body, until `duration_s`.
+/// Runs the chain from the first contact (t = 0) for `duration_s`.
+///
+/// x counts from where each body stands before gaps close; bodies move freely up to the
+/// first contact.
 ///
 /// # Errors
 /// [`SimulationError`] names the interface or body.
@@ -98,6 +101,7 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
         largest_m: vec![0.0; interfaces.len()],
         force_n: vec![0.0; interfaces.len()],
     };
+    state.move_to_first_contact(chain);
     // Bodies that touch and close are already on the envelope: a curve may begin above 0.
     for (k, interface) in interfaces.iter().enumerate() {
         if state.deflection_m[k] == 0.0 && state.closing(k) > 0.0 {
@@ -162,6 +166,28 @@ impl State {
     /// Rate of deflection of interface `k`: of the body behind it against what is in front.
     fn closing(&self, k: usize) -> f64 {
         self.v[k] - self.v.get(k + 1).copied().unwrap_or(0.0)
+    }
+
+    /// Free motion until the first gap closes; none if no interface closes.
+    fn move_to_first_contact(&mut self, chain: &Chain) {
+        let time_to = |k: usize, gap_m: f64| match self.closing(k) {
+            closing if closing > 0.0 => gap_m / closing,
+            _ => f64::INFINITY,
+        };
+        let gaps = || chain.interfaces().iter().map(|i| i.gap_m).enumerate();
+        let flight_s = gaps().map(|(k, gap)| time_to(k, gap)).fold(f64::INFINITY, f64::min);
+        if !(flight_s > 0.0 && flight_s.is_finite()) {
+            return;
+        }
+        let touching: Vec<bool> = gaps().map(|(k, gap)| time_to(k, gap) == flight_s).collect();
+        for (x, v) in self.x_m.iter_mut().zip(&self.v) {
+            *x = v * flight_s;
+        }
+        for (k, interface) in chain.interfaces().iter().enumerate() {
+            let moved = self.closing(k) * flight_s - interface.gap_m;
+            // Exactly 0 where contact begins, whatever the rounding.
+            self.deflection_m[k] = if touching[k] { 0.0 } else { moved };
+        }
     }
 
     /// One velocity Verlet step to `time_s`.

@@ -463,16 +463,12 @@ impl Table {
         let wanted = selection.wants(entity) && !self.wanted_columns.is_empty();
         self.channel_of.push(wanted.then_some(self.channels.len()));
         if wanted {
-            self.channels.extend(
-                self.wanted_columns
-                    .iter()
-                    .map(|_| Channel {
-                        values: Vec::new(),
-                        pending: f64::NAN,
-                        seen: 0,
-                        pending_seen: false,
-                    }),
-            );
+            self.channels.extend(self.wanted_columns.iter().map(|_| Channel {
+                values: Vec::new(),
+                pending: f64::NAN,
+                seen: 0,
+                pending_seen: false,
+            }));
         }
         row
     }

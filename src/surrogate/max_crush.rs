@@ -5,12 +5,15 @@ use serde::{Deserialize, Serialize};
 use crate::curve::Envelope;
 
 /// How the maximal crush is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum MaxCrushRule {
     /// Cubic spline through the training cases (reference method).
     Spline,
     /// Monotone cubic through (0, 0) and the training cases (default).
+    #[default]
     Monotone,
     /// Where the predicted curve has taken up the kinetic energy.
     Energy,

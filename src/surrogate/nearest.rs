@@ -48,11 +48,7 @@ impl Nearest {
 
     /// The curve nearest in speed; of two equally near ones the slower.
     fn nearest(&self, speed_m_per_s: f64) -> &NearestCurve {
-        let distance = |c: &NearestCurve| (c.speed_m_per_s - speed_m_per_s).abs();
-        self.curves
-            .iter()
-            .skip(1)
-            .fold(&self.curves[0], |best, c| if distance(c) < distance(best) { c } else { best })
+        &self.curves[nearest(self.curves.iter().map(|c| c.speed_m_per_s), speed_m_per_s)]
     }
 }
 

@@ -129,7 +129,8 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
         warnings.push(Warning::energy_mismatch(energy_over_kinetic));
     }
     let (low, high) = model.range_m_per_s();
-    let nearest = model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
+    let nearest =
+        model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
     Ok(PredictedCurve {
         // A softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),

@@ -90,8 +90,7 @@ fn component(text: &[u8]) -> Option<String> {
     let known = NAMES.iter().find(|(l, _)| *l == label);
     known.map(|(_, name)| name.to_string()).or_else(|| {
         // The tables of mass properties ("row1= …") can have a point in that column.
-        let is_label = label.starts_with(|c: char| c.is_ascii_alphabetic())
-            && !label.contains('=');
+        let is_label = label.starts_with(|c: char| c.is_ascii_alphabetic()) && !label.contains('=');
         let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
         is_label.then(|| words.collect::<Vec<_>>().join("_"))
     })

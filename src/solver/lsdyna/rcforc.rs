@@ -133,7 +133,8 @@ impl Rcforc {
             return;
         }
         // Text behind the last whole column, or a cut file's row that is shorter than others.
-        let end = COLUMNS.iter().filter(|c| c.fits(text, at)).map(|c| at + c.offset + c.width).max();
+        let end =
+            COLUMNS.iter().filter(|c| c.fits(text, at)).map(|c| at + c.offset + c.width).max();
         let rest = text.get(end.unwrap_or(0)..).unwrap_or_default();
         if !rest.trim_ascii().is_empty() || (!moments && (self.moments || !line.ended)) {
             states.damage(
@@ -144,9 +145,9 @@ impl Rcforc {
             return;
         }
         self.moments |= moments;
-        let table = *self.table.get_or_insert_with(|| {
-            states.table("sides", &COLUMNS.each_ref().map(|c| c.component))
-        });
+        let table = *self
+            .table
+            .get_or_insert_with(|| states.table("sides", &COLUMNS.each_ref().map(|c| c.component)));
         let entity = EntityId { id, side: Some(side) };
         // Times have six digits, so two states can print the same one: a repeated side
         // begins a state as well.

@@ -1,0 +1,283 @@
+//! The readers on small texts, each with one peculiarity of real files.
+
+use std::io::Cursor;
+
+use crumple::history::{EntityId, Side};
+use crumple::solver::{NoDataReason, ProblemCode, Selection, SolverFile, read_from};
+
+const HEADER: &str =
+    " title\n                    ls-dyna smp d R14 R14.0_515_8a12796 date 12/12/2022\n";
+
+fn read(format: &str, body: &str) -> SolverFile {
+    read_with(format, body, &Selection::all())
+}
+
+fn read_with(format: &str, body: &str, selection: &Selection) -> SolverFile {
+    let text = format!("{HEADER}{body}");
+    read_from(format, &mut Cursor::new(text.as_bytes()), selection).unwrap()
+}
+
+fn values(file: &SolverFile, id: i64, component: &str) -> Vec<f64> {
+    file.history(Some(EntityId::new(id)), component).unwrap().values.clone()
+}
+
+fn codes(file: &SolverFile) -> Vec<ProblemCode> {
+    file.problems.iter().map(|p| p.code).collect()
+}
+
+/// State line of a nodout.
+fn state(cycle: u32, time: &str) -> String {
+    format!(
+        "\n\n\n n o d a l   p r i n t   o u t   f o r   t i m e  s t e p{cycle:8}                              ( at time {time} )\n\n"
+    )
+}
+
+const TRANSLATIONS: &str = " nodal point  x-disp     y-disp      z-disp      x-vel       y-vel       z-vel      x-accl      y-accl      z-accl      x-coor      y-coor      z-coor\n";
+const ROTATIONS: &str = " nodal point  x-rot      y-rot       z-rot       x-rot vel   y-rot vel   z-rot vel   x-rot acc   y-rot acc   z-rot acc\n";
+
+/// A row of `n` equal fields of 12 columns.
+fn row(id: &str, field: &str, n: usize) -> String {
+    format!("{id:>9} {}\n", format!("{field:>12}").repeat(n))
+}
+
+#[test]
+fn touching_fields_and_rotations() {
+    let mut text = String::new();
+    for (cycle, time, value) in
+        [(1, "0.0000000E+00", "-1.50000E+00"), (9, "1.0000000E-01", "-2.5000-101")]
+    {
+        text += &state(cycle, time);
+        text += TRANSLATIONS;
+        text += &row("7", value, 12);
+        text += &row("12345678", value, 12);
+        text += &state(cycle, time);
+        text += ROTATIONS;
+        text += &row("12345678", "1.00000E-03", 9);
+    }
+    let file = read("nodout", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(&file.time[..], [0.0, 0.1]);
+    assert_eq!(values(&file, 7, "z_coordinate"), [-1.5, -2.5e-101]);
+    assert_eq!(values(&file, 12345678, "rz_acceleration"), [1e-3, 1e-3]);
+    assert!(
+        file.history(Some(EntityId::new(7)), "rx_displacement").is_none(),
+        "node 7 has no rotations"
+    );
+    let windows = read("nodout", &text.replace('\n', "\r\n"));
+    assert_eq!(windows.histories, file.histories);
+}
+
+#[test]
+fn header_only_is_no_error() {
+    for format in ["nodout", "rcforc", "rwforc", "glstat"] {
+        let file = read(format, "");
+        assert_eq!((file.time.len(), file.problems.len()), (0, 0), "{format}");
+        assert_eq!(file.version.as_deref(), Some("smp d R14 R14.0_515_8a12796"));
+        assert_eq!(file.title.as_deref(), Some("title"));
+    }
+}
+
+/// l2a writes ids as `%9ld`: wider ones push the row to the right. However the file is cut,
+/// no digit of a neighbouring field may become a number.
+#[test]
+fn wide_ids_cut_at_every_byte() {
+    let rows = row("1234567890", "-3.70368E-11", 12) + &row("1234567891", "-4.70368E-11", 12);
+    let text = state(1, "0.0000000E+00")
+        + TRANSLATIONS
+        + &rows
+        + &state(2, "1.0000000E+00")
+        + TRANSLATIONS
+        + &rows;
+    let one = Selection { components: Some(vec!["x_displacement".into()]), ..Selection::all() };
+    let whole = read_with("nodout", &text, &one);
+    assert_eq!(values(&whole, 1234567890, "x_displacement"), [-3.70368e-11; 2]);
+    for cut in text.len() - 400..text.len() - 1 {
+        let file = read_with("nodout", &text[..cut], &one);
+        assert_eq!(file.time.len(), 1, "cut at {cut}");
+        assert_eq!(values(&file, 1234567891, "x_displacement"), [-4.70368e-11]);
+        assert!(!file.problems.is_empty());
+    }
+}
+
+#[test]
+fn damage_in_fields_that_are_not_kept_is_found_by_an_audit() {
+    let text = state(1, "0.0000000E+00") + TRANSLATIONS + &row("7", "************", 12);
+    assert_eq!(
+        codes(&read_with("nodout", &text, &Selection::nothing())),
+        [ProblemCode::OverflowedField; 12]
+    );
+    let other = Selection { ids: Some(vec!["8".parse().unwrap()]), ..Selection::all() };
+    assert_eq!(read_with("nodout", &text, &other).problems, [], "only what is kept is read");
+}
+
+#[test]
+fn a_legend_that_is_not_closed_ends_at_the_first_state() {
+    let text =
+        "\n{BEGIN LEGEND}\n Entity #        Title\n        7     slave of nothing\n{XND LEGEND}\n"
+            .to_string()
+            + &state(1, "0.0000000E+00")
+            + TRANSLATIONS
+            + &row("7", "1.00000E+00", 12);
+    let file = read("nodout", &text);
+    assert_eq!(file.time.len(), 1);
+    assert_eq!(file.entities[0].title.as_deref(), Some("slave of nothing"));
+    assert_eq!(codes(&file), [ProblemCode::BadLine]);
+    let cut = read("nodout", "\n{BEGIN LEGEND}\n Entity #        Title\n        7     a\n");
+    assert_eq!(codes(&cut), [ProblemCode::BadLine]);
+    assert_eq!(cut.without_data[0].reason, NoDataReason::LegendOnly);
+}
+
+const FORCES: &str = "  x  1.00000E+00  y -2.00000E+00  z  3.00000E+00 mass  4.00000E+00";
+const MOMENTS: &str = "  mx  5.00000E+00  my  6.00000E+00  mz  7.00000E+00";
+const TIED: &str = "  tied          9  tied area  8.00000E+00";
+
+fn side(name: &str, id: u32, time: &str, rest: &str) -> String {
+    format!("  {name:<6}{id:>11} time {time:>11}{rest}\n")
+}
+
+#[test]
+fn both_generations_of_side_names_and_undefined_contacts() {
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E+00"] {
+        let undefined = " interface number,     10001,is single surface-resultants are undefined\n";
+        text += &undefined.repeat(2);
+        text += &side("slave", 2, time, &format!("{FORCES}{MOMENTS}"));
+        text += &side("SURFB", 2, time, &format!("{FORCES}{MOMENTS}"));
+    }
+    let file = read("rcforc", &text);
+    assert_eq!(file.problems, []);
+    let sides: Vec<_> = file.entities.iter().map(|e| e.id.side).collect();
+    assert_eq!(sides, [Some(Side::SurfA), Some(Side::SurfB)]);
+    assert_eq!(file.without_data[0].id, 10001);
+    assert_eq!(file.time.len(), 2);
+}
+
+/// Two states so close that six digits print one time.
+#[test]
+fn equal_printed_times_are_two_states() {
+    let one = side("slave", 2, "1.00000E+00", FORCES) + &side("master", 2, "1.00000E+00", FORCES);
+    let file = read("rcforc", &one.repeat(3));
+    assert_eq!(&file.time[..], [1.0; 3]);
+    assert_eq!(file.problems, []);
+}
+
+#[test]
+fn old_files_without_moments_and_mixed_tied_contacts() {
+    let old = read("rcforc", &side("slave", 2, "0.00000E+00", FORCES));
+    let names: Vec<&str> = old.components.iter().map(|c| &**c).collect();
+    assert_eq!(names, ["x_force", "y_force", "z_force", "mass"]);
+
+    for tied_first in [true, false] {
+        let tied = format!("{FORCES}{MOMENTS}{TIED}");
+        let plain = format!("{FORCES}{MOMENTS}");
+        let rests = if tied_first { [&tied, &plain] } else { [&plain, &tied] };
+        let mut text = String::new();
+        for time in ["0.00000E+00", "1.00000E+00"] {
+            text += &side("slave", 1, time, rests[0]);
+            text += &side("slave", 2, time, rests[1]);
+        }
+        let file = read("rcforc", &text);
+        assert_eq!(file.problems, [], "tied first: {tied_first}");
+        assert_eq!(file.time.len(), 2);
+        let tied_id = if tied_first { 1 } else { 2 };
+        let of = |id| {
+            let entity = EntityId { id, side: Some(Side::SurfA) };
+            file.history(Some(entity), "tie_area").map(|h| h.values.clone())
+        };
+        assert_eq!(of(tied_id), Some(vec![8.0, 8.0]));
+        assert_eq!(of(3 - tied_id), None);
+    }
+    // Without moments, the tied columns stand behind 51 blanks.
+    let text = side("slave", 1, "0.00000E+00", &format!("{FORCES}{}{TIED}", " ".repeat(51)));
+    let file = read("rcforc", &text);
+    assert_eq!(file.problems, []);
+    assert!(file.components.iter().any(|c| &**c == "tie_count"));
+}
+
+#[test]
+fn a_cut_first_row_is_not_a_state() {
+    let text = side("slave", 1, "0.00000E+00", &format!("{FORCES}{MOMENTS}"));
+    for cut in 1..text.len() - 1 {
+        let file = read("rcforc", &text[..cut]);
+        assert_eq!(file.time.len(), 0, "cut at {cut}");
+        let blank = text[..cut].trim().is_empty();
+        assert_eq!(file.problems.is_empty(), blank, "cut at {cut}");
+    }
+}
+
+#[test]
+fn several_walls_and_a_wide_wall_id() {
+    let heading = "    time       wall#   normal-force    x-force        y-force        z-force\n";
+    let wall = |time: &str, id: &str| {
+        format!(" {time:>11}{id:>8}{}\n", format!("{:>15}", "1.500000E+06").repeat(4))
+    };
+    let text = heading.to_string()
+        + &wall("0.00000E+00", "1")
+        + &wall("0.00000E+00", "123456789")
+        + &wall("1.00000E-03", "1")
+        + &wall("1.00000E-03", "123456789");
+    let file = read("rwforc", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(&file.time[..], [0.0, 1e-3]);
+    assert_eq!(values(&file, 123456789, "normal_force"), [1.5e6; 2]);
+}
+
+fn glstat(time: &str, labels: &[(&str, &str)]) -> String {
+    let mut text = format!(
+        "\n\n dt of cycle       1 is controlled by shell\n\n time...........................{time:>14}\n"
+    );
+    for (label, value) in labels {
+        text += &format!(" {label:.<31}{value}\n");
+    }
+    text
+}
+
+#[test]
+fn labels_may_be_absent_or_repeat_for_every_wall() {
+    let first = glstat(
+        "0.00000E+00",
+        &[
+            ("kinetic energy", "   1.00000E+00"),
+            ("stonewall energy", "   2.00000E+00 wall# 1"),
+            ("stonewall energy", "   3.00000E+00 wall# 2"),
+            ("time per zone cycle.(nanosec)", "             7"),
+        ],
+    );
+    let second = glstat(
+        "1.00000E+00",
+        &[
+            ("kinetic energy", "   4.00000E+00"),
+            ("total energy", "   5.00000E+00"),
+            ("time per zone cycle.(nanosec)", "             7"),
+        ],
+    );
+    let file = read("glstat", &(first + &second));
+    let value = |component: &str| file.history(None, component).unwrap().values.clone();
+    assert_eq!(value("kinetic_energy"), [1.0, 4.0]);
+    assert_eq!(value("stonewall_energy_wall_2")[0], 3.0);
+    assert!(value("stonewall_energy_wall_2")[1].is_nan());
+    assert!(value("total_energy")[0].is_nan());
+    assert_eq!(value("nzc"), [7.0, 7.0]);
+    assert_eq!(codes(&file), [ProblemCode::AbsentComponent; 3], "absence is said");
+}
+
+/// Labels without end must not fill the memory.
+#[test]
+fn labels_are_bounded() {
+    let mut text = String::new();
+    for i in 0..2_000 {
+        let label = format!("invented energy {}", i);
+        text += &glstat("0.00000E+00", &[(&label, "   1.00000E+00")]);
+    }
+    let file = read("glstat", &text);
+    assert!(file.components.len() <= 500);
+    assert!(codes(&file).contains(&ProblemCode::UnreadRows));
+}
+
+#[test]
+fn times_that_go_back_are_named() {
+    let row = |time| side("slave", 2, time, FORCES);
+    let file = read("rcforc", &(row("1.00000E+00") + &row("2.00000E+00") + &row("1.50000E+00")));
+    assert_eq!(&file.time[..], [1.0, 2.0, 1.5]);
+    assert_eq!(codes(&file), [ProblemCode::TimeGoesBack]);
+}
