@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let selection = Selection {
         ids: Some(vec![id.parse()?]),
         components: Some(vec![component.clone()]),
-        audit: false,
+        ..Selection::all()
     };
     let file = solver::read(Path::new(path), None, &selection)?;
     for problem in &file.problems {

@@ -100,6 +100,10 @@ struct Located {
     /// As written in the recipe.
     file: String,
     path: PathBuf,
+    /// Section of a binout; `None` for a text file.
+    section: Option<String>,
+    /// A binout beside the text file that has the same section.
+    twin: Option<(PathBuf, String)>,
     size_bytes: u64,
     blake3: String,
 }
@@ -289,7 +293,7 @@ impl LocatedRun<'_> {
         let lacking =
             |path: &Path, component: &str, file: &SolverFile| ReadError::NoSuchComponent {
                 path: path.into(),
-                format: file.format,
+                format: file.section.clone(),
                 component: component.into(),
                 known: file.components.join(", "),
             };
@@ -341,6 +345,10 @@ impl LocatedRun<'_> {
             ));
         }
         let mut warnings = extracted.warnings;
+        compare_twin(motion_file, &motion, &mut notes, &mut warnings);
+        if self.files.len() > 1 {
+            compare_twin(force_file, &force, &mut notes, &mut warnings);
+        }
         let read: Vec<(&Located, &SolverFile)> = match self.files.len() {
             1 => vec![(motion_file, &motion)],
             _ => vec![(motion_file, &motion), (force_file, &force)],
@@ -376,7 +384,14 @@ impl LocatedRun<'_> {
 
     fn source(&self, located: &Located, file: &SolverFile) -> Source {
         Source {
-            path: format!("{}/{}", self.entry.path, located.file),
+            path: format!(
+                "{}/{}",
+                self.entry.path,
+                located
+                    .path
+                    .file_name()
+                    .map_or(String::new(), |n| n.to_string_lossy().into_owned())
+            ),
             size_bytes: located.size_bytes,
             blake3: located.blake3.clone(),
             format: file.format.into(),
@@ -400,21 +415,28 @@ fn force_component(force: &ForceSource) -> &str {
     }
 }
 
+/// Finds the file a recipe names: the text file of that name, or the section of a binout.
 fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
-    let path = folder.join(name);
-    let io = |source| RunError::Io { path: path.clone(), source };
-    if !path.is_file() {
-        let mut found: Vec<String> = folder
-            .read_dir()
-            .map_err(io)?
-            .filter_map(Result::ok)
-            .map(|e| e.file_name().to_string_lossy().into_owned())
-            .take(100)
-            .collect();
-        found.sort();
-        let found = if found.is_empty() { "no files".into() } else { found.join(", ") };
-        return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
+    let text = folder.join(name);
+    let names = file_names(folder)?;
+    let mut binout = None;
+    for part in names.iter().filter(|n| n.starts_with("binout") && !n.contains('%')) {
+        let path = folder.join(part);
+        let sections = solver::read_sections(&path, None, &Selection::nothing())?;
+        if let Some(section) = sections.iter().find(|s| is_section_of(&s.section, name)) {
+            binout = Some((path, section.section.clone()));
+            break;
+        }
     }
+    let (path, section, twin) = match (text.is_file(), binout) {
+        (true, twin) => (text, None, twin),
+        (false, Some((path, section))) => (path, Some(section), None),
+        (false, None) => {
+            let found = if names.is_empty() { "no files".into() } else { names.join(", ") };
+            return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
+        }
+    };
+    let io = |source| RunError::Io { path: path.clone(), source };
     let mut hasher = blake3::Hasher::new();
     let file = File::open(&path).map_err(io)?;
     hasher.update_reader(file).map_err(io)?;
@@ -423,7 +445,75 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
         size_bytes: hasher.count(),
         blake3: hasher.finalize().to_hex().to_string(),
         path,
+        section,
+        twin,
     })
+}
+
+/// Whether a binout's section holds what the text file of that name holds.
+fn is_section_of(section: &str, name: &str) -> bool {
+    section == name || section.strip_prefix(name).is_some_and(|rest| rest == "/forces")
+}
+
+/// Names in a run's folder, in order.
+fn file_names(folder: &Path) -> Result<Vec<String>, RunError> {
+    let entries =
+        folder.read_dir().map_err(|source| RunError::Io { path: folder.into(), source })?;
+    let mut names: Vec<String> = entries
+        .filter_map(Result::ok)
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .take(1_000)
+        .collect();
+    names.sort();
+    Ok(names)
+}
+
+/// Text and binary of one run agree up to the text's digits.
+const SAME_VALUE: f64 = 1e-5;
+
+/// Says which of text file and binout was read, and whether they differ.
+fn compare_twin(
+    file: &Located,
+    read: &SolverFile,
+    notes: &mut Vec<String>,
+    warnings: &mut Vec<String>,
+) {
+    let shown =
+        |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+    if let Some(section) = &file.section {
+        notes.push(format!("{}: read from section {section} of {}", file.file, shown(&file.path)));
+    }
+    let Some((path, section)) = &file.twin else { return };
+    let ids = read.histories.iter().filter_map(|h| h.entity);
+    let selection = Selection {
+        ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
+        components: Some(read.histories.iter().map(|h| h.component.to_string()).collect()),
+        section: Some(section.clone()),
+        audit: false,
+    };
+    let twin = match solver::read(path, None, &selection) {
+        Ok(twin) => twin,
+        Err(error) => {
+            warnings
+                .push(format!("{}: the binout beside it cannot be compared: {error}", file.file));
+            return;
+        }
+    };
+    let differs = read.histories.iter().any(|a| {
+        let Some(b) = twin.history(a.entity, &a.component) else { return true };
+        let largest = a.values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        a.values.len() != b.values.len()
+            || a.values.iter().zip(&b.values).any(|(a, b)| (a - b).abs() > SAME_VALUE * largest)
+    });
+    if differs {
+        warnings.push(format!(
+            "{} and section {section} of {} differ; the text file was used",
+            file.file,
+            shown(path)
+        ));
+    } else {
+        notes.push(format!("{}: section {section} of {} agrees with it", file.file, shown(path)));
+    }
 }
 
 /// Displacements and, where the file has them, velocities of the recipe's nodes.
@@ -435,6 +525,7 @@ fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, 
     let select = |components: Vec<String>| Selection {
         ids: Some(ids.clone()),
         components: Some(components),
+        section: file.section.clone(),
         audit: false,
     };
     let both = select(vec![component.name().into(), component.velocity().into()]);
@@ -452,8 +543,12 @@ fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadEr
         ForceSource::Body { node, .. } => WantedId { id: node, side: None },
     };
     let component = force_component(source).to_string();
-    let selection =
-        Selection { ids: Some(vec![id]), components: Some(vec![component]), audit: false };
+    let selection = Selection {
+        ids: Some(vec![id]),
+        components: Some(vec![component]),
+        section: file.section.clone(),
+        audit: false,
+    };
     solver::read(&file.path, None, &selection)
 }
 

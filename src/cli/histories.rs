@@ -26,7 +26,7 @@ pub struct Args {
     /// Component to keep, named as in binout, such as x_displacement (default: all)
     #[arg(long = "component")]
     components: Vec<String>,
-    /// Section to read; a text file has one, named like its format
+    /// Section of a binout to read, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
     /// Kind of the file (nodout, rcforc, …), if its content does not tell
@@ -43,15 +43,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         ids: some(args.ids.is_empty()).then(|| args.ids.clone()),
         components: some(args.components.is_empty()).then(|| args.components.clone()),
         audit: false,
+        section: None,
     };
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     if let Some(output) = output {
         keep_input(&args.file, output)?;
     }
     let target = output.map(Target::of).transpose()?;
+    let selection = Selection { section: args.section.clone(), ..selection };
     let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
     if let Some(section) = &args.section
-        && section != file.format
+        && *section != file.section
     {
         return Err(Failure::Usage(format!(
             "{} has no section \"{section}\": it is a text file with the one section \"{}\"",

@@ -28,6 +28,9 @@ pub struct Args {
 struct Report<'a> {
     path: String,
     format: &'a str,
+    /// Section of a binary file; absent for text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    section: Option<&'a str>,
     solver: Option<&'a str>,
     version: Option<&'a str>,
     title: Option<&'a str>,
@@ -49,8 +52,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let mut read = Vec::new();
     let mut outcome = Outcome::Clean;
     for path in &args.files {
-        match solver::read(path, args.format.as_deref(), &Selection::nothing()) {
-            Ok(file) => read.push((path, file)),
+        match solver::read_sections(path, args.format.as_deref(), &Selection::nothing()) {
+            Ok(sections) => read.extend(sections.into_iter().map(|file| (path, file))),
             Err(error) if args.files.len() == 1 => return Err(error.into()),
             Err(error) => {
                 eprintln!("error: {error}");
@@ -74,6 +77,7 @@ fn report<'a>(path: &std::path::Path, file: &'a SolverFile) -> Report<'a> {
     Report {
         path: path.display().to_string(),
         format: file.format,
+        section: (file.section != file.format).then_some(file.section.as_str()),
         solver: file.solver.as_deref(),
         version: file.version.as_deref(),
         title: file.title.as_deref(),
@@ -91,7 +95,10 @@ const SHOWN_ENTITIES: usize = 20;
 
 fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
     writeln!(out, "{}", file.path)?;
-    writeln!(out, "  format      {}", file.format)?;
+    match file.section {
+        Some(section) => writeln!(out, "  format      {}, section {section}", file.format)?,
+        None => writeln!(out, "  format      {}", file.format)?,
+    }
     if let Some(solver) = file.solver {
         writeln!(out, "  solver      {solver} {}", file.version.unwrap_or_default())?;
     }

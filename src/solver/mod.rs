@@ -22,18 +22,76 @@ pub use problem::{Problem, ProblemCode};
 pub struct Format {
     /// Named as the solver names the file.
     pub name: &'static str,
-    /// Whether a line below the header shows that the file is of this kind.
+    reader: Reader,
+}
+
+/// Reads a family of files; one result per section.
+type ReadSections = fn(&mut [Box<dyn BufRead>], &Selection) -> io::Result<Vec<SolverFile>>;
+
+enum Reader {
+    /// Lines of text. A signature is a line below the header that shows the kind.
+    Text {
+        signature: fn(&[u8]) -> bool,
+        read: fn(&mut dyn BufRead, &Selection) -> io::Result<SolverFile>,
+    },
+    /// Bytes, told by the first of them; over one or several files; sections inside.
+    Binary {
+        recognises: fn(&[u8]) -> bool,
+        read: ReadSections,
+    },
+}
+
+const fn text(
+    name: &'static str,
     signature: fn(&[u8]) -> bool,
     read: fn(&mut dyn BufRead, &Selection) -> io::Result<SolverFile>,
+) -> Format {
+    Format { name, reader: Reader::Text { signature, read } }
 }
 
 /// Every file we read. To add one: write its module, add its line here.
 pub const FORMATS: &[Format] = &[
-    Format { name: "nodout", signature: lsdyna::nodout::signature, read: lsdyna::nodout::read },
-    Format { name: "rcforc", signature: lsdyna::rcforc::signature, read: lsdyna::rcforc::read },
-    Format { name: "rwforc", signature: lsdyna::rwforc::signature, read: lsdyna::rwforc::read },
-    Format { name: "glstat", signature: lsdyna::glstat::signature, read: lsdyna::glstat::read },
+    text("nodout", lsdyna::nodout::signature, lsdyna::nodout::read),
+    text("rcforc", lsdyna::rcforc::signature, lsdyna::rcforc::read),
+    text("rwforc", lsdyna::rwforc::signature, lsdyna::rwforc::read),
+    text("glstat", lsdyna::glstat::signature, lsdyna::glstat::read),
+    Format {
+        name: "binout",
+        reader: Reader::Binary {
+            recognises: lsdyna::binout::recognises,
+            read: lsdyna::binout::read,
+        },
+    },
 ];
+
+impl Format {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        match self.reader {
+            Reader::Text { signature, .. } => signature(line),
+            Reader::Binary { .. } => false,
+        }
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        match self.reader {
+            Reader::Text { .. } => false,
+            Reader::Binary { recognises, .. } => recognises(head),
+        }
+    }
+
+    /// One result per section; a text file is one section.
+    fn read(
+        &self,
+        parts: &mut [Box<dyn BufRead>],
+        selection: &Selection,
+    ) -> io::Result<Vec<SolverFile>> {
+        match (&self.reader, parts) {
+            (Reader::Text { read, .. }, [first, ..]) => Ok(vec![read(first, selection)?]),
+            (Reader::Text { .. }, []) => Ok(Vec::new()),
+            (Reader::Binary { read, .. }, parts) => read(parts, selection),
+        }
+    }
+}
 
 /// Which entity is wanted: an id, on both sides of an interface unless one is named.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +140,8 @@ pub struct Selection {
     /// Whether fields that are not kept are read as well, so that the problems of the
     /// whole file are found.
     pub audit: bool,
+    /// Section of a binary file, such as `nodout` or `rwforc/forces`; `None` for all.
+    pub section: Option<String>,
 }
 
 impl Selection {
@@ -92,7 +152,7 @@ impl Selection {
 
     /// No history: only what the file says of itself, and all its problems.
     pub fn nothing() -> Self {
-        Self { ids: Some(Vec::new()), components: Some(Vec::new()), audit: true }
+        Self { ids: Some(Vec::new()), components: Some(Vec::new()), audit: true, section: None }
     }
 
     fn wants(&self, entity: EntityId) -> bool {
@@ -136,6 +196,8 @@ pub enum NoDataReason {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolverFile {
     pub format: &'static str,
+    /// Section of a binary file; of a text file its format's name.
+    pub section: String,
     pub solver: Option<String>,
     pub version: Option<String>,
     pub title: Option<String>,
@@ -164,16 +226,20 @@ pub enum ReadError {
     Io { path: PathBuf, source: io::Error },
     #[error("{path}: {looks_like}: the readers take {known}")]
     UnknownFormat { path: PathBuf, looks_like: String, known: String },
+    #[error("{path}: it has several sections: select one of {known}")]
+    SeveralSections { path: PathBuf, known: String },
+    #[error("{path}: it has no section \"{section}\": it has {known}")]
+    NoSuchSection { path: PathBuf, section: String, known: String },
     #[error("there is no format \"{name}\": the readers take {known}")]
     NoSuchFormat { name: String, known: String },
     #[error("{path}: {format} has no {what} {id}: {near}", what = entity_word(format))]
-    NoSuchEntity { path: PathBuf, format: &'static str, id: WantedId, near: String },
+    NoSuchEntity { path: PathBuf, format: String, id: WantedId, near: String },
     #[error(
         "{path}: interface {id} is a single-surface contact, for which LS-DYNA prints no resultants: ask for a two-sided contact or a force transducer ({with_data})"
     )]
     SingleSurface { path: PathBuf, id: i64, with_data: String },
     #[error("{path}: {format} has no component \"{component}\": it has {known}")]
-    NoSuchComponent { path: PathBuf, format: &'static str, component: String, known: String },
+    NoSuchComponent { path: PathBuf, format: String, component: String, known: String },
 }
 
 /// What an id of this format counts, for messages.
@@ -191,44 +257,108 @@ pub fn format_names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
-/// Reads the selected histories of the file at `path`.
+/// Reads the selected histories of the file at `path`, of one section.
 ///
 /// `format` names the kind of file; without it the kind is told by the content and,
 /// for a file that ends after its header, by the name of the file or of its folder.
 ///
 /// # Errors
-/// [`ReadError`] if the file cannot be opened, its kind is not known, or a selected id
-/// or component is not in it. Damage within the file is no error: see
-/// [`SolverFile::problems`].
+/// [`ReadError`] if the file cannot be opened, its kind is not known, it has several
+/// sections and none is selected, or a selected section, id or component is not in it.
+/// Damage within the file is no error: see [`SolverFile::problems`].
 pub fn read(
     path: &Path,
     format: Option<&str>,
     selection: &Selection,
 ) -> Result<SolverFile, ReadError> {
+    let mut sections = read_sections(path, format, selection)?;
+    if sections.len() > 1 {
+        return Err(ReadError::SeveralSections { path: path.into(), known: listed(&sections) });
+    }
+    match sections.pop() {
+        Some(file) => {
+            check_selection(path, &file, selection)?;
+            Ok(file)
+        }
+        None => Err(ReadError::NoSuchSection {
+            path: path.into(),
+            section: selection.section.clone().unwrap_or_default(),
+            known: listed(&read_sections(path, format, &Selection::nothing())?),
+        }),
+    }
+}
+
+fn listed(sections: &[SolverFile]) -> String {
+    sections.iter().map(|s| s.section.as_str()).collect::<Vec<_>>().join(", ")
+}
+
+/// Reads the selected histories of every section of the file at `path`, or of the one
+/// selected. Ids and components are not held against what a section has.
+///
+/// # Errors
+/// [`ReadError`] if the file cannot be opened or its kind is not known.
+pub fn read_sections(
+    path: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+) -> Result<Vec<SolverFile>, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let format = match format {
         Some(name) => named(name)?,
         None => detect(path)?,
     };
-    let mut input = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
-    let file = (format.read)(&mut input, selection).map_err(io)?;
-    check_selection(path, &file, selection)?;
-    Ok(file)
+    let mut parts: Vec<Box<dyn BufRead>> = Vec::new();
+    for part in family(path, format) {
+        let file = File::open(part).map_err(io)?;
+        parts.push(Box::new(BufReader::with_capacity(1 << 16, file)));
+    }
+    let sections = format.read(&mut parts, selection).map_err(io)?;
+    let is_text = matches!(format.reader, Reader::Text { .. });
+    if is_text || !sections.is_empty() || selection.section.is_some() {
+        return Ok(sections);
+    }
+    Err(ReadError::UnknownFormat {
+        path: path.into(),
+        looks_like: "this is an LSDA container, but it has no section of a binout".into(),
+        known: format_names(),
+    })
 }
 
-/// Reads the selected histories of a format's file from `input`.
+/// The file and, of a binary one, its continuations `name%001`, `name%002`, … as far as
+/// they follow each other.
+fn family(path: &Path, format: &Format) -> Vec<PathBuf> {
+    let mut parts = vec![path.to_path_buf()];
+    if matches!(format.reader, Reader::Binary { .. }) {
+        let continuation = |number: usize| {
+            let mut name = path.as_os_str().to_os_string();
+            name.push(format!("%{number:03}"));
+            PathBuf::from(name)
+        };
+        parts.extend((1..).map(continuation).take_while(|part| part.is_file()));
+    }
+    parts
+}
+
+/// Reads the selected histories of a text format's file from `input`.
 ///
 /// Unlike [`read`], it does not hold the selection against what the file has.
 ///
 /// # Errors
-/// [`ReadError::NoSuchFormat`], or [`ReadError::Io`] (without a path) from `input`.
+/// [`ReadError::NoSuchFormat`] if the format is not one of text, or [`ReadError::Io`]
+/// (without a path) from `input`.
 pub fn read_from(
     format: &str,
     input: &mut dyn BufRead,
     selection: &Selection,
 ) -> Result<SolverFile, ReadError> {
-    (named(format)?.read)(input, selection)
-        .map_err(|source| ReadError::Io { path: PathBuf::new(), source })
+    match named(format)?.reader {
+        Reader::Text { read, .. } => {
+            read(input, selection).map_err(|source| ReadError::Io { path: PathBuf::new(), source })
+        }
+        Reader::Binary { .. } => {
+            Err(ReadError::NoSuchFormat { name: format.into(), known: "text formats".into() })
+        }
+    }
 }
 
 fn named(name: &str) -> Result<&'static Format, ReadError> {
@@ -258,8 +388,8 @@ fn detect(path: &Path) -> Result<&'static Format, ReadError> {
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Err(unknown("this is an HDF5 file"));
     }
-    if let [8 | 4, 8 | 4, 8 | 4, 1, 1, 0 | 1, 0, ..] = head[..] {
-        return Err(unknown("this is an LSDA container such as binout, which is not read yet"));
+    if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
+        return Ok(format);
     }
     let mut lines = lsdyna::line::Lines::new(BufReader::new(io::Cursor::new(head).chain(file)));
     let mut is_lsdyna = false;
@@ -273,7 +403,7 @@ fn detect(path: &Path) -> Result<&'static Format, ReadError> {
         }
         // Titles in a legend are free text, but none begins like a line of a body, whose
         // signature also ends a legend that lost its closing line.
-        if let Some(format) = FORMATS.iter().find(|f| (f.signature)(line.text)) {
+        if let Some(format) = FORMATS.iter().find(|f| f.is_signature(line.text)) {
             return Ok(format);
         }
     }
@@ -313,7 +443,7 @@ fn check_selection(path: &Path, file: &SolverFile, selection: &Selection) -> Res
         }
         return Err(ReadError::NoSuchEntity {
             path: path.into(),
-            format: file.format,
+            format: file.section.clone(),
             id: *wanted,
             near: near_ids(file, wanted.id),
         });
@@ -322,7 +452,7 @@ fn check_selection(path: &Path, file: &SolverFile, selection: &Selection) -> Res
         if !file.components.iter().any(|c| **c == **wanted) {
             return Err(ReadError::NoSuchComponent {
                 path: path.into(),
-                format: file.format,
+                format: file.section.clone(),
                 component: wanted.clone(),
                 known: if file.components.is_empty() {
                     "none, because the file holds no complete state".into()

@@ -27,6 +27,12 @@ pub enum ProblemCode {
     UnexpectedEntity,
     /// A component is missing from some states; its values there are NaN.
     AbsentComponent,
+    /// A binary record that the end of the file cuts.
+    CutRecord,
+    /// A binary record that makes no sense; it or what follows is left out.
+    BadRecord,
+    /// A state that is already there; its first values are kept.
+    RepeatedState,
     /// A label that a state already has; its first value is kept.
     RepeatedLabel,
     /// A state's time is before the one of the state above it; the order of the file is kept.

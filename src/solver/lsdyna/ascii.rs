@@ -139,6 +139,7 @@ fn assemble(
     );
     SolverFile {
         format,
+        section: format.to_string(),
         solver: version.is_some().then(|| "LS-DYNA".to_string()),
         version,
         title,

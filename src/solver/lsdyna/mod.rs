@@ -1,6 +1,7 @@
-//! LS-DYNA's ASCII time histories: one module per file, named as the solver names it.
+//! LS-DYNA's time histories: one module per file, named as the solver names it.
 
 mod ascii;
+pub mod binout;
 pub mod glstat;
 pub(super) mod header;
 pub mod line;

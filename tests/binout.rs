@@ -1,0 +1,290 @@
+//! binout against the text files of the same runs, and damaged containers.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{crumple_fails, crumple_in, crumple_ok, fixture, samples, shared};
+use crumple::history::EntityId;
+use crumple::solver::{ReadError, Selection, SolverFile, read, read_sections};
+
+fn section(path: &Path, name: &str) -> SolverFile {
+    read(path, None, &Selection { section: Some(name.into()), ..Selection::all() }).unwrap()
+}
+
+/// Equal to the digits that the text prints.
+fn agrees(text: &SolverFile, binary: &SolverFile, digits: i32) {
+    assert_eq!(text.time.len(), binary.time.len());
+    let mut compared = 0;
+    for history in &text.histories {
+        let other = binary.history(history.entity, &history.component).unwrap();
+        for (a, b) in history.values.iter().zip(&other.values) {
+            // Half a unit of the last printed digit.
+            let unit = 10f64.powf(b.abs().log10().floor() - f64::from(digits) + 1.0);
+            assert!(
+                a == b || (a - b).abs() <= 0.5000001 * unit,
+                "{}: {a} and {b}",
+                history.label()
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared > 300, "{compared} values");
+}
+
+#[test]
+fn text_and_binary_of_one_run_agree() {
+    let Some(folder) = shared("samples/lsdyna") else { return };
+    for run in ["run0001", "run0010_5"] {
+        let text = folder.join(format!("nodout/rowan_r14.1.1_smp_d_{run}"));
+        let text = read(&text, None, &Selection::all()).unwrap();
+        let binary = folder.join(format!("binout/rowan_r14.1.1_smp_d_{run}"));
+        agrees(&text, &section(&binary, "nodout"), 6);
+    }
+    // l2a printed this one from the binout: seven digits of its float32 values.
+    let text = read(&folder.join("rwforc/l2a_lasso_r12_smp_s"), None, &Selection::all()).unwrap();
+    let binary = section(&folder.join("binout/lasso_r12_smp_s_sph_rwforc"), "rwforc/forces");
+    agrees(&text, &binary, 7);
+}
+
+#[test]
+fn sections_states_and_ids_of_every_sample() {
+    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let states = |name: &str| -> Vec<(String, usize)> {
+        let sections = read_sections(&folder.join(name), None, &Selection::nothing()).unwrap();
+        sections.into_iter().map(|s| (s.section, s.time.len())).collect()
+    };
+    let has = |name: &str, section: &str, count: usize| {
+        let found = states(name);
+        assert!(found.contains(&(section.to_string(), count)), "{name}: {found:?}");
+    };
+    let mpp = "dynareadout_r11.1_mpp_s_nodout_rcforc";
+    has(mpp, "nodout", 601);
+    has(mpp, "rcforc", 601);
+    has("lasso_r7.1.2_smp_s_sph_rwforc", "rcforc", 0);
+    has("lasso_r7.1.2_smp_s_sph_rwforc", "glstat", 88);
+    for (section, count) in [
+        ("spcforc", 10),
+        ("nodout", 8),
+        ("elout/solid", 10),
+        ("matsum", 10),
+        ("bndout/velocity/nodes", 10),
+    ] {
+        has("rowan_r14.1.1_smp_d_run0001", section, count);
+    }
+    has("rowan_r14.1.1_smp_d_run0010_5", "eloutdet/nodavg", 2);
+    let rcforc = section(&folder.join(mpp), "rcforc");
+    assert_eq!(rcforc.entities.len(), 8);
+    assert!(rcforc.entities.iter().all(|e| e.id.side.is_some()));
+    let error = read_sections(
+        &folder.join("pillars_r13_dyna.lsda_not_binout"),
+        None,
+        &Selection::nothing(),
+    );
+    assert!(matches!(error, Err(ReadError::UnknownFormat { .. })));
+}
+
+#[test]
+fn histories_needs_a_section_and_selects() {
+    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let path = folder.join("rowan_r14.1.1_smp_d_run0001");
+    let path = path.to_str().unwrap();
+    let here = Path::new(".");
+    let error = crumple_fails(here, 1, &["histories", path]);
+    assert!(
+        error.contains("it has several sections: select one of nodout, elout/solid"),
+        "{error}"
+    );
+    let error = crumple_fails(here, 1, &["histories", path, "--section", "secforc"]);
+    assert!(error.contains("it has no section \"secforc\": it has nodout"), "{error}");
+    let csv = crumple_ok(
+        here,
+        &["histories", path, "--section", "nodout", "--id", "225", "--component", "z_coordinate"],
+    );
+    assert_eq!(csv.lines().next(), Some("time,z_coordinate[225]"));
+    assert_eq!(csv.lines().count(), 9);
+}
+
+/// A binout written here: a wall's force and a node, `states` states, one table per state.
+struct Written {
+    bytes: Vec<u8>,
+}
+
+impl Written {
+    fn new() -> Self {
+        Self { bytes: vec![8, 8, 8, 1, 1, 1, 0, 0] }
+    }
+
+    fn record(&mut self, command: u8, payload: &[u8]) {
+        self.bytes.extend((payload.len() as u64 + 9).to_le_bytes());
+        self.bytes.push(command);
+        self.bytes.extend(payload);
+    }
+
+    fn cd(&mut self, path: &str) {
+        self.record(2, path.as_bytes());
+    }
+
+    fn data(&mut self, name: &str, kind: u8, values: &[u8]) {
+        let mut payload = vec![kind, name.len() as u8];
+        payload.extend(name.as_bytes());
+        payload.extend(values);
+        self.record(3, &payload);
+    }
+
+    fn reals(&mut self, name: &str, values: &[f64]) {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.data(name, 10, &bytes);
+    }
+
+    fn ids(&mut self, section: &str, ids: &[i64]) {
+        self.cd(&format!("/{section}/metadata"));
+        let bytes: Vec<u8> = ids.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.data("ids", 4, &bytes);
+    }
+}
+
+/// The text histories of a bundled run as a binout.
+fn binout_of(run: &Path) -> Vec<u8> {
+    let all = Selection::all();
+    let nodout = read(&run.join("nodout"), None, &all).unwrap();
+    let rwforc = read(&run.join("rwforc"), None, &all).unwrap();
+    let mut out = Written::new();
+    for (file, section, id) in [(&nodout, "nodout", 900001), (&rwforc, "rwforc/forces", 1)] {
+        out.ids(section, &[id]);
+        for (state, &time) in file.time.iter().enumerate() {
+            out.cd(&format!("/{section}/d{:06}", state + 1));
+            out.reals("time", &[time]);
+            for component in &file.components {
+                let history = file.history(Some(EntityId::new(id)), component).unwrap();
+                out.reals(component, &history.values[state..=state]);
+            }
+        }
+    }
+    out.bytes
+}
+
+/// A study of one bundled run, with the given files in its folder.
+fn study(folder: &Path, files: &[(&str, Vec<u8>)]) -> PathBuf {
+    let text = fs::read_to_string(fixture("fe/lead-car-wall/study.toml")).unwrap();
+    let one: Vec<&str> = text.splitn(3, "[[run]]").take(2).collect();
+    let manifest = folder.join("study.toml");
+    fs::write(&manifest, one.join("[[run]]")).unwrap();
+    fs::create_dir_all(folder.join("25kmh")).unwrap();
+    for (name, bytes) in files {
+        fs::write(folder.join("25kmh").join(name), bytes).unwrap();
+    }
+    manifest
+}
+
+/// One recipe works with either, says which, and says if both are there and differ.
+#[test]
+fn a_recipe_finds_text_or_binout() {
+    let run = fixture("fe/lead-car-wall/25kmh");
+    let binout = binout_of(&run);
+    let text = |name: &str| fs::read(run.join(name)).unwrap();
+    let build = |files: &[(&str, Vec<u8>)]| -> serde_json::Value {
+        let folder = tempfile::tempdir().unwrap();
+        study(folder.path(), files);
+        let report = crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]);
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        report["runs"][0]["case"].clone()
+    };
+    let from_text = build(&[("nodout", text("nodout")), ("rwforc", text("rwforc"))]);
+    let from_binout = build(&[("binout0000", binout.clone())]);
+    for key in ["work_J", "max_deflection_m", "peak_force_N", "speed_m_per_s"] {
+        assert_eq!(from_text[key], from_binout[key], "{key}");
+    }
+    let notes = from_binout["notes"].to_string();
+    assert!(notes.contains("rwforc: read from section rwforc/forces of binout0000"), "{notes}");
+    let both = build(&[
+        ("nodout", text("nodout")),
+        ("rwforc", text("rwforc")),
+        ("binout", binout.clone()),
+    ]);
+    assert!(both["notes"].to_string().contains("section nodout of binout agrees with it"));
+    // Another rwforc beside the binout.
+    let other =
+        fs::read_to_string(run.join("rwforc")).unwrap().replace("2.056506E+06", "2.156506E+06");
+    let both =
+        build(&[("nodout", text("nodout")), ("rwforc", other.into_bytes()), ("binout", binout)]);
+    let warnings = both["warnings"].to_string();
+    assert!(
+        warnings
+            .contains("rwforc and section rwforc/forces of binout differ; the text file was used"),
+        "{warnings}"
+    );
+}
+
+/// A container over two files, and one that ends within a record.
+#[test]
+fn continuations_and_cuts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout0000");
+    let mut first = Written::new();
+    first.ids("nodout", &[7, 8]);
+    let mut second = Written::new();
+    for state in 1..=6u32 {
+        let part = if state <= 3 { &mut first } else { &mut second };
+        part.cd(&format!("/nodout/d{state:06}"));
+        part.reals("time", &[f64::from(state)]);
+        part.reals("x_displacement", &[f64::from(state), -f64::from(state)]);
+    }
+    fs::write(&path, &first.bytes).unwrap();
+    fs::write(folder.path().join("binout0000%001"), &second.bytes).unwrap();
+    let whole = section(&path, "nodout");
+    assert_eq!(&whole.time[..], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(whole.history(Some(EntityId::new(8)), "x_displacement").unwrap().values[5], -6.0);
+    assert_eq!(whole.problems, []);
+    for cut in 9..second.bytes.len() {
+        fs::write(folder.path().join("binout0000%001"), &second.bytes[..cut]).unwrap();
+        let file = section(&path, "nodout");
+        let kept = file.time.len();
+        assert!((3..=6).contains(&kept));
+        for (a, b) in file.histories.iter().zip(&whole.histories) {
+            assert_eq!(a.values, b.values[..kept], "cut at {cut}");
+        }
+        // A cut between two records of a state is seen by what the state lacks.
+        assert!(kept == file.time.len() && (kept < 6 || file.problems.is_empty()));
+    }
+}
+
+/// Samples with flipped bits, zeroed ranges and cuts: a result or an error, never a panic.
+#[test]
+fn damaged_containers_never_panic() {
+    let mut seeds = vec![binout_of(&fixture("fe/lead-car-wall/25kmh"))[..20_000].to_vec()];
+    for path in samples("binout").into_iter().flatten() {
+        let bytes = fs::read(path).unwrap();
+        seeds.push(bytes[..bytes.len().min(60_000)].to_vec());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    let mut state = 7u64;
+    let mut random = |n: usize| {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % n
+    };
+    for seed in &seeds {
+        for _ in 0..300 {
+            let mut bytes = seed.clone();
+            for _ in 0..3 {
+                let at = random(bytes.len());
+                bytes[at] ^= 1 << random(8);
+            }
+            let from = random(bytes.len());
+            let to = (from + random(64)).min(bytes.len());
+            bytes[from..to].fill(0);
+            bytes.truncate(random(bytes.len()) + 1);
+            fs::write(&path, &bytes).unwrap();
+            for selection in [Selection::all(), Selection::nothing()] {
+                for file in read_sections(&path, Some("binout"), &selection).into_iter().flatten() {
+                    assert!(file.histories.iter().all(|h| h.values.len() == file.time.len()));
+                }
+            }
+        }
+    }
+    let output = crumple_in(folder.path(), &["inspect", "binout"]);
+    assert!(output.status.code().is_some_and(|c| c < 4));
+}
