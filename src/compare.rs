@@ -5,9 +5,10 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::curve::rating::l1_ratio;
-use crate::curve::resample::{derivative, interpolate};
+use crate::curve::resample::interpolate;
 use crate::curve::{Case, Envelope, EnvelopeError};
 use crate::dataset::{DatasetError, TrainingSet, nearest};
+use crate::history::derivative;
 use crate::multibody::integrator::DEFAULT_STEP_S;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,

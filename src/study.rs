@@ -100,9 +100,9 @@ struct Located {
     /// As written in the recipe.
     file: String,
     path: PathBuf,
-    /// Section of a binout; `None` for a text file.
+    /// Section of a binary file; `None` for a text file.
     section: Option<String>,
-    /// A binout beside the text file that has the same section.
+    /// A binary file beside the text file that has the same section.
     twin: Option<(PathBuf, String)>,
     size_bytes: u64,
     blake3: String,
@@ -415,12 +415,14 @@ fn force_component(force: &ForceSource) -> &str {
     }
 }
 
-/// Finds the file a recipe names: the text file of that name, or the section of a binout.
+/// Finds the file a recipe names: the text file of that name, or the section of a binout
+/// or of an OpenRadioss T01.
 fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
     let text = folder.join(name);
     let names = file_names(folder)?;
     let mut binout = None;
-    for part in names.iter().filter(|n| n.starts_with("binout") && !n.contains('%')) {
+    let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
+    for part in names.iter().filter(is_binary) {
         let path = folder.join(part);
         let sections = solver::read_sections(&path, None, &Selection::nothing())?;
         if let Some(section) = sections.iter().find(|s| is_section_of(&s.section, name)) {
@@ -494,8 +496,10 @@ fn compare_twin(
     let twin = match solver::read(path, None, &selection) {
         Ok(twin) => twin,
         Err(error) => {
-            warnings
-                .push(format!("{}: the binout beside it cannot be compared: {error}", file.file));
+            warnings.push(format!(
+                "{}: the binary file beside it cannot be compared: {error}",
+                file.file
+            ));
             return;
         }
     };

@@ -27,7 +27,7 @@ const MAY_NAME: [(&str, &[&str]); 16] = [
     ("multibody", &["curve", "unit"]),
     ("export", &["surrogate", "curve", "unit"]),
     ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
-    ("compare", &["multibody", "surrogate", "dataset", "curve", "unit"]),
+    ("compare", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
 ];
 
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {

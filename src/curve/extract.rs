@@ -1,9 +1,9 @@
 //! Extraction: from the histories of one run to its curve.
 
 use super::recipe::{BodyMotion, Filter, Recipe};
-use super::resample::{derivative, interpolate};
+use super::resample::interpolate;
 use super::{Curve, CurveError, EnergyAudit, Masses, cfc, energy, loading};
-use crate::history::History;
+use crate::history::{History, derivative};
 use crate::unit::{Speed, SpeedKind, UnitSystem, km_per_h};
 
 /// The histories of one run, in the solver's units.

@@ -1,4 +1,4 @@
-//! Resampling and differentiation of histories.
+//! Resampling of histories.
 
 /// Why a history has no value at a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -37,20 +37,6 @@ pub fn interpolate(at_s: &[f64], values: &[f64], times_s: &[f64]) -> Result<Vec<
         .collect()
 }
 
-/// Rate of `values` over `time_s`: central differences, one-sided at both ends.
-///
-/// `time_s`: strictly increasing, at least two. Over an output interval `h` the result is
-/// a mean over `2 h`, as the contact forces derived from impulses are.
-pub fn derivative(time_s: &[f64], values: &[f64]) -> Vec<f64> {
-    let last = values.len() - 1;
-    (0..values.len())
-        .map(|i| {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-            (values[b] - values[a]) / (time_s[b] - time_s[a])
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,14 +52,5 @@ mod tests {
             interpolate(&t, &v, &[3.5]).unwrap_err().to_string(),
             "time 3.5 s lies outside the history (0 s to 3 s)"
         );
-    }
-
-    #[test]
-    fn derivative_of_a_parabola_is_exact_inside() {
-        let t: Vec<f64> = (0..10).map(|i| f64::from(i) * 0.5).collect();
-        let v: Vec<f64> = t.iter().map(|t| t * t).collect();
-        let rate = derivative(&t, &v);
-        assert_eq!(rate[4], 4.0);
-        assert_eq!(rate[0], 0.5, "one-sided at the end");
     }
 }

@@ -5,6 +5,7 @@
 //! missing is named. It never prints, panics, or holds more than was selected.
 
 pub mod lsdyna;
+pub mod openradioss;
 mod problem;
 mod states;
 
@@ -35,10 +36,7 @@ enum Reader {
         read: fn(&mut dyn BufRead, &Selection) -> io::Result<SolverFile>,
     },
     /// Bytes, told by the first of them; over one or several files; sections inside.
-    Binary {
-        recognises: fn(&[u8]) -> bool,
-        read: ReadSections,
-    },
+    Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
 }
 
 const fn text(
@@ -61,6 +59,10 @@ pub const FORMATS: &[Format] = &[
             recognises: lsdyna::binout::recognises,
             read: lsdyna::binout::read,
         },
+    },
+    Format {
+        name: "t01",
+        reader: Reader::Binary { recognises: openradioss::recognises, read: openradioss::read },
     },
 ];
 

@@ -1,0 +1,144 @@
+//! OpenRadioss T01 against the text of the same runs, and damaged files.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{crumple_ok, shared};
+use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
+
+fn section(path: &Path, name: &str) -> SolverFile {
+    read(path, None, &Selection { section: Some(name.into()), ..Selection::all() }).unwrap()
+}
+
+/// Every value of the text equals T01's to the six digits (rwforc: seven) that it prints.
+fn agrees(text: &SolverFile, binary: &SolverFile, digits: f64) -> usize {
+    assert_eq!(text.time.len(), binary.time.len());
+    let mut compared = 0;
+    for history in &text.histories {
+        // T01 has no coordinates, no moments, and no total energy.
+        let Some(other) = binary.history(history.entity, &history.component) else { continue };
+        // Where differences cancel, the last bits of the impulses count.
+        let largest = other.values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        for (a, b) in history.values.iter().zip(&other.values) {
+            let unit = 10f64.powf(b.abs().log10().floor() - digits + 1.0);
+            let close = (a - b).abs() <= 0.5000001 * unit + 1e-13 * largest;
+            assert!(a == b || close, "{}: {a} and {b}", history.label());
+            compared += 1;
+        }
+    }
+    compared
+}
+
+#[test]
+fn t01_and_text_of_every_run_agree() {
+    let Some(folder) = shared("fe") else { return };
+    let mut runs = 0;
+    for group in ["lead-car-wall", "lead-car-pair", "vehicle-pair", "train-set"] {
+        for run in folder.join(group).read_dir().unwrap() {
+            let run = run.unwrap().path();
+            if !run.is_dir() {
+                continue;
+            }
+            let t01 = run.join("crashT01");
+            let text = |name: &str| read(&run.join(name), None, &Selection::all()).unwrap();
+            let nodes = agrees(&text("nodout"), &section(&t01, "nodout"), 6.0);
+            assert!(nodes >= 400 * 9 * 4, "{} values of {}", nodes, run.display());
+            let energies = agrees(&text("glstat"), &section(&t01, "glstat"), 6.0);
+            assert!(energies >= 400 * 5);
+            if run.join("rwforc").is_file() {
+                assert!(agrees(&text("rwforc"), &section(&t01, "rwforc"), 7.0) >= 400 * 4);
+            }
+            if group == "lead-car-pair" {
+                assert_eq!(agrees(&text("rcforc"), &section(&t01, "rcforc"), 6.0), 400 * 6);
+            }
+            runs += 1;
+        }
+    }
+    assert!(runs >= 17, "{runs} runs");
+}
+
+/// A study whose folders hold nothing but T01 gives the curves of the text.
+#[test]
+fn a_study_of_t01_alone() {
+    let Some(full) = shared("fe") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = fs::read_to_string(full.join("lead-car-pair/study.toml")).unwrap();
+    fs::write(folder.path().join("study.toml"), manifest).unwrap();
+    for run in ["36kmh", "48kmh", "60kmh", "72kmh"] {
+        fs::create_dir(folder.path().join(run)).unwrap();
+        let source = full.join("lead-car-pair").join(run).join("crashT01");
+        fs::copy(source, folder.path().join(run).join("crashT01")).unwrap();
+    }
+    let build = |study: &str, output: &str| -> serde_json::Value {
+        serde_json::from_str(&crumple_ok(folder.path(), &["build", study, "-o", output, "--json"]))
+            .unwrap()
+    };
+    let binary = build("study.toml", "t01.h5");
+    let text = build(full.join("lead-car-pair/study.toml").to_str().unwrap(), "text.h5");
+    for (a, b) in binary["runs"].as_array().unwrap().iter().zip(text["runs"].as_array().unwrap()) {
+        for key in ["work_J", "max_deflection_m", "peak_force_N"] {
+            let (a, b) = (a["case"][key].as_f64().unwrap(), b["case"][key].as_f64().unwrap());
+            assert!((a / b - 1.0).abs() < 1e-5, "{key}: {a} and {b}");
+        }
+        assert!(a["case"]["notes"].to_string().contains("read from section nodout of crashT01"));
+        assert!(
+            b["case"]["notes"].to_string().contains("section rcforc of crashT01 agrees with it")
+        );
+    }
+}
+
+#[test]
+fn cut_anywhere_gives_the_whole_states() {
+    let Some(full) = shared("fe") else { return };
+    let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    fs::write(&path, &bytes).unwrap();
+    let whole = section(&path, "nodout");
+    let mut kept_before = 0;
+    for step in 0..400 {
+        let cut = bytes.len() * step / 400;
+        fs::write(&path, &bytes[..cut]).unwrap();
+        let Ok(sections) = read_sections(&path, Some("t01"), &Selection::all()) else { panic!() };
+        let Some(file) = sections.iter().find(|s| s.section == "nodout") else { continue };
+        let kept = file.time.len();
+        assert!(kept >= kept_before);
+        kept_before = kept;
+        for (a, b) in file.histories.iter().zip(&whole.histories) {
+            assert_eq!(a.values, b.values[..kept], "cut at {cut}");
+        }
+        // Every state is 1 of 400 equal parts, so hardly any cut falls between two.
+        let said = file.problems.iter().any(|p| p.code == ProblemCode::IncompleteState);
+        assert!(said || kept == 0 || cut == 0, "cut at {cut}");
+    }
+    assert!(kept_before > 390);
+}
+
+#[test]
+fn damaged_files_never_panic() {
+    let Some(full) = shared("fe") else { return };
+    let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
+    let bytes = &bytes[..8_000];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    let mut state = 3u64;
+    let mut random = |n: usize| {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % n
+    };
+    for _ in 0..2_000 {
+        let mut copy = bytes.to_vec();
+        for _ in 0..4 {
+            let at = random(copy.len());
+            copy[at] ^= 1 << random(8);
+        }
+        copy.truncate(random(copy.len()) + 1);
+        fs::write(&path, &copy).unwrap();
+        for file in read_sections(&path, Some("t01"), &Selection::all()).into_iter().flatten() {
+            assert!(file.histories.iter().all(|h| h.values.len() == file.time.len()));
+        }
+    }
+}
