@@ -182,6 +182,74 @@ fn glstat_values_are_the_files() {
     }
 }
 
+#[test]
+fn secforc_values_are_the_files() {
+    let Some(files) = samples("secforc") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        let kinds = [
+            ["x_force", "y_force", "z_force", "total_force"],
+            ["x_moment", "y_moment", "z_moment", "total_moment"],
+            ["x_centroid", "y_centroid", "z_centroid", "area"],
+        ];
+        let mut kind = 0;
+        let mut section = String::new();
+        for line in text.lines().skip(2).filter(|l| numbers(l).len() >= 4) {
+            let mut values = numbers(line);
+            if values.len() == 5 {
+                section = line.split_whitespace().next().unwrap().to_string();
+                push(&mut theirs, "time".into(), values.remove(0));
+                kind = 0;
+            }
+            for (name, value) in kinds[kind].iter().zip(values) {
+                push(&mut theirs, format!("{name}[{section}]"), value);
+            }
+            kind += 1;
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn matsum_values_are_the_files() {
+    let Some(files) = samples("matsum") else { return };
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        let mut part = String::new();
+        for line in text.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            if words.first() == Some(&"time") {
+                push(&mut theirs, "time".into(), numbers(line)[0]);
+            }
+            if words.first() == Some(&"mat.#=") {
+                part = words[1].to_string();
+            }
+            for pair in words.windows(2).filter(|w| w[0].ends_with('=') && w[1].contains('.')) {
+                let name = match pair[0] {
+                    "inten=" => "internal_energy",
+                    "kinen=" => "kinetic_energy",
+                    "eroded_ie=" => "eroded_internal_energy",
+                    "eroded_ke=" => "eroded_kinetic_energy",
+                    "hgeng=" => "hourglass_energy",
+                    "+mass=" => "added_mass",
+                    "eroded_he=" => "eroded_hourglass_energy",
+                    "x-mom=" => "x_momentum",
+                    "y-mom=" => "y_momentum",
+                    "z-mom=" => "z_momentum",
+                    "x-rbv=" => "x_rbvelocity",
+                    "y-rbv=" => "y_rbvelocity",
+                    "z-rbv=" => "z_rbvelocity",
+                    _ => continue,
+                };
+                push(&mut theirs, format!("{name}[{part}]"), pair[1].parse().unwrap());
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
 /// States, first and last time, ids of every sample, counted by hand (`grep -c` and `head`).
 #[test]
 fn inspect_says_states_times_and_ids() {

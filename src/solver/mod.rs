@@ -52,7 +52,9 @@ pub const FORMATS: &[Format] = &[
     text("nodout", lsdyna::nodout::signature, lsdyna::nodout::read),
     text("rcforc", lsdyna::rcforc::signature, lsdyna::rcforc::read),
     text("rwforc", lsdyna::rwforc::signature, lsdyna::rwforc::read),
+    text("secforc", lsdyna::secforc::signature, lsdyna::secforc::read),
     text("glstat", lsdyna::glstat::signature, lsdyna::glstat::read),
+    text("matsum", lsdyna::matsum::signature, lsdyna::matsum::read),
     Format {
         name: "binout",
         reader: Reader::Binary {
@@ -248,7 +250,9 @@ pub enum ReadError {
 fn entity_word(format: &str) -> &'static str {
     match format {
         "nodout" => "node",
-        "rwforc" => "rigid wall",
+        "rwforc" | "rwforc/forces" => "rigid wall",
+        "secforc" => "section",
+        "matsum" => "part",
         "rcforc" => "interface",
         _ => "entity",
     }

@@ -5,6 +5,8 @@ pub mod binout;
 pub mod glstat;
 pub(super) mod header;
 pub mod line;
+pub mod matsum;
 pub mod nodout;
 pub mod rcforc;
 pub mod rwforc;
+pub mod secforc;
