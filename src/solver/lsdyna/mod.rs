@@ -5,6 +5,7 @@ pub mod binout;
 pub mod glstat;
 pub(super) mod header;
 pub mod line;
+mod lsda;
 pub mod matsum;
 pub mod nodout;
 pub mod rcforc;
