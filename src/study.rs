@@ -424,7 +424,13 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
     let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
     for part in names.iter().filter(is_binary) {
         let path = folder.join(part);
-        let sections = solver::read_sections(&path, None, &Selection::nothing())?;
+        let sections = match solver::read_sections(&path, None, &Selection::nothing()) {
+            Ok(sections) => sections,
+            // Only named like one; or broken, which matters where the text is not there.
+            Err(ReadError::UnknownFormat { .. }) => continue,
+            Err(_) if text.is_file() => continue,
+            Err(error) => return Err(error.into()),
+        };
         if let Some(section) = sections.iter().find(|s| is_section_of(&s.section, name)) {
             binout = Some((path, section.section.clone()));
             break;

@@ -209,6 +209,15 @@ fn a_recipe_finds_text_or_binout() {
         ("binout", binout.clone()),
     ]);
     assert!(both["notes"].to_string().contains("section nodout of binout agrees with it"));
+    // Files that are only named like a binout or T01 do not spoil the run.
+    let strangers =
+        [("binout.txt", b"notes".to_vec()), ("runT01", Vec::new()), ("binout9", vec![8; 3])];
+    let mut files = vec![("nodout", text("nodout")), ("rwforc", text("rwforc"))];
+    files.extend(strangers.clone());
+    assert_eq!(build(&files)["work_J"], from_text["work_J"]);
+    let mut files = vec![("binout0000", binout.clone())];
+    files.extend(strangers);
+    assert_eq!(build(&files)["work_J"], from_text["work_J"]);
     // Another rwforc beside the binout.
     let other =
         fs::read_to_string(run.join("rwforc")).unwrap().replace("2.056506E+06", "2.156506E+06");

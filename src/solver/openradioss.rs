@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use std::io::{self, BufRead, Read};
 use std::sync::Arc;
 
+use super::lsdyna::nodout::TRANSLATIONS;
 use super::problem::{ProblemCode, Problems};
 use super::{Entity, Selection, SolverFile};
 use crate::history::{EntityId, History, Side, derivative};
@@ -23,18 +24,8 @@ const NODES: i32 = 0;
 const INTERFACE: i32 = 101;
 const RIGID_WALL: i32 = 102;
 
-/// Node variables by code, from 1.
-const NODE_COMPONENTS: [&str; 9] = [
-    "x_displacement",
-    "y_displacement",
-    "z_displacement",
-    "x_velocity",
-    "y_velocity",
-    "z_velocity",
-    "x_acceleration",
-    "y_acceleration",
-    "z_acceleration",
-];
+/// Node variables by code, from 1: those of a nodout without its coordinates.
+const NODE_COMPONENTS: &[&str] = TRANSLATIONS.split_at(9).0;
 /// Global variables in their order, named as in `glstat` where it has them.
 const GLOBAL_COMPONENTS: [&str; 22] = [
     "internal_energy",

@@ -17,7 +17,8 @@ use crate::solver::{Selection, SolverFile};
 const STATE: &[u8] = b" n o d a l   p r i n t   o u t   f o r   t i m e  s t e p";
 const COLUMN_LINE: &[u8] = b" nodal point";
 
-const TRANSLATIONS: [&str; 12] = [
+/// Components of the translational block, in order of its columns.
+pub(in crate::solver) const TRANSLATIONS: [&str; 12] = [
     "x_displacement",
     "y_displacement",
     "z_displacement",
