@@ -497,7 +497,7 @@ fn compare_twin(
         ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
         components: Some(read.histories.iter().map(|h| h.component.to_string()).collect()),
         section: Some(section.clone()),
-        audit: false,
+        ..Selection::all()
     };
     let twin = match solver::read(path, None, &selection) {
         Ok(twin) => twin,
@@ -536,7 +536,7 @@ fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, 
         ids: Some(ids.clone()),
         components: Some(components),
         section: file.section.clone(),
-        audit: false,
+        ..Selection::all()
     };
     let both = select(vec![component.name().into(), component.velocity().into()]);
     match solver::read(&file.path, None, &both) {
@@ -557,7 +557,7 @@ fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadEr
         ids: Some(vec![id]),
         components: Some(vec![component]),
         section: file.section.clone(),
-        audit: false,
+        ..Selection::all()
     };
     solver::read(&file.path, None, &selection)
 }

@@ -2,14 +2,12 @@
 
 mod common;
 
-use std::io::Cursor;
-
 use common::{fixture, samples};
 use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
 use proptest::prelude::*;
 
 fn read(format: &str, bytes: &[u8]) -> SolverFile {
-    read_from(format, &mut Cursor::new(bytes), &Selection::all()).unwrap()
+    read_from(format, &bytes, &Selection::all()).unwrap()
 }
 
 /// Byte offsets at which the states of a nodout begin: its state lines, one per state.

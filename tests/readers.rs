@@ -1,7 +1,5 @@
 //! The readers on small texts, each with one peculiarity of real files.
 
-use std::io::Cursor;
-
 use crumple::history::{EntityId, Side};
 use crumple::solver::{NoDataReason, ProblemCode, Selection, SolverFile, read_from};
 
@@ -14,7 +12,7 @@ fn read(format: &str, body: &str) -> SolverFile {
 
 fn read_with(format: &str, body: &str, selection: &Selection) -> SolverFile {
     let text = format!("{HEADER}{body}");
-    read_from(format, &mut Cursor::new(text.as_bytes()), selection).unwrap()
+    read_from(format, &text.as_bytes(), selection).unwrap()
 }
 
 fn values(file: &SolverFile, id: i64, component: &str) -> Vec<f64> {

@@ -1,23 +1,27 @@
 //! Solver files: from bytes to [`History`].
 //!
-//! A reader takes `BufRead` and a [`Selection`], returns a [`SolverFile`], and treats
+//! A reader takes a [`Source`] and a [`Selection`], returns a [`SolverFile`], and treats
 //! damage as part of the result ([`Problem`]): complete states are returned, what is
 //! missing is named. It never prints, panics, or holds more than was selected.
 
 pub mod lsdyna;
 pub mod openradioss;
 mod problem;
+pub mod source;
 mod states;
+mod zeros;
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Serialize;
 
 use crate::history::{EntityId, History, Side};
+pub use lsdyna::nodout::Blocks;
 pub use problem::{Problem, ProblemCode};
+pub use source::Access;
+use source::{Source, Stream};
 
 /// One kind of file: its name, how to recognise it, how to read it.
 pub struct Format {
@@ -27,13 +31,13 @@ pub struct Format {
 }
 
 /// Reads a family of files; one result per section.
-type ReadSections = fn(&mut [Box<dyn BufRead>], &Selection) -> io::Result<Vec<SolverFile>>;
+type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
 
 enum Reader {
     /// Lines of text. A signature is a line below the header that shows the kind.
     Text {
         signature: fn(&[u8]) -> bool,
-        read: fn(&mut dyn BufRead, &Selection) -> io::Result<SolverFile>,
+        read: fn(&dyn Source, &Selection) -> io::Result<SolverFile>,
     },
     /// Bytes, told by the first of them; over one or several files; sections inside.
     Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
@@ -42,7 +46,7 @@ enum Reader {
 const fn text(
     name: &'static str,
     signature: fn(&[u8]) -> bool,
-    read: fn(&mut dyn BufRead, &Selection) -> io::Result<SolverFile>,
+    read: fn(&dyn Source, &Selection) -> io::Result<SolverFile>,
 ) -> Format {
     Format { name, reader: Reader::Text { signature, read } }
 }
@@ -86,11 +90,11 @@ impl Format {
     /// One result per section; a text file is one section.
     fn read(
         &self,
-        parts: &mut [Box<dyn BufRead>],
+        parts: &[Box<dyn Source>],
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         match (&self.reader, parts) {
-            (Reader::Text { read, .. }, [first, ..]) => Ok(vec![read(first, selection)?]),
+            (Reader::Text { read, .. }, [first, ..]) => Ok(vec![read(&**first, selection)?]),
             (Reader::Text { .. }, []) => Ok(Vec::new()),
             (Reader::Binary { read, .. }, parts) => read(parts, selection),
         }
@@ -146,6 +150,8 @@ pub struct Selection {
     pub audit: bool,
     /// Section of a binary file, such as `nodout` or `rwforc/forces`; `None` for all.
     pub section: Option<String>,
+    /// How the file's bytes are read.
+    pub access: Access,
 }
 
 impl Selection {
@@ -156,7 +162,7 @@ impl Selection {
 
     /// No history: only what the file says of itself, and all its problems.
     pub fn nothing() -> Self {
-        Self { ids: Some(Vec::new()), components: Some(Vec::new()), audit: true, section: None }
+        Self { ids: Some(Vec::new()), components: Some(Vec::new()), audit: true, ..Self::default() }
     }
 
     fn wants(&self, entity: EntityId) -> bool {
@@ -309,16 +315,8 @@ pub fn read_sections(
     selection: &Selection,
 ) -> Result<Vec<SolverFile>, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
-    let format = match format {
-        Some(name) => named(name)?,
-        None => detect(path)?,
-    };
-    let mut parts: Vec<Box<dyn BufRead>> = Vec::new();
-    for part in family(path, format) {
-        let file = File::open(part).map_err(io)?;
-        parts.push(Box::new(BufReader::with_capacity(1 << 16, file)));
-    }
-    let sections = format.read(&mut parts, selection).map_err(io)?;
+    let (format, parts) = open(path, format, selection)?;
+    let sections = format.read(&parts, selection).map_err(io)?;
     let is_text = matches!(format.reader, Reader::Text { .. });
     if is_text || !sections.is_empty() || selection.section.is_some() {
         return Ok(sections);
@@ -330,10 +328,56 @@ pub fn read_sections(
     })
 }
 
-/// The file and, of a binary one, its continuations `name%001`, `name%002`, … as far as
-/// they follow each other.
+/// Opens a file and what continues it.
+fn open(
+    path: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+) -> Result<(&'static Format, Vec<Box<dyn Source>>), ReadError> {
+    let io = |source| ReadError::Io { path: path.into(), source };
+    if path.is_dir() {
+        return Err(ReadError::UnknownFormat {
+            path: path.into(),
+            looks_like: "this is a folder".into(),
+            known: format_names(),
+        });
+    }
+    let first = source::open(path, selection.access).map_err(io)?;
+    let format = match format {
+        Some(name) => named(name)?,
+        None => detect(path, &*first)?,
+    };
+    let mut parts = vec![first];
+    for part in family(path, format) {
+        parts.push(source::open(&part, selection.access).map_err(io)?);
+    }
+    Ok((format, parts))
+}
+
+/// Opens the file at `path` for reading state by state, if it is a nodout without damage
+/// that is laid out evenly; [`read`] takes any other.
+///
+/// # Errors
+/// As [`read`].
+pub fn blocks(
+    path: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+) -> Result<Option<Blocks>, ReadError> {
+    let (format, mut parts) = open(path, format, selection)?;
+    let Some(source) = parts.pop().filter(|_| format.name == "nodout") else { return Ok(None) };
+    let io = |source| ReadError::Io { path: path.into(), source };
+    let blocks = Blocks::open(source, selection).map_err(io)?;
+    if let Some(blocks) = &blocks {
+        check_selection(path, &blocks.file, selection)?;
+    }
+    Ok(blocks)
+}
+
+/// Of a binary file its continuations `name%001`, `name%002`, … as far as they follow each
+/// other.
 fn family(path: &Path, format: &Format) -> Vec<PathBuf> {
-    let mut parts = vec![path.to_path_buf()];
+    let mut parts = Vec::new();
     if matches!(format.reader, Reader::Binary { .. }) {
         let continuation = |number: usize| {
             let mut name = path.as_os_str().to_os_string();
@@ -345,21 +389,21 @@ fn family(path: &Path, format: &Format) -> Vec<PathBuf> {
     parts
 }
 
-/// Reads the selected histories of a text format's file from `input`.
+/// Reads the selected histories of a text format's file from `source`.
 ///
 /// Unlike [`read`], it does not hold the selection against what the file has.
 ///
 /// # Errors
 /// [`ReadError::NoSuchFormat`] if the format is not one of text, or [`ReadError::Io`]
-/// (without a path) from `input`.
+/// (without a path) from `source`.
 pub fn read_from(
     format: &str,
-    input: &mut dyn BufRead,
+    source: &dyn Source,
     selection: &Selection,
 ) -> Result<SolverFile, ReadError> {
     match named(format)?.reader {
         Reader::Text { read, .. } => {
-            read(input, selection).map_err(|source| ReadError::Io { path: PathBuf::new(), source })
+            read(source, selection).map_err(|source| ReadError::Io { path: PathBuf::new(), source })
         }
         Reader::Binary { .. } => {
             Err(ReadError::NoSuchFormat { name: format.into(), known: "text formats".into() })
@@ -378,26 +422,22 @@ fn named(name: &str) -> Result<&'static Format, ReadError> {
 /// few enough that a large foreign file is refused at once.
 const DETECT_LINES: u64 = 100_000;
 
-fn detect(path: &Path) -> Result<&'static Format, ReadError> {
+fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let unknown = |looks_like: &str| ReadError::UnknownFormat {
         path: path.into(),
         looks_like: looks_like.into(),
         known: format_names(),
     };
-    if path.is_dir() {
-        return Err(unknown("this is a folder"));
-    }
-    let mut file = File::open(path).map_err(io)?;
     let mut head = Vec::new();
-    file.by_ref().take(16).read_to_end(&mut head).map_err(io)?;
+    Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Err(unknown("this is an HDF5 file"));
     }
     if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
         return Ok(format);
     }
-    let mut lines = lsdyna::line::Lines::new(BufReader::new(io::Cursor::new(head).chain(file)));
+    let mut lines = lsdyna::line::Lines::new(Stream::new(source));
     let mut is_lsdyna = false;
     while let Some(line) = lines.next_line().map_err(io)? {
         if line.number > DETECT_LINES {

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use super::lsdyna::nodout::TRANSLATIONS;
 use super::problem::{ProblemCode, Problems};
+use super::source::{Source, Stream};
 use super::{Entity, Selection, SolverFile};
 use crate::history::{EntityId, History, Side, derivative};
 
@@ -63,8 +64,9 @@ pub fn recognises(head: &[u8]) -> bool {
 }
 
 /// Reads the selected histories of every section, or of the one selected.
-pub fn read(parts: &mut [Box<dyn BufRead>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
-    let Some(input) = parts.first_mut() else { return Ok(Vec::new()) };
+pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
+    let Some(source) = parts.first() else { return Ok(Vec::new()) };
+    let input = Stream::new(&**source);
     let mut problems = Problems::default();
     let mut records = Records { input, at: 0 };
     let Some(header) = Header::read(&mut records)? else {
@@ -84,7 +86,7 @@ pub fn read(parts: &mut [Box<dyn BufRead>], selection: &Selection) -> io::Result
 
 /// Records: 4-byte length, that many bytes, the same length again, all big-endian.
 struct Records<'a> {
-    input: &'a mut Box<dyn BufRead>,
+    input: Stream<'a>,
     at: u64,
 }
 
@@ -102,7 +104,7 @@ impl Records<'_> {
     fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
         let Some(length) = self.length()? else { return Ok(None) };
         let mut bytes = Vec::new();
-        self.input.take(length as u64).read_to_end(&mut bytes)?;
+        self.input.by_ref().take(length as u64).read_to_end(&mut bytes)?;
         if bytes.len() < length || self.length()? != Some(length) {
             return Ok(None);
         }

@@ -25,18 +25,24 @@ pub enum ProblemCode {
     BadField,
     /// A row of an entity that the first state does not have; it is left out.
     UnexpectedEntity,
+    /// Entities are missing from some states (erosion, failure); their values there are NaN.
+    AbsentEntity,
     /// A component is missing from some states; its values there are NaN.
     AbsentComponent,
     /// A binary record that the end of the file cuts.
     CutRecord,
     /// A binary record that makes no sense; it or what follows is left out.
     BadRecord,
-    /// A state that is already there; its first values are kept.
+    /// States that a restart wrote again; the last ones are kept.
     RepeatedState,
     /// A label that a state already has; its first value is kept.
     RepeatedLabel,
-    /// A state's time is before the one of the state above it; the order of the file is kept.
+    /// A single state's time is before the one of the state above it; the order of the file
+    /// is kept.
     TimeGoesBack,
+    /// Values that are zero between others that are not: the file was overwritten there, or
+    /// the quantity really vanished. They are returned as they are.
+    SuspectZeros,
     /// Rows of a layout that is not read.
     UnreadRows,
     /// The second line is not LS-DYNA's version line.
@@ -69,6 +75,8 @@ impl fmt::Display for Problem {
                 write!(f, ", columns {from}-{to}")?;
             }
             write!(f, ": ")?;
+        } else if let Some(byte) = self.byte {
+            write!(f, "byte {byte}: ")?;
         }
         f.write_str(&self.message)
     }
@@ -113,6 +121,23 @@ impl Problems {
             columns,
             message,
         });
+    }
+
+    /// A problem of a binary file, which has no lines.
+    pub fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
+        self.add(code, None, None, message);
+        if self.dropped == 0
+            && let Some(last) = self.kept.last_mut()
+        {
+            last.byte = Some(byte);
+        }
+    }
+
+    /// Adds the problems of another list behind these.
+    pub fn append(&mut self, other: Self) {
+        let room = MAX_KEPT - self.kept.len();
+        self.dropped += other.dropped + other.kept.len().saturating_sub(room);
+        self.kept.extend(other.kept.into_iter().take(room));
     }
 
     pub fn into_list(mut self) -> Vec<Problem> {

@@ -2,7 +2,8 @@
 //!
 //! A file is a sequence of states; a state is one row per entity in one or more tables
 //! (`nodout` has two: translations and rotations). The first whole state fixes the
-//! entities of each table. Invariant: every kept history has one value per kept state.
+//! entities of each table, unless its rows may come and go (eroded elements). Invariant:
+//! every kept history has one value per kept state.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -21,6 +22,11 @@ pub struct Collected {
     pub problems: Vec<Problem>,
 }
 
+/// Values that states may lack, beyond so many times the values they have: more are no
+/// erosion but damage, and would fill the memory.
+const ABSENT_CELLS: usize = 10_000_000;
+const ABSENT_PER_PRESENT: usize = 20;
+
 /// Labels kept of a file of labels; real ones have about thirty.
 const MAX_LABELS: usize = 500;
 
@@ -34,6 +40,12 @@ struct Table {
     seen_columns: Vec<bool>,
     rows: Vec<EntityId>,
     row_of: HashMap<EntityId, usize>,
+    /// Whether a state may lack rows, or have new ones: elements erode, welds fail.
+    varies: bool,
+    /// Last row of the state above; a state that is cut lacks it.
+    last_row: Option<usize>,
+    /// Per row: kept states that have it.
+    states_with: Vec<usize>,
     /// Per row: its first channel in `channels`, or `None` if the entity is not selected.
     channel_of: Vec<Option<usize>>,
     channels: Vec<Channel>,
@@ -65,6 +77,8 @@ struct Pending {
     time: Option<f64>,
     place: Place,
     damaged: bool,
+    /// Whether it has a row that the first whole state does not have.
+    disagrees: bool,
     /// Labels seen in this state, in order of the file.
     labels: usize,
 }
@@ -78,11 +92,24 @@ pub struct States<'a> {
     pending: Option<Pending>,
     /// Whether a whole state has fixed the entities.
     sealed: bool,
+    /// Whole states to leave out before the first that is kept.
+    skip: usize,
+    /// States left out because their rows are not those of the first whole state.
+    disagreeing: usize,
+    /// Whether times have enough digits to tell neighbouring states apart.
+    distinct_times: bool,
+    /// Whether a state without rows is whole.
+    may_be_empty: bool,
+    /// Values kept that the file has, and that it does not have (NaN).
+    present_cells: usize,
+    absent_cells: usize,
+    /// Places of the kept states' beginnings.
+    places: Vec<Place>,
     pub problems: Problems,
 }
 
 /// Index of a table, from [`States::table`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TableId(usize);
 
 impl<'a> States<'a> {
@@ -94,8 +121,52 @@ impl<'a> States<'a> {
             time: Vec::new(),
             pending: None,
             sealed: false,
+            skip: 0,
+            disagreeing: 0,
+            distinct_times: false,
+            may_be_empty: false,
+            present_cells: 0,
+            absent_cells: 0,
+            places: Vec::new(),
             problems: Problems::default(),
         }
+    }
+
+    /// Leaves out the first `count` whole states.
+    pub fn skip(&mut self, count: usize) {
+        self.skip = count;
+    }
+
+    /// Says that equal times are the same state, written again.
+    pub fn times_are_distinct(&mut self) {
+        self.distinct_times = true;
+    }
+
+    /// Says that a state without rows is whole.
+    pub fn may_be_empty(&mut self) {
+        self.may_be_empty = true;
+    }
+
+    /// Whether more states disagree with the first whole state than agree with it.
+    pub fn is_disputed(&self) -> bool {
+        self.disagreeing > self.time.len()
+    }
+
+    /// Number of states kept so far.
+    pub fn kept(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether the whole file is to be looked through for problems.
+    pub fn is_audit(&self) -> bool {
+        self.selection.audit
+    }
+
+    /// Adds a table whose rows may come and go.
+    pub fn varying_table(&mut self, name: &'static str, components: &[&str]) -> TableId {
+        let id = self.table(name, components);
+        self.tables[id.0].varies = true;
+        id
     }
 
     /// Adds a table. `name` is for messages; `components` name its columns.
@@ -111,6 +182,9 @@ impl<'a> States<'a> {
             wanted_columns,
             rows: Vec::new(),
             row_of: HashMap::new(),
+            varies: false,
+            last_row: None,
+            states_with: Vec::new(),
             channel_of: Vec::new(),
             channels: Vec::new(),
             filled: Vec::new(),
@@ -123,7 +197,7 @@ impl<'a> States<'a> {
     /// Ends the pending state and starts one at `time` (`None`: not yet known).
     pub fn begin(&mut self, time: Option<f64>, place: Place) {
         self.close(false);
-        self.pending = Some(Pending { time, place, damaged: false, labels: 0 });
+        self.pending = Some(Pending { time, place, damaged: false, disagrees: false, labels: 0 });
     }
 
     /// Time of the pending state.
@@ -186,8 +260,13 @@ impl<'a> States<'a> {
         let table = &mut self.tables[table.0];
         let row = match table.find(entity) {
             Some(row) => row,
-            None if !self.sealed => table.add_row(entity, self.selection),
+            None if !self.sealed || table.varies => {
+                table.add_row(entity, self.selection, self.time.len())
+            }
             None => {
+                if let Some(pending) = &mut self.pending {
+                    pending.disagrees = true;
+                }
                 self.problems.add(
                     ProblemCode::UnexpectedEntity,
                     Some(line.into()),
@@ -267,11 +346,27 @@ impl<'a> States<'a> {
     }
 
     /// Ends the pending state; keeps it if it is whole.
-    fn close(&mut self, at_end: bool) {
+    pub fn close(&mut self, at_end: bool) {
         let Some(pending) = self.pending.take() else { return };
         match (pending.time, self.missing(&pending, at_end)) {
+            (Some(time), None) if self.skip > 0 => {
+                self.skip -= 1;
+                self.problems.add(
+                    ProblemCode::IncompleteState,
+                    Some(pending.place),
+                    None,
+                    format!(
+                        "the state at time {time:?} has other entities than the states below it; it is left out"
+                    ),
+                );
+                for table in &mut self.tables {
+                    table.forget_rows();
+                }
+                self.scalars.clear();
+            }
             (Some(time), None) => self.keep(time, &pending),
             (time, missing) => {
+                self.disagreeing += usize::from(pending.disagrees);
                 let missing = missing.unwrap_or_else(|| "its time is missing".into());
                 let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
                 self.problems.add(
@@ -302,7 +397,13 @@ impl<'a> States<'a> {
     fn missing(&self, pending: &Pending, at_end: bool) -> Option<String> {
         for table in &self.tables {
             let (have, want) = (table.filled_rows, table.rows.len());
-            if have < want {
+            if table.varies {
+                // Rows come in order, so that a cut takes the last ones.
+                let cut = table.last_row.filter(|&last| at_end && !table.filled[last]);
+                if let Some(last) = cut {
+                    return Some(format!("its {} end before {}", table.name, table.rows[last]));
+                }
+            } else if have < want {
                 let first = table.filled.iter().position(|f| !f)?;
                 return Some(format!(
                     "{} of {want} {} are missing, the first of {}",
@@ -321,42 +422,85 @@ impl<'a> States<'a> {
             Some(last) if at_end && self.sealed && last.pending.is_none() => {
                 Some(format!("its labels end before \"{}\"", last.component))
             }
-            _ if self.tables.iter().all(|t| t.filled_rows == 0) && pending.labels == 0 => {
+            _ if !self.may_be_empty
+                && self.tables.iter().all(|t| t.filled_rows == 0)
+                && pending.labels == 0 =>
+            {
                 Some("it has no rows".into())
+            }
+            _ if self.absent_cells > ABSENT_CELLS + ABSENT_PER_PRESENT * self.present_cells => {
+                Some("the states above already lack most of their entities".into())
             }
             _ => None,
         }
     }
 
     fn keep(&mut self, time: f64, pending: &Pending) {
-        if self.time.last().is_some_and(|&last| time < last) {
-            self.problems.add(
-                ProblemCode::TimeGoesBack,
-                Some(pending.place),
-                None,
-                format!(
-                    "time {time:?} of state {} is before the time of the state above it",
-                    self.time.len() + 1
-                ),
-            );
-        }
         self.sealed = true;
         self.time.push(time);
-        for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
-            channel.values.push(channel.pending);
-            channel.seen += usize::from(channel.pending_seen);
+        self.places.push(pending.place);
+        for table in &mut self.tables {
+            if table.varies {
+                table.last_row = table.filled.iter().rposition(|&filled| filled);
+                for (states, &filled) in table.states_with.iter_mut().zip(&table.filled) {
+                    *states += usize::from(filled);
+                }
+                let rows = table.rows.len().max(1);
+                let absent = table.channels.len() * (rows - table.filled_rows) / rows;
+                self.absent_cells += absent;
+                self.present_cells += table.channels.len() - absent;
+            }
+            for channel in &mut table.channels {
+                channel.values.push(channel.pending);
+                channel.seen += usize::from(channel.pending_seen);
+                (channel.pending, channel.pending_seen) = (f64::NAN, false);
+            }
         }
         for scalar in &mut self.scalars {
-            scalar.absent += usize::from(scalar.pending.is_none());
+            let absent = usize::from(scalar.pending.is_none());
+            scalar.absent += absent;
+            self.absent_cells += absent;
+            self.present_cells += 1 - absent;
             if scalar.kept {
                 scalar.values.push(scalar.pending.unwrap_or(f64::NAN));
             }
         }
     }
 
+    /// The entities of a table, in order of its rows.
+    pub fn rows(&self, table: TableId) -> &[EntityId] {
+        &self.tables[table.0].rows
+    }
+
+    /// Rows of a table of which values are kept.
+    pub fn wanted_rows(&self, table: TableId) -> Vec<usize> {
+        let of = &self.tables[table.0].channel_of;
+        (0..of.len()).filter(|&row| of[row].is_some()).collect()
+    }
+
+    /// Columns of a table of which values are kept.
+    pub fn wanted_columns(&self, table: TableId) -> &[usize] {
+        &self.tables[table.0].wanted_columns
+    }
+
+    /// Adds whole states that were read at once. Per state: its time, the place of its
+    /// beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
+    pub fn extend(&mut self, states: &[(f64, Place)], values: &[Vec<f64>]) {
+        for &(time, place) in states {
+            self.time.push(time);
+            self.places.push(place);
+        }
+        let channels = self.tables.iter_mut().flat_map(|t| &mut t.channels);
+        for (k, channel) in channels.enumerate() {
+            channel.seen += states.len();
+            channel.values.extend(values.iter().map(|state| state[k]));
+        }
+    }
+
     /// Ends the file.
     pub fn finish(mut self) -> Collected {
         self.close(true);
+        self.resolve_restarts();
         let time: Arc<[f64]> = self.time.into();
         let mut collected = Collected {
             entities: Vec::new(),
@@ -397,6 +541,65 @@ impl<'a> States<'a> {
     }
 }
 
+impl States<'_> {
+    /// Leaves out the states that a restart wrote again: of equal times the last one counts.
+    /// A single state whose time is before its neighbours' stays where the file has it.
+    fn resolve_restarts(&mut self) {
+        let time = &self.time;
+        let goes_back = |i: usize| time[i] < time[i - 1];
+        let repeats = |i: usize| self.distinct_times && time[i] == time[i - 1];
+        let mut kept: Vec<usize> = Vec::with_capacity(time.len());
+        for i in 0..time.len() {
+            let is_single = time.get(i + 1).is_none_or(|&next| i > 0 && next > time[i - 1]);
+            if i > 0 && goes_back(i) && is_single {
+                self.problems.add(
+                    ProblemCode::TimeGoesBack,
+                    self.places.get(i).copied(),
+                    None,
+                    format!(
+                        "time {:?} of state {} is before the time of the state above it",
+                        time[i],
+                        i + 1
+                    ),
+                );
+            } else if i > 0 && (goes_back(i) || repeats(i)) {
+                let again = kept.iter().rposition(|&k| time[k] < time[i]).map_or(0, |k| k + 1);
+                let left_out = kept.split_off(again);
+                if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
+                    self.problems.add(
+                        ProblemCode::RepeatedState,
+                        self.places.get(i).copied(),
+                        None,
+                        format!(
+                            "a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
+                            time[i],
+                            left_out.len(),
+                            time[first],
+                            time[last]
+                        ),
+                    );
+                }
+            }
+            kept.push(i);
+        }
+        if kept.len() == self.time.len() {
+            return;
+        }
+        let take = |values: &mut Vec<f64>| {
+            if !values.is_empty() {
+                *values = kept.iter().map(|&i| values[i]).collect();
+            }
+        };
+        take(&mut self.time);
+        for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
+            take(&mut channel.values);
+        }
+        for scalar in &mut self.scalars {
+            take(&mut scalar.values);
+        }
+    }
+}
+
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
 fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut Problems) {
@@ -407,7 +610,28 @@ fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut 
             continue;
         }
         let mut channels = table.channels.into_iter();
+        let partly = table.states_with.iter().filter(|&&n| table.varies && 0 < n && n < states);
+        let partly = partly.count();
+        if partly > 0 {
+            problems.add(
+                ProblemCode::AbsentEntity,
+                None,
+                None,
+                format!(
+                    "{partly} of {} {} are missing from some states (eroded or failed); their values there are NaN",
+                    table.rows.len(),
+                    table.name
+                ),
+            );
+        }
         for (row, &entity) in table.rows.iter().enumerate() {
+            if table.varies && table.states_with[row] == 0 {
+                // Only states that were left out had it.
+                if table.channel_of[row].is_some() {
+                    channels.by_ref().take(table.wanted_columns.len()).for_each(drop);
+                }
+                continue;
+            }
             let histories = of_entity.entry(entity).or_insert_with(|| {
                 collected.entities.push(entity);
                 Vec::new()
@@ -419,7 +643,7 @@ fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut 
                 if channel.seen == 0 {
                     continue;
                 }
-                if channel.seen < states {
+                if channel.seen < states && !table.varies {
                     problems.add(
                         ProblemCode::AbsentComponent,
                         None,
@@ -455,16 +679,28 @@ impl Table {
         }
     }
 
-    fn add_row(&mut self, entity: EntityId, selection: &Selection) -> usize {
+    fn forget_rows(&mut self) {
+        self.rows.clear();
+        self.row_of.clear();
+        self.channel_of.clear();
+        self.channels.clear();
+        self.states_with.clear();
+        self.filled.clear();
+        self.seen_columns.fill(false);
+    }
+
+    /// Adds a row that the first `states` kept states do not have.
+    fn add_row(&mut self, entity: EntityId, selection: &Selection, states: usize) -> usize {
         let row = self.rows.len();
         self.rows.push(entity);
         self.row_of.insert(entity, row);
         self.filled.push(false);
         let wanted = selection.wants(entity) && !self.wanted_columns.is_empty();
+        self.states_with.push(0);
         self.channel_of.push(wanted.then_some(self.channels.len()));
         if wanted {
             self.channels.extend(self.wanted_columns.iter().map(|_| Channel {
-                values: Vec::new(),
+                values: vec![f64::NAN; states],
                 pending: f64::NAN,
                 seen: 0,
                 pending_seen: false,

@@ -1,11 +1,12 @@
 //! The frame all LS-DYNA ASCII readers share: header, legend, then the file's own body.
 
-use std::collections::HashMap;
-use std::io::{self, BufRead};
+use std::collections::{HashMap, HashSet};
+use std::io;
 
 use super::header::{self, LegendFence};
 use super::line::{Line, Lines};
 use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::source::{Source, Stream};
 use crate::solver::states::States;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
@@ -20,134 +21,209 @@ pub trait Body {
     /// The end of the file, at `place`.
     fn end(&mut self, place: Place, states: &mut States<'_>);
 
+    /// Offered after every line: reads the states from there on at once, if they are laid
+    /// out like the ones above, and says at which line to go on.
+    fn leap(
+        &mut self,
+        _source: &dyn Source,
+        _states: &mut States<'_>,
+    ) -> io::Result<Option<Place>> {
+        Ok(None)
+    }
+
     /// Contacts that the file declares to have no resultants.
     fn single_surfaces(&self) -> &[i64] {
         &[]
     }
 }
 
-/// Reads a whole file through `body`.
-pub fn read(
+/// Header, legend and states of a file, while it is read.
+pub struct Frame<'a> {
     format: &'static str,
-    input: &mut dyn BufRead,
+    lines: Lines<Stream<'a>>,
+    pub states: States<'a>,
+    fence: LegendFence,
+    legend: Vec<(i64, Option<String>)>,
+    title: Option<String>,
+    version: Option<String>,
+}
+
+/// Entries kept of a legend; real ones have one per entity.
+const MAX_LEGEND: usize = 2_000_000;
+/// Leading states that may be too damaged to tell the entities.
+const MAX_SKIPPED: usize = 3;
+
+/// Reads a whole file through a body made by `body`.
+///
+/// The first whole state tells which entities a state has. If more states disagree with it
+/// than agree, it is the damaged one: the file is read again without it.
+pub fn read<B: Body>(
+    format: &'static str,
+    source: &dyn Source,
+    selection: &Selection,
+    body: impl Fn() -> B,
+) -> io::Result<SolverFile> {
+    let mut best = read_from_state(0, format, source, selection, body())?;
+    for skipped in 1..=MAX_SKIPPED {
+        if !best.disputed {
+            break;
+        }
+        let next = read_from_state(skipped, format, source, selection, body())?;
+        if next.file.time.len() > best.file.time.len() {
+            best = next;
+        }
+    }
+    Ok(best.file)
+}
+
+struct Attempt {
+    file: SolverFile,
+    /// Whether more states disagree with the first whole state than agree.
+    disputed: bool,
+}
+
+fn read_from_state(
+    skipped: usize,
+    format: &'static str,
+    source: &dyn Source,
     selection: &Selection,
     mut body: impl Body,
-) -> io::Result<SolverFile> {
-    let mut lines = Lines::new(input);
-    let mut states = States::new(selection);
-    let mut fence = LegendFence::default();
-    let mut legend: Vec<(i64, Option<String>)> = Vec::new();
-    let (mut title, mut version) = (None, None);
-    while let Some(line) = lines.next_line()? {
+) -> io::Result<Attempt> {
+    let mut frame = Frame::new(format, source, selection);
+    frame.states.skip(skipped);
+    while frame.step(&mut body)? {
+        if let Some(place) = body.leap(source, &mut frame.states)? {
+            frame.lines.go_to(place);
+        }
+    }
+    let disputed = frame.states.is_disputed();
+    Ok(Attempt { file: frame.finish(&mut body), disputed })
+}
+
+impl<'a> Frame<'a> {
+    pub fn new(format: &'static str, source: &'a dyn Source, selection: &'a Selection) -> Self {
+        Self {
+            format,
+            lines: Lines::new(Stream::new(source)),
+            states: States::new(selection),
+            fence: LegendFence::default(),
+            legend: Vec::new(),
+            title: None,
+            version: None,
+        }
+    }
+
+    /// Takes one line; false at the end of the file.
+    pub fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
+        let Some(line) = self.lines.next_line()? else { return Ok(false) };
         match line.number {
             1 => {
                 let text = String::from_utf8_lossy(line.text).trim().to_string();
-                title = (!text.is_empty()).then_some(text);
-                continue;
+                self.title = (!text.is_empty()).then_some(text);
+                return Ok(true);
             }
             2 => {
-                version = header::version(line.text);
-                if version.is_none() {
-                    states.problems.add(
+                self.version = header::version(line.text);
+                if self.version.is_none() {
+                    self.states.problems.add(
                         ProblemCode::NoVersionLine,
                         Some((&line).into()),
                         None,
                         "expected LS-DYNA's version line (\"ls-dyna … date …\")".into(),
                     );
                 }
-                continue;
+                return Ok(true);
             }
             _ => {}
         }
         if line.overlong {
-            states.problems.add(
+            self.states.problems.add(
                 ProblemCode::BadLine,
                 Some((&line).into()),
                 None,
                 "the line is longer than any line of this file can be; its end is left out".into(),
             );
         }
-        if fence.is_open() && body.is_signature(line.text) {
-            fence.close();
-            states.problems.add(
+        if self.fence.is_open() && body.is_signature(line.text) {
+            self.fence.close();
+            self.states.problems.add(
                 ProblemCode::BadLine,
                 Some((&line).into()),
                 None,
                 "expected {END LEGEND} before the first state".into(),
             );
         }
-        if fence.covers(line.text) {
-            legend.extend(header::legend_entry(line.text));
+        if self.fence.covers(line.text) {
+            if self.legend.len() < MAX_LEGEND {
+                self.legend.extend(header::legend_entry(line.text));
+            }
         } else {
-            body.line(&line, &mut states);
+            body.line(&line, &mut self.states);
         }
+        Ok(true)
     }
-    if lines.number() < 2 {
-        states.problems.add(
-            ProblemCode::NoVersionLine,
-            None,
-            None,
-            "the file ends before its header (title and version line) is complete".into(),
-        );
-    }
-    if fence.is_open() {
-        states.problems.add(
-            ProblemCode::BadLine,
-            None,
-            None,
-            "the file ends within its legend: expected {END LEGEND}".into(),
-        );
-    }
-    let end = Place { line: lines.number(), byte: lines.byte() };
-    body.end(end, &mut states);
-    Ok(assemble(format, states, &body, legend, title, version))
-}
 
-fn assemble(
-    format: &'static str,
-    states: States<'_>,
-    body: &impl Body,
-    legend: Vec<(i64, Option<String>)>,
-    title: Option<String>,
-    version: Option<String>,
-) -> SolverFile {
-    let titles: HashMap<i64, &Option<String>> = legend.iter().map(|(id, t)| (*id, t)).collect();
-    let title_of = |id: i64| titles.get(&id).and_then(|t| (*t).clone());
-    let collected = states.finish();
-    let entities: Vec<Entity> =
-        collected.entities.iter().map(|&id| Entity { id, title: title_of(id.id) }).collect();
-    let with_data: std::collections::HashSet<i64> = entities.iter().map(|e| e.id.id).collect();
-    let mut without_data: Vec<WithoutData> = body
-        .single_surfaces()
-        .iter()
-        .filter(|id| !with_data.contains(id))
-        .map(|&id| WithoutData {
-            id,
-            title: title_of(id),
-            reason: NoDataReason::SingleSurfaceContact,
-        })
-        .collect();
-    let single: std::collections::HashSet<i64> = without_data.iter().map(|w| w.id).collect();
-    without_data.extend(
-        legend.iter().filter(|(id, _)| !with_data.contains(id) && !single.contains(id)).map(
-            |(id, title)| WithoutData {
-                id: *id,
-                title: title.clone(),
-                reason: NoDataReason::LegendOnly,
-            },
-        ),
-    );
-    SolverFile {
-        format,
-        section: format.to_string(),
-        solver: version.is_some().then(|| "LS-DYNA".to_string()),
-        version,
-        title,
-        entities,
-        without_data,
-        components: collected.components,
-        time: collected.time,
-        histories: collected.histories,
-        problems: collected.problems,
+    /// Ends the file.
+    pub fn finish(mut self, body: &mut impl Body) -> SolverFile {
+        let end = self.lines.place();
+        if end.line < 2 {
+            self.states.problems.add(
+                ProblemCode::NoVersionLine,
+                None,
+                None,
+                "the file ends before its header (title and version line) is complete".into(),
+            );
+        }
+        if self.fence.is_open() {
+            self.states.problems.add(
+                ProblemCode::BadLine,
+                None,
+                None,
+                "the file ends within its legend: expected {END LEGEND}".into(),
+            );
+        }
+        body.end(end, &mut self.states);
+        self.assemble(body)
+    }
+
+    fn assemble(self, body: &impl Body) -> SolverFile {
+        let titles: HashMap<i64, &Option<String>> =
+            self.legend.iter().map(|(id, t)| (*id, t)).collect();
+        let title_of = |id: i64| titles.get(&id).and_then(|t| (*t).clone());
+        let collected = self.states.finish();
+        let entities: Vec<Entity> =
+            collected.entities.iter().map(|&id| Entity { id, title: title_of(id.id) }).collect();
+        let with_data: HashSet<i64> = entities.iter().map(|e| e.id.id).collect();
+        let mut without_data: Vec<WithoutData> = body
+            .single_surfaces()
+            .iter()
+            .filter(|id| !with_data.contains(id))
+            .map(|&id| WithoutData {
+                id,
+                title: title_of(id),
+                reason: NoDataReason::SingleSurfaceContact,
+            })
+            .collect();
+        let single: HashSet<i64> = without_data.iter().map(|w| w.id).collect();
+        let unused =
+            self.legend.iter().filter(|(id, _)| !with_data.contains(id) && !single.contains(id));
+        without_data.extend(unused.map(|(id, title)| WithoutData {
+            id: *id,
+            title: title.clone(),
+            reason: NoDataReason::LegendOnly,
+        }));
+        SolverFile {
+            format: self.format,
+            section: self.format.to_string(),
+            solver: self.version.is_some().then(|| "LS-DYNA".to_string()),
+            version: self.version,
+            title: self.title,
+            entities,
+            without_data,
+            components: collected.components,
+            time: collected.time,
+            histories: collected.histories,
+            problems: collected.problems,
+        }
     }
 }

@@ -1,16 +1,23 @@
 //! `binout`: LS-DYNA's binary histories, an LSDA container.
 //!
-//! Records are walked in order; symbol tables are skipped. A run that died has no final
-//! table, so nothing may depend on one, and a record that overruns the file is the cut.
-//! A file that continues as `name%001`, `name%002`, … is one tree over several containers.
+//! First all records are noted with their places, then the values that are wanted are read.
+//! A file that continues as `name%001`, `name%002`, … and the files `binout0000`,
+//! `binout0001`, … of the processes of one run are one tree over several containers.
+//!
+//! Of a record that is there twice the later one counts: a restart wrote it again. Entities
+//! may differ between states (eroded elements): a state that lacks one has NaN there.
 
 use std::collections::{HashMap, HashSet};
-use std::io::{self, BufRead};
+use std::io;
 use std::sync::Arc;
 
-use super::lsda::{Header, Values, change_directory, fill, skip, take};
+use rayon::prelude::*;
+
+use super::lsda::{self, Event, Header, Kind, Payload, change_directory};
 use crate::history::{EntityId, History, Side};
 use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::source::{Source, fill_at};
+use crate::solver::zeros;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// Sections by which a container is known to be a binout.
@@ -20,9 +27,15 @@ const SECTIONS: [&str; 24] = [
     "sleout", "spcforc", "sphout", "swforc", "tprint", "trhist",
 ];
 
-/// Longest path and longest metadata array that are read; real ones are far shorter.
-const MAX_PATH: u64 = 4096;
-const MAX_METADATA: u64 = 64 << 20;
+/// Components of a state that are no results.
+const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
+
+/// Largest array of ids or titles that is read; real ones are far shorter.
+const MAX_METADATA: u64 = 256 << 20;
+/// Components kept of one section; real ones have at most about forty.
+const MAX_COMPONENTS: usize = 2_000;
+/// Values of one entity for several integration points that are told apart.
+const MAX_POINTS: usize = 128;
 
 /// Whether a file begins with the header of an LSDA container.
 pub fn recognises(head: &[u8]) -> bool {
@@ -31,574 +44,686 @@ pub fn recognises(head: &[u8]) -> bool {
 
 /// Reads the selected histories of every section, or of the one selected. Empty if no
 /// section is one of a binout.
-pub fn read(parts: &mut [Box<dyn BufRead>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
-    let mut tree = Tree { selection, sections: Vec::new(), index: HashMap::new() };
-    let mut problems = Problems::default();
-    for part in parts {
-        walk(part, &mut tree, &mut problems)?;
+pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
+    let mut tree = Tree::default();
+    for (number, part) in parts.iter().enumerate() {
+        tree.walk(number, &**part)?;
     }
-    Ok(tree.finish(problems))
+    let wanted = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
+    let reader = Reader { parts, headers: &tree.headers, selection };
+    let mut files = Vec::new();
+    for section in tree.sections.iter().filter(|s| wanted(&s.name)) {
+        files.push(reader.section(section, &mut tree.problems)?);
+    }
+    // The container's problems concern every section of it.
+    let problems = tree.problems.into_list();
+    for file in &mut files {
+        file.problems.clone_from(&problems);
+    }
+    Ok(files)
 }
 
-/// Commands of records.
-const CD: u64 = 2;
-const DATA: u64 = 3;
-
-/// Walks the records of one container.
-fn walk(input: &mut dyn BufRead, tree: &mut Tree<'_>, problems: &mut Problems) -> io::Result<()> {
-    let mut at = 0;
-    let mut head = [0; 8];
-    let cut = |at: u64, what: &str, problems: &mut Problems| {
-        problems.add(
-            ProblemCode::CutRecord,
-            None,
-            None,
-            format!("the file ends within {what} at byte {at}; the records before it are read"),
-        );
-    };
-    if !fill(input, &mut head)? {
-        cut(0, "its header", problems);
-        return Ok(());
-    }
-    let Some(header) = Header::parse(&head) else {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "this is no LSDA container"));
-    };
-    skip(input, header.header as u64 - 8)?;
-    at += header.header as u64;
-    let mut path = Vec::new();
-    let mut frame = vec![0; header.length + 1];
-    loop {
-        let start = at;
-        if input.fill_buf()?.is_empty() {
-            return Ok(());
-        }
-        if !fill(input, &mut frame)? {
-            cut(start, "a record's head", problems);
-            return Ok(());
-        }
-        let length = header.unsigned(&frame[..header.length]);
-        let command = u64::from(frame[header.length]);
-        let Some(payload) = length.checked_sub(frame.len() as u64) else {
-            problems.add(
-                ProblemCode::BadRecord,
-                None,
-                None,
-                format!("the record at byte {start} says it has {length} bytes; what follows is left out"),
-            );
-            return Ok(());
-        };
-        at += length;
-        let whole = match command {
-            CD if payload <= MAX_PATH => match take(input, payload)? {
-                Some(text) => {
-                    change_directory(&mut path, &String::from_utf8_lossy(&text));
-                    true
-                }
-                None => false,
-            },
-            DATA => data(input, payload, header, &path, tree, problems, start)?,
-            _ => skip(input, payload)?,
-        };
-        if !whole {
-            tree.cut(&path);
-            cut(start, "the record", problems);
-            return Ok(());
-        }
-    }
-}
-
-/// Reads one data record, or skips it if nothing of it is wanted. False at a cut.
-fn data(
-    input: &mut dyn BufRead,
-    payload: u64,
-    header: Header,
-    path: &[String],
-    tree: &mut Tree<'_>,
-    problems: &mut Problems,
-    start: u64,
-) -> io::Result<bool> {
-    let mut head = [0; 2];
-    if payload < 2 || !fill(input, &mut head)? {
-        return Ok(false);
-    }
-    let [kind, name_length] = head;
-    let Some(bytes) = (payload - 2).checked_sub(u64::from(name_length)) else { return Ok(false) };
-    let Some(name) = take(input, name_length.into())? else { return Ok(false) };
-    let name = String::from_utf8_lossy(&name).into_owned();
-    let Some(place) = tree.place(path) else { return skip(input, bytes) };
-    let wanted = match place.state {
-        None => bytes <= MAX_METADATA,
-        Some(_) => tree.wants(place, &name),
-    };
-    if !wanted {
-        tree.note(place, &name, bytes, kind);
-        return skip(input, bytes);
-    }
-    let Some(bytes) = take(input, bytes)? else { return Ok(false) };
-    match Values::decode(kind, bytes, header) {
-        Some(values) => tree.store(place, &name, values, problems),
-        None => problems.add(
-            ProblemCode::BadRecord,
-            None,
-            None,
-            format!("{name} at byte {start} has the unknown type {kind} or a broken length"),
-        ),
-    }
-    Ok(true)
-}
-
-/// Where a record belongs.
+/// A data record of one of the containers.
 #[derive(Clone, Copy)]
 struct Place {
-    section: usize,
-    /// Number of the state's directory; `None` for metadata.
-    state: Option<u64>,
+    part: usize,
+    payload: Payload,
 }
 
 /// All sections of the family of containers.
-struct Tree<'a> {
-    selection: &'a Selection,
-    sections: Vec<SectionData>,
+#[derive(Default)]
+struct Tree {
+    headers: Vec<Option<Header>>,
+    sections: Vec<Section>,
     index: HashMap<String, usize>,
+    problems: Problems,
 }
 
-/// What is known of one section.
+/// The records of one section.
 #[derive(Default)]
-struct SectionData {
+struct Section {
     name: String,
-    metadata: HashMap<String, Vec<u8>>,
-    integers: HashMap<String, Vec<i64>>,
+    metadata: HashMap<String, Place>,
     /// Directory numbers of the states, in order of appearance.
     states: Vec<u64>,
     state_index: HashMap<u64, usize>,
-    times: Vec<Option<f64>>,
-    /// Whether a state names other entities than the first one.
-    other_ids: Vec<bool>,
-    /// Components in order of appearance, with the states that have them.
-    components: Vec<ComponentData>,
+    /// States that damage was found in.
+    damaged: HashSet<usize>,
+    /// Records that were there before, and the first state of which.
+    repeated: usize,
+    first_repeated: Option<u64>,
+    /// Components in order of appearance.
+    components: Vec<Component>,
     component_index: HashMap<String, usize>,
-    /// Index of a state that a cut record belongs to.
-    cut_state: Option<usize>,
 }
 
-struct ComponentData {
+/// The records of one component.
+struct Component {
     name: Arc<str>,
-    /// Values of the first state that has it.
-    width: usize,
-    numeric: bool,
-    /// Positions of the selected entities; `None` if the ids came later: then all are kept.
-    kept: Option<Vec<usize>>,
-    /// States that have it, in order of appearance.
-    present: Vec<usize>,
-    present_in: HashSet<usize>,
-    /// Kept values of each of these states; empty if the component is not selected.
-    rows: Vec<Vec<f64>>,
+    /// By state.
+    records: HashMap<usize, Place>,
 }
 
-/// Components of a state that are not results.
-const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
+impl Tree {
+    /// Notes all records of one container.
+    fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
+        let header = lsda::header(source)?;
+        self.headers.push(header);
+        let Some(header) = header else {
+            let message = "this is no LSDA container, or its header is cut";
+            self.problems.add(ProblemCode::CutRecord, None, None, message.into());
+            return Ok(());
+        };
+        let mut path: Vec<String> = Vec::new();
+        let mut here = None;
+        lsda::walk(source, header, |event| match event {
+            Event::Directory(to) => {
+                change_directory(&mut path, to);
+                here = self.place(&path);
+            }
+            Event::Data { name, payload } => {
+                if let Some((section, state)) = here {
+                    self.sections[section].note(name, state, Place { part, payload });
+                }
+            }
+            Event::Damage { at, resumed, message } => {
+                self.damage(here);
+                let rest = match resumed {
+                    Some(byte) => format!("reading goes on at byte {byte}"),
+                    None => "what follows is left out".into(),
+                };
+                let message = format!("damaged record: {message}; {rest}");
+                self.problems.add_at_byte(ProblemCode::BadRecord, at, message);
+            }
+            Event::Cut { at } => {
+                self.damage(here);
+                let message = format!(
+                    "the file ends within the record at byte {at}; the records before it are read"
+                );
+                self.problems.add_at_byte(ProblemCode::CutRecord, at, message);
+            }
+        })
+    }
 
-impl Tree<'_> {
+    fn damage(&mut self, here: Option<(usize, Option<usize>)>) {
+        if let Some((section, Some(state))) = here {
+            self.sections[section].damaged.insert(state);
+        }
+    }
+
     /// The section and state a path names; `None` for what is not a result of a binout.
     /// States are `d` and digits, padded or not; directories below them hold no results.
-    fn place(&mut self, path: &[String]) -> Option<Place> {
+    fn place(&mut self, path: &[String]) -> Option<(usize, Option<usize>)> {
         let (last, section) = path.split_last()?;
         if !SECTIONS.contains(&section.first()?.as_str()) {
             return None;
         }
-        let state = match last.strip_prefix('d').filter(|d| d.bytes().all(|b| b.is_ascii_digit())) {
-            Some(digits) => Some(digits.parse().ok()?),
-            None if last == "metadata" => None,
-            None => return None,
+        let number = match last.strip_prefix('d') {
+            Some(digits) if digits.bytes().all(|b| b.is_ascii_digit()) => {
+                Some(digits.parse().ok()?)
+            }
+            _ if last == "metadata" => None,
+            _ => return None,
         };
         let name = section.join("/");
         let index = match self.index.get(&name) {
             Some(&index) => index,
             None => {
-                self.sections.push(SectionData { name: name.clone(), ..SectionData::default() });
+                self.sections.push(Section { name: name.clone(), ..Section::default() });
                 self.index.insert(name, self.sections.len() - 1);
                 self.sections.len() - 1
             }
         };
-        Some(Place { section: index, state })
-    }
-
-    fn wants(&self, place: Place, name: &str) -> bool {
-        let section = &self.sections[place.section].name;
-        self.selection.section.as_ref().is_none_or(|s| s == section)
-            && (["time", "ids"].contains(&name) || self.selection.wants_component(name))
-    }
-
-    /// Notes a component whose values are not kept.
-    fn note(&mut self, place: Place, name: &str, bytes: u64, kind: u8) {
-        let Some(state) = place.state else { return };
-        let section = &mut self.sections[place.section];
-        let size = match kind {
-            1 | 5 => 1,
-            2 | 6 => 2,
-            3 | 7 | 9 => 4,
-            _ => 8,
-        };
-        if NOT_RESULTS.contains(&name) {
-            return;
-        }
-        let state = section.state(state);
-        let width = usize::try_from(bytes / size).unwrap_or(usize::MAX);
-        let index = section.component_index(name, width, self.selection);
-        let component = &mut section.components[index];
-        component.numeric = !matches!(kind, 1 | 5);
-        component.mark(state);
-    }
-
-    fn store(&mut self, place: Place, name: &str, values: Values, problems: &mut Problems) {
-        let section = &mut self.sections[place.section];
-        let Some(number) = place.state else {
-            match values {
-                Values::Integers(values) => section.integers.insert(name.into(), values).is_some(),
-                other => section.metadata.insert(name.into(), other.into_text()).is_some(),
-            };
-            return;
-        };
-        let state = section.state(number);
-        if name == "ids" {
-            let ids = values.into_integers();
-            let known = section.integers.entry("ids".into()).or_insert_with(|| ids.clone());
-            if *known != ids {
-                problems.add(
-                    ProblemCode::UnexpectedEntity,
-                    None,
-                    None,
-                    format!("{}: the ids of state d{number} are not those of the states before it; its values are left out", section.name),
-                );
-                section.other_ids[state] = true;
-            }
-            return;
-        }
-        let Some(values) = values.into_reals() else { return };
-        if name == "time" {
-            if section.times[state].is_some() {
-                problems.add(
-                    ProblemCode::RepeatedState,
-                    None,
-                    None,
-                    format!(
-                        "{}: state d{number} appears again; its first values are kept",
-                        section.name
-                    ),
-                );
-            } else {
-                section.times[state] = values.first().copied();
-            }
-            return;
-        }
-        if NOT_RESULTS.contains(&name) {
-            return;
-        }
-        let index = section.component_index(name, values.len(), self.selection);
-        let component = &mut section.components[index];
-        if component.mark(state) {
-            let row = match &component.kept {
-                Some(kept) if values.len() == component.width => {
-                    kept.iter().map(|&k| values[k]).collect()
-                }
-                _ => values,
-            };
-            component.rows.push(row);
-        }
-    }
-
-    /// Notes that the container ends within a record of this directory.
-    fn cut(&mut self, path: &[String]) {
-        if let Some(Place { section, state: Some(state) }) = self.place(path) {
-            let section = &mut self.sections[section];
-            section.cut_state = Some(section.state(state));
-        }
+        Some((index, number.map(|number| self.sections[index].state(number))))
     }
 }
 
-impl SectionData {
+impl Section {
     /// Index of the state of that directory number.
     fn state(&mut self, number: u64) -> usize {
-        if let Some(&index) = self.state_index.get(&number) {
-            return index;
+        *self.state_index.entry(number).or_insert_with(|| {
+            self.states.push(number);
+            self.states.len() - 1
+        })
+    }
+
+    fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
+        let Some(state) = state else {
+            self.metadata.insert(name.into(), place);
+            return;
+        };
+        let index = match self.component_index.get(name) {
+            Some(&index) => index,
+            None if self.components.len() < MAX_COMPONENTS => {
+                self.components.push(Component { name: name.into(), records: HashMap::new() });
+                self.component_index.insert(name.into(), self.components.len() - 1);
+                self.components.len() - 1
+            }
+            None => return,
+        };
+        if self.components[index].records.insert(state, place).is_some() {
+            self.repeated += 1;
+            self.first_repeated.get_or_insert(self.states[state]);
         }
-        self.states.push(number);
-        self.times.push(None);
-        self.other_ids.push(false);
-        self.state_index.insert(number, self.states.len() - 1);
-        self.states.len() - 1
     }
 
-    fn component_index(&mut self, name: &str, width: usize, selection: &Selection) -> usize {
-        if let Some(&index) = self.component_index.get(name) {
-            return index;
-        }
-        let index = self.components.len();
-        self.component_index.insert(name.to_string(), index);
-        let kept = self.entities(name, width).map(|ids| {
-            ids.iter().enumerate().filter(|(_, id)| selection.wants(**id)).map(|(k, _)| k).collect()
-        });
-        self.components.push(ComponentData {
-            name: name.into(),
-            width,
-            numeric: true,
-            kept,
-            present: Vec::new(),
-            present_in: HashSet::new(),
-            rows: Vec::new(),
-        });
-        index
+    fn component(&self, name: &str) -> Option<&Component> {
+        self.component_index.get(name).map(|&index| &self.components[index])
+    }
+}
+
+/// Reads the noted records.
+struct Reader<'a> {
+    parts: &'a [Box<dyn Source>],
+    headers: &'a [Option<Header>],
+    selection: &'a Selection,
+}
+
+/// The whole states of a section.
+struct States {
+    /// Indices of the states, in order of their numbers.
+    whole: Vec<usize>,
+    time: Arc<[f64]>,
+    /// Ids of each of them where states name their own.
+    ids: Option<Vec<Vec<i64>>>,
+}
+
+/// Whom the values of a component belong to.
+enum Owners {
+    Global,
+    /// One value per entity, in this order in every state.
+    Fixed(Vec<EntityId>),
+    /// Each state names its own entities; here all of them.
+    OfState(Vec<EntityId>),
+}
+
+impl Reader<'_> {
+    fn bytes(&self, place: Place, from: u64, length: usize) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; length];
+        let read = fill_at(&*self.parts[place.part], place.payload.at + from, &mut bytes)?;
+        bytes.truncate(read);
+        Ok(bytes)
     }
 
-    /// The entities that the values of a component belong to, by their number; `None` for
-    /// a global quantity.
-    fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
-        let named = |key: &str| self.integers.get(key).filter(|ids| ids.len() == width);
-        let by_kind = if component.ends_with("_moment") { "moment_ids" } else { "force_ids" };
-        let ids = match named("ids") {
-            Some(ids) => ids,
-            None if component.ends_with("_force") || component.ends_with("_moment") => {
-                named(by_kind)?
-            }
-            None => return None,
-        };
-        // Rows of two-sided contacts repeat their id.
-        let sides = self.integers.get("side").filter(|sides| sides.len() == width);
-        let entity = |(row, &id): (usize, &i64)| {
-            let side = sides.map(|s| if s[row] == 0 { Side::SurfA } else { Side::SurfB });
-            EntityId { id, side }
-        };
-        Some(ids.iter().enumerate().map(entity).collect())
+    fn whole(&self, place: Place) -> io::Result<(Kind, Header, Vec<u8>)> {
+        let header = self.headers[place.part].ok_or(io::ErrorKind::InvalidData)?;
+        let length = place.payload.bytes.min(MAX_METADATA) as usize;
+        Ok((place.payload.kind, header, self.bytes(place, 0, length)?))
     }
 
-    /// A text of the metadata, without its padding.
-    fn text(&self, key: &str) -> Option<String> {
-        let text = String::from_utf8_lossy(self.metadata.get(key)?);
-        let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
-        (!text.is_empty()).then(|| text.to_string())
+    fn integers(&self, place: Place) -> io::Result<Vec<i64>> {
+        let (kind, header, bytes) = self.whole(place)?;
+        Ok(kind.integers(header, &bytes))
     }
 
-    /// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
-    fn titles(&self) -> HashMap<i64, String> {
-        let (Some(ids), Some(legend)) =
-            (self.integers.get("legend_ids"), self.metadata.get("legend"))
-        else {
-            return HashMap::new();
-        };
-        let width = legend.len() / ids.len().max(1);
-        if width == 0 {
-            return HashMap::new();
-        }
-        let title = |bytes: &[u8]| {
-            let text = String::from_utf8_lossy(bytes);
-            text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_string()
-        };
-        ids.iter()
-            .zip(legend.chunks(width))
-            .map(|(&id, bytes)| (id, title(bytes)))
-            .filter(|(_, title)| !title.is_empty())
-            .collect()
-    }
-
-    /// Indices of the whole states in order of their numbers. A state is whole if it has a
-    /// time and no record of it is cut; the last one must also have what the one before has.
-    fn whole_states(&self, problems: &mut Problems) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.states.len()).collect();
-        order.sort_by_key(|&i| self.states[i]);
-        if !self.states.is_sorted() {
-            problems.add(
-                ProblemCode::TimeGoesBack,
-                None,
-                None,
-                format!(
-                    "{}: states are not in order of their numbers; they are returned in it",
-                    self.name
-                ),
-            );
-        }
-        let last = order.last().copied();
-        let before = order.len().checked_sub(2).map(|i| order[i]);
-        let has = |state| self.components.iter().map(move |c| c.present_in.contains(&state));
-        let mut drop = |state: usize, why: &str| {
-            let number = self.states[state];
-            problems.add(
-                ProblemCode::IncompleteState,
-                None,
-                None,
-                format!("{}: state d{number} is left out: {why}", self.name),
-            );
-            false
-        };
-        order.retain(|&state| {
-            if self.other_ids[state] {
-                return false; // said where it was found
-            }
-            if self.times[state].is_none_or(|t| !t.is_finite()) {
-                return drop(state, "its time is missing");
-            }
-            if self.cut_state == Some(state) {
-                return drop(state, "the file ends within it");
-            }
-            let lacks = before.is_some_and(|before| {
-                has(before).zip(has(state)).any(|(before, now)| before && !now)
-            });
-            if Some(state) == last && lacks {
-                return drop(state, "it has fewer components than the state before");
-            }
-            true
-        });
-        order
-    }
-
-    fn finish(self, selection: &Selection, problems: &mut Problems) -> SolverFile {
-        let whole = self.whole_states(problems);
-        let time: Arc<[f64]> = whole.iter().filter_map(|&s| self.times[s]).collect();
-        let titles = self.titles();
-        let mut entities: Vec<Entity> = Vec::new();
-        let mut known = HashSet::new();
-        let mut components = Vec::new();
-        let mut histories = Vec::new();
-        for component in self.components.iter().filter(|c| c.numeric) {
-            let ids = self.entities(&component.name, component.width);
-            if ids.is_none() && component.width != 1 {
-                if component.width > 0 {
-                    problems.add(
-                        ProblemCode::UnreadRows,
-                        None,
-                        None,
-                        format!(
-                            "{}: {} has {} values a state and no ids of that number; it is not read",
-                            self.name, component.name, component.width
-                        ),
-                    );
-                }
+    fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
+        let metadata = self.metadata(section)?;
+        let states = self.states(section, problems)?;
+        let mut entities: Vec<EntityId> = Vec::new();
+        let mut known: HashSet<EntityId> = HashSet::new();
+        let mut components: Vec<Arc<str>> = Vec::new();
+        let mut wanted: Vec<(&Component, Arc<str>, Owners, Option<usize>)> = Vec::new();
+        for component in section.components.iter().filter(|c| !is_not_result(&c.name)) {
+            let Some((owners, points)) =
+                self.owners(section, component, &metadata, &states, problems)?
+            else {
                 continue;
+            };
+            for id in owners.entities() {
+                if !states.whole.is_empty() && known.insert(*id) {
+                    entities.push(*id);
+                }
             }
-            components.push(component.name.clone());
-            for id in ids.iter().flatten().filter(|&&id| !whole.is_empty() && known.insert(id)) {
-                entities.push(Entity { id: *id, title: titles.get(&id.id).cloned() });
-            }
-            if !component.rows.is_empty() {
-                histories
-                    .extend(self.histories(component, ids, &whole, &time, selection, problems));
+            for point in 0..points {
+                let name = match points {
+                    1 => component.name.clone(),
+                    _ => format!("{}_ip{}", component.name, point + 1).into(),
+                };
+                components.push(name.clone());
+                let audited = self.selection.audit && component.is_real();
+                if audited || self.selection.wants_component(&name) {
+                    wanted.push((component, name, owners.clone(), (points > 1).then_some(point)));
+                }
             }
         }
-        // Entity by entity, as in the text files.
-        let rank: HashMap<EntityId, usize> =
-            entities.iter().enumerate().map(|(k, e)| (e.id, k)).collect();
-        histories.sort_by_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
-        let with_data: HashSet<i64> = known.iter().map(|e: &EntityId| e.id).collect();
-        let mut legend: Vec<(i64, String)> =
-            titles.into_iter().filter(|(id, _)| !with_data.contains(id)).collect();
-        legend.sort();
-        let without_data = legend
-            .into_iter()
-            .map(|(id, title)| WithoutData {
-                id,
-                title: Some(title),
-                reason: NoDataReason::LegendOnly,
+        let together = zeros::may_vanish(&section.name);
+        let read: Vec<(Vec<History>, Problems)> = wanted
+            .into_par_iter()
+            .map(|(component, name, owners, point)| {
+                let (mut histories, mut found) =
+                    self.histories(section, component, &name, &owners, point, &states)?;
+                if !together {
+                    zeros::suspect(&section.name, &histories, &mut found);
+                    self.keep_selected(&mut histories);
+                }
+                Ok((histories, found))
             })
-            .collect();
-        let version = match (self.text("version"), self.text("revision")) {
+            .collect::<io::Result<_>>()?;
+        let mut histories: Vec<History> = Vec::new();
+        for (read, found) in read {
+            histories.extend(read);
+            problems.append(found);
+        }
+        if together {
+            zeros::suspect(&section.name, &histories, problems);
+            self.keep_selected(&mut histories);
+        }
+        let rank: HashMap<EntityId, usize> =
+            entities.iter().enumerate().map(|(k, &id)| (id, k)).collect();
+        // Entity by entity, as in the text files.
+        histories.sort_by_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
+        let ids: HashSet<i64> = known.iter().map(|e| e.id).collect();
+        let mut legend: Vec<(&i64, &String)> =
+            metadata.titles.iter().filter(|(id, _)| !ids.contains(id)).collect();
+        legend.sort();
+        let without_data = legend.into_iter().map(|(&id, title)| WithoutData {
+            id,
+            title: Some(title.clone()),
+            reason: NoDataReason::LegendOnly,
+        });
+        let version = match (&metadata.version, &metadata.revision) {
             (Some(version), Some(revision)) => Some(format!("{version} {revision}")),
-            (version, _) => version,
+            (version, _) => version.clone(),
         };
-        SolverFile {
+        let titled =
+            |id: &EntityId| Entity { id: *id, title: metadata.titles.get(&id.id).cloned() };
+        Ok(SolverFile {
             format: "binout",
-            section: self.name.clone(),
+            section: section.name.clone(),
             solver: version.is_some().then(|| "LS-DYNA".to_string()),
             version,
-            title: self.text("title"),
-            entities,
-            without_data,
-            components: if whole.is_empty() { Vec::new() } else { components },
-            time,
+            title: metadata.title.clone(),
+            entities: entities.iter().map(titled).collect(),
+            without_data: without_data.collect(),
+            components: if states.whole.is_empty() { Vec::new() } else { components },
+            time: states.time,
             histories,
             problems: Vec::new(),
+        })
+    }
+
+    /// Drops what was read for an audit only.
+    fn keep_selected(&self, histories: &mut Vec<History>) {
+        let selection = self.selection;
+        histories.retain(|h| {
+            selection.wants_component(&h.component) && h.entity.is_none_or(|e| selection.wants(e))
+        });
+    }
+
+    fn metadata(&self, section: &Section) -> io::Result<Metadata> {
+        let text = |key: &str| -> io::Result<Option<Vec<u8>>> {
+            let place = section.metadata.get(key).filter(|p| p.payload.kind.is_text());
+            place.map(|&place| self.whole(place).map(|(_, _, bytes)| bytes)).transpose()
+        };
+        let numbers = |key: &str| -> io::Result<Option<Vec<i64>>> {
+            section.metadata.get(key).map(|&place| self.integers(place)).transpose()
+        };
+        let plain = |bytes: Option<Vec<u8>>| bytes.and_then(|b| trimmed(&b));
+        Ok(Metadata {
+            title: plain(text("title")?),
+            version: plain(text("version")?),
+            revision: plain(text("revision")?),
+            titles: titles(numbers("legend_ids")?, text("legend")?),
+            ids: numbers("ids")?,
+            side: numbers("side")?,
+            force_ids: numbers("force_ids")?,
+            moment_ids: numbers("moment_ids")?,
+        })
+    }
+
+    /// The whole states, in order of their numbers. A state is whole if it has a time and
+    /// no damage; the last one must also have what the one before has.
+    fn states(&self, section: &Section, problems: &mut Problems) -> io::Result<States> {
+        let mut order: Vec<usize> = (0..section.states.len()).collect();
+        order.sort_by_key(|&i| section.states[i]);
+        if section.repeated > 0 {
+            let message = format!(
+                "{}: a restart writes {} records again, the first of state d{}; the last ones are kept",
+                section.name,
+                section.repeated,
+                section.first_repeated.unwrap_or_default()
+            );
+            problems.add(ProblemCode::RepeatedState, None, None, message);
+        } else if !section.states.is_sorted() {
+            let message = format!(
+                "{}: states are not in order of their numbers; they are returned in it",
+                section.name
+            );
+            problems.add(ProblemCode::TimeGoesBack, None, None, message);
         }
+        let times = section.component("time");
+        let last = order.last().copied();
+        let before = order.len().checked_sub(2).map(|k| order[k]);
+        let mut whole = Vec::new();
+        let mut time: Vec<f64> = Vec::new();
+        for state in order {
+            let record = times.and_then(|t| t.records.get(&state));
+            let value = match record {
+                Some(&place) => {
+                    let (kind, header, bytes) = self.whole(place)?;
+                    let mut values = Vec::new();
+                    kind.reals(header, &bytes, &mut values);
+                    values.first().copied().filter(|t| t.is_finite())
+                }
+                None => None,
+            };
+            let lacks = || {
+                let has = |c: &Component, s: usize| c.records.contains_key(&s);
+                let lost = |c: &&Component| before.is_some_and(|b| has(c, b)) && !has(c, state);
+                section.components.iter().find(lost).map(|c| c.name.clone())
+            };
+            let why = match value {
+                _ if section.damaged.contains(&state) => Some("a record of it is damaged".into()),
+                None => Some("its time is missing".into()),
+                Some(_) if Some(state) == last => {
+                    lacks().map(|name| format!("it lacks {name}, which the state before has"))
+                }
+                Some(_) => None,
+            };
+            match (why, value) {
+                (None, Some(value)) => {
+                    if time.last().is_some_and(|&last| value < last) {
+                        let message = format!(
+                            "{}: time {value:?} of state d{} is before the time of the state above it",
+                            section.name, section.states[state]
+                        );
+                        problems.add(ProblemCode::TimeGoesBack, None, None, message);
+                    }
+                    whole.push(state);
+                    time.push(value);
+                }
+                (why, _) => {
+                    let message = format!(
+                        "{}: state d{} is left out: {}",
+                        section.name,
+                        section.states[state],
+                        why.unwrap_or_default()
+                    );
+                    problems.add(ProblemCode::IncompleteState, None, None, message);
+                }
+            }
+        }
+        let ids = match section.component("ids") {
+            None => None,
+            Some(component) => {
+                let of = |state: &usize| match component.records.get(state) {
+                    Some(&place) => self.integers(place),
+                    None => Ok(Vec::new()),
+                };
+                Some(whole.iter().map(of).collect::<io::Result<_>>()?)
+            }
+        };
+        Ok(States { whole, time: time.into(), ids })
+    }
+
+    /// Whom a component's values belong to, and how many values each has; `None` (said)
+    /// where the number of values fits no ids.
+    fn owners(
+        &self,
+        section: &Section,
+        component: &Component,
+        metadata: &Metadata,
+        states: &States,
+        problems: &mut Problems,
+    ) -> io::Result<Option<(Owners, usize)>> {
+        let first = states.whole.iter().find_map(|state| component.records.get(state));
+        let any = first.or_else(|| component.records.values().next());
+        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(Place::width) else {
+            return Ok(None);
+        };
+        if width == 0 || is_total(&component.name) {
+            return Ok((width == 1).then_some((Owners::Global, 1)));
+        }
+        if let Some(ids) = &states.ids {
+            let with = (0..states.whole.len())
+                .find(|&k| component.records.contains_key(&states.whole[k]) && !ids[k].is_empty());
+            let count = with.map_or(0, |k| ids[k].len());
+            let points = self.points(section, states, count, width)?;
+            if let Some(points) = points {
+                let mut all: Vec<EntityId> = Vec::new();
+                let mut known = HashSet::new();
+                for id in ids.iter().flatten().filter(|&&id| known.insert(id)) {
+                    all.push(EntityId::new(*id));
+                }
+                return Ok(Some((Owners::OfState(all), points)));
+            }
+        }
+        if let Some(ids) = metadata.entities(&component.name, width) {
+            return Ok(Some((Owners::Fixed(ids), 1)));
+        }
+        if width == 1 {
+            return Ok(Some((Owners::Global, 1)));
+        }
+        let message = format!(
+            "{}: {} has {width} values a state and no ids of that number; it is not read",
+            section.name, component.name
+        );
+        problems.add(ProblemCode::UnreadRows, None, None, message);
+        Ok(None)
+    }
+
+    /// Values of each of `count` entities: one, or as many as integration points if the
+    /// section says that all have the same number of them (`nip`).
+    fn points(
+        &self,
+        section: &Section,
+        states: &States,
+        count: usize,
+        width: usize,
+    ) -> io::Result<Option<usize>> {
+        if count == 0 || width == count {
+            return Ok((width == count).then_some(1));
+        }
+        let record = section
+            .component("nip")
+            .and_then(|nip| states.whole.iter().find_map(|state| nip.records.get(state)));
+        let Some(&record) = record else { return Ok(None) };
+        let nip = self.integers(record)?;
+        let points = width / count;
+        let agrees = nip.len() == count
+            && points * count == width
+            && (2..=MAX_POINTS).contains(&points)
+            && nip.iter().all(|&n| usize::try_from(n) == Ok(points));
+        Ok(agrees.then_some(points))
     }
 
     /// The histories of one component over the whole states.
     fn histories(
         &self,
-        component: &ComponentData,
-        ids: Option<Vec<EntityId>>,
-        whole: &[usize],
-        time: &Arc<[f64]>,
-        selection: &Selection,
-        problems: &mut Problems,
-    ) -> Vec<History> {
-        let entities: Vec<Option<EntityId>> = match &ids {
-            Some(ids) => ids.iter().copied().filter(|&id| selection.wants(id)).map(Some).collect(),
-            None => vec![None],
+        section: &Section,
+        component: &Component,
+        name: &Arc<str>,
+        owners: &Owners,
+        point: Option<usize>,
+        states: &States,
+    ) -> io::Result<(Vec<History>, Problems)> {
+        let mut problems = Problems::default();
+        let kept: Vec<(usize, Option<EntityId>)> = match owners {
+            Owners::Global => vec![(0, None)],
+            _ => {
+                let all = owners.entities().iter().enumerate();
+                let audit = self.selection.audit;
+                all.filter(|(_, id)| audit || self.selection.wants(**id))
+                    .map(|(k, id)| (k, Some(*id)))
+                    .collect()
+            }
         };
-        // Where a kept row holds each of them: in order, or by position if all were kept.
-        let positions: Vec<usize> = match (&ids, &component.kept) {
-            (Some(ids), None) => (0..ids.len()).filter(|&k| selection.wants(ids[k])).collect(),
-            _ => (0..entities.len()).collect(),
-        };
-        let row_width = match component.kept {
-            Some(_) => entities.len(),
-            None => component.width,
-        };
-        let mut columns = vec![Vec::with_capacity(whole.len()); entities.len()];
-        let row_of: HashMap<usize, &Vec<f64>> =
-            component.present.iter().copied().zip(&component.rows).collect();
-        let mut absent = 0;
-        for state in whole {
-            let row = row_of.get(state).filter(|row| row.len() == row_width);
-            absent += usize::from(row.is_none());
-            for (column, &k) in columns.iter_mut().zip(&positions) {
-                column.push(row.map_or(f64::NAN, |row| row[k]));
+        let mut columns = vec![vec![f64::NAN; states.whole.len()]; kept.len()];
+        let (mut absent, mut not_finite) = (0, 0);
+        let mut row = Vec::new();
+        // Where each entity's value is, while the states' ids stay the same.
+        let mut positions: Vec<Option<usize>> = kept.iter().map(|&(k, _)| Some(k)).collect();
+        let mut current: Option<&Vec<i64>> = None;
+        for (k, state) in states.whole.iter().enumerate() {
+            let width = match owners {
+                Owners::Global => 1,
+                Owners::Fixed(ids) => ids.len(),
+                Owners::OfState(_) => {
+                    let Some(ids) = states.ids.as_ref().map(|ids| &ids[k]) else { continue };
+                    if current != Some(ids) {
+                        current = Some(ids);
+                        positions = positions_of(&kept, ids);
+                    }
+                    ids.len()
+                }
+            };
+            let per_entity = point.map_or(1, |_| {
+                component.records.get(state).map_or(1, |p| p.width() / width.max(1))
+            });
+            let place = component.records.get(state);
+            let Some(&place) = place.filter(|p| p.width() == width * per_entity) else {
+                absent += 1;
+                continue;
+            };
+            let index = |position: usize| position * per_entity + point.unwrap_or(0);
+            let wanted = positions.iter().flatten().map(|&p| index(p));
+            let Some((from, to)) = wanted.clone().min().zip(wanted.max()) else { continue };
+            row.clear();
+            self.values(place, from, to + 1, &mut row)?;
+            for (column, position) in columns.iter_mut().zip(&positions) {
+                let value = position.and_then(|p| row.get(index(p) - from));
+                if let Some(&value) = value {
+                    column[k] = value;
+                    not_finite += usize::from(!value.is_finite());
+                }
             }
         }
-        if absent > 0 && !entities.is_empty() {
-            problems.add(
-                ProblemCode::AbsentComponent,
-                None,
-                None,
-                format!(
-                    "{}: {} is missing from {absent} of {} states, or has another number of values; its values there are NaN",
-                    self.name,
-                    component.name,
-                    whole.len()
-                ),
+        if absent > 0 && !kept.is_empty() {
+            let message = format!(
+                "{}: {name} is missing from {absent} of {} states, or has another number of values; its values there are NaN",
+                section.name,
+                states.whole.len()
             );
+            problems.add(ProblemCode::AbsentComponent, None, None, message);
         }
-        let history = |(entity, values)| History {
+        if not_finite > 0 {
+            let message = format!(
+                "{}: {name} has {not_finite} values that are no finite numbers; they are returned as such",
+                section.name
+            );
+            problems.add(ProblemCode::NotFinite, None, None, message);
+        }
+        let history = |((_, entity), values): ((usize, Option<EntityId>), Vec<f64>)| History {
             entity,
-            component: component.name.clone(),
-            time: time.clone(),
+            component: name.clone(),
+            time: states.time.clone(),
             values,
         };
-        entities.into_iter().zip(columns).map(history).collect()
+        Ok((kept.into_iter().zip(columns).map(history).collect(), problems))
     }
-}
 
-impl ComponentData {
-    /// Notes that a state has it; false if it already had.
-    fn mark(&mut self, state: usize) -> bool {
-        self.present_in.insert(state) && {
-            self.present.push(state);
-            true
-        }
-    }
-}
-
-impl Tree<'_> {
-    fn finish(self, mut problems: Problems) -> Vec<SolverFile> {
-        let wanted = |name: &str| self.selection.section.as_ref().is_none_or(|s| s == name);
-        let mut files: Vec<SolverFile> = Vec::new();
-        for section in self.sections {
-            if wanted(&section.name) {
-                files.push(section.finish(self.selection, &mut problems));
+    /// Appends the values from `from` up to `to` of a record.
+    fn values(&self, place: Place, from: usize, to: usize, out: &mut Vec<f64>) -> io::Result<()> {
+        let (kind, header) = (place.payload.kind, self.headers[place.part]);
+        if let (Some(size), Some(header)) = (kind.size(), header) {
+            let source = &*self.parts[place.part];
+            let at = place.payload.at + (from * size) as u64;
+            let length = (to - from) * size;
+            if let Some(all) = source.bytes() {
+                let from = usize::try_from(at).unwrap_or(usize::MAX);
+                let bytes = all.get(from..from.saturating_add(length)).unwrap_or_default();
+                kind.reals(header, bytes, out);
+            } else {
+                let bytes = self.bytes(place, (from * size) as u64, length)?;
+                kind.reals(header, &bytes, out);
             }
         }
-        // The container's problems concern every section of it.
-        let problems = problems.into_list();
-        for file in &mut files {
-            file.problems.clone_from(&problems);
-        }
-        files
+        Ok(())
     }
+}
+
+/// For every kept entity its position among a state's ids.
+fn positions_of(kept: &[(usize, Option<EntityId>)], ids: &[i64]) -> Vec<Option<usize>> {
+    let of: HashMap<i64, usize> = ids.iter().enumerate().map(|(k, &id)| (id, k)).collect();
+    kept.iter().map(|(_, entity)| entity.and_then(|e| of.get(&e.id).copied())).collect()
+}
+
+fn is_not_result(name: &str) -> bool {
+    NOT_RESULTS.contains(&name)
+}
+
+/// Sums over all entities of a section (bndout, spcforc), whose number of values tells
+/// nothing where there is one entity.
+fn is_total(name: &str) -> bool {
+    name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")
+}
+
+impl Place {
+    /// Number of values.
+    fn width(&self) -> usize {
+        let size = self.payload.kind.size().unwrap_or(1) as u64;
+        usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)
+    }
+}
+
+impl Component {
+    fn is_real(&self) -> bool {
+        self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
+    }
+}
+
+impl Clone for Owners {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Global => Self::Global,
+            Self::Fixed(ids) => Self::Fixed(ids.clone()),
+            Self::OfState(ids) => Self::OfState(ids.clone()),
+        }
+    }
+}
+
+impl Owners {
+    fn entities(&self) -> &[EntityId] {
+        match self {
+            Self::Global => &[],
+            Self::Fixed(ids) | Self::OfState(ids) => ids,
+        }
+    }
+}
+
+/// What a section says of itself.
+struct Metadata {
+    title: Option<String>,
+    version: Option<String>,
+    revision: Option<String>,
+    titles: HashMap<i64, String>,
+    ids: Option<Vec<i64>>,
+    side: Option<Vec<i64>>,
+    force_ids: Option<Vec<i64>>,
+    moment_ids: Option<Vec<i64>>,
+}
+
+impl Metadata {
+    /// The entities that the values of a component belong to, by their number.
+    fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
+        let fits = |ids: &Option<Vec<i64>>| ids.clone().filter(|ids| ids.len() == width);
+        let ids = fits(&self.ids).or_else(|| match component {
+            c if c.ends_with("_force") => fits(&self.force_ids),
+            c if c.ends_with("_moment") => fits(&self.moment_ids),
+            _ => None,
+        })?;
+        // Rows of two-sided contacts repeat their id.
+        let sides = fits(&self.side);
+        let side =
+            |k: usize| sides.as_ref().map(|s| if s[k] == 0 { Side::SurfA } else { Side::SurfB });
+        Some(ids.into_iter().enumerate().map(|(k, id)| EntityId { id, side: side(k) }).collect())
+    }
+}
+
+/// A text without its padding.
+fn trimmed(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    (!text.is_empty()).then(|| text.to_string())
+}
+
+/// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
+fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
+    let (Some(ids), Some(legend)) = (ids, legend) else { return HashMap::new() };
+    let width = legend.len() / ids.len().max(1);
+    if width == 0 {
+        return HashMap::new();
+    }
+    let titled = ids.iter().zip(legend.chunks(width));
+    titled.filter_map(|(&id, bytes)| Some((id, trimmed(bytes)?))).collect()
 }

@@ -1,10 +1,11 @@
 //! `glstat`: energies and other quantities of the whole model, one labelled line each.
 
-use std::io::{self, BufRead};
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real};
 use crate::solver::problem::Place;
+use crate::solver::source::Source;
 use crate::solver::states::States;
 use crate::solver::{Selection, SolverFile};
 
@@ -24,8 +25,8 @@ pub fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("glstat", input, selection, Glstat)
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("glstat", source, selection, || Glstat)
 }
 
 struct Glstat;

@@ -2,6 +2,9 @@
 
 use std::io::{self, BufRead};
 
+use crate::solver::problem::Place;
+use crate::solver::source::Stream;
+
 /// Bytes kept of one line. The longest line of any known file has 170; what lies
 /// beyond is skipped, so that a file without line ends cannot fill the memory.
 const MAX_LINE: usize = 4096;
@@ -45,14 +48,9 @@ impl<R: BufRead> Lines<R> {
         Self { input, buffer: Vec::with_capacity(256), number: 0, byte: 0 }
     }
 
-    /// Bytes read so far.
-    pub fn byte(&self) -> u64 {
-        self.byte
-    }
-
-    /// Number of the last line read, counted from 1.
-    pub fn number(&self) -> u64 {
-        self.number
+    /// Number of the last line read, counted from 1, and the byte behind it.
+    pub fn place(&self) -> Place {
+        Place { line: self.number, byte: self.byte }
     }
 
     /// The next line, or `None` at the end of the file.
@@ -90,6 +88,15 @@ impl<R: BufRead> Lines<R> {
         }
         self.number += 1;
         Ok(Some(Line { text: &self.buffer, number: self.number, byte: start, ended, overlong }))
+    }
+}
+
+impl Lines<Stream<'_>> {
+    /// Goes on with the line that begins at `place`.
+    pub fn go_to(&mut self, place: Place) {
+        self.number = place.line - 1;
+        self.byte = place.byte;
+        self.input.go_to(place.byte);
     }
 }
 

@@ -1,28 +1,34 @@
-//! LSDA: the container of binout. Header, record payloads and paths; no meaning of content.
+//! LSDA: the container of binout. Header, records and paths; no meaning of content.
+//!
+//! Records are walked in order and symbol tables skipped: a run that died has no last table,
+//! so nothing may depend on one. Where a record makes no sense, the walk goes on at the next
+//! record that changes to an absolute path.
 
-use std::io::{self, BufRead, Read};
+use std::io;
+
+use crate::solver::source::{Source, Window};
 
 /// Widths of the container's own fields.
-#[derive(Clone, Copy)]
-pub(super) struct Header {
-    pub(super) header: usize,
-    pub(super) length: usize,
-    pub(super) big_endian: bool,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    length: u8,
+    width: u8,
+    big_endian: bool,
 }
 
 impl Header {
     /// "header length, bytes in LENGTH, OFFSET, COMMAND and TYPEID fields, byte order
     /// (1 little, 0 big), float format (0 IEEE), unused".
-    pub(super) fn parse(head: &[u8]) -> Option<Self> {
+    pub fn parse(head: &[u8]) -> Option<Self> {
         match *head.get(..7)? {
-            [header @ 8..=64, length @ (4 | 8), 4 | 8, 1, 1, order @ (0 | 1), 0] => {
-                Some(Self { header: header.into(), length: length.into(), big_endian: order == 0 })
+            [length @ 8..=64, width @ (4 | 8), 4 | 8, 1, 1, order @ (0 | 1), 0] => {
+                Some(Self { length, width, big_endian: order == 0 })
             }
             _ => None,
         }
     }
 
-    pub(super) fn unsigned(&self, bytes: &[u8]) -> u64 {
+    fn unsigned(self, bytes: &[u8]) -> u64 {
         let fold = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
         match self.big_endian {
             true => bytes.iter().fold(0, fold),
@@ -31,101 +37,252 @@ impl Header {
     }
 }
 
-/// The values of one data record.
-pub(super) enum Values {
-    Text(Vec<u8>),
-    Integers(Vec<i64>),
-    Reals(Vec<f64>),
-}
+/// Types of values: 1–4 signed of 1, 2, 4, 8 bytes, 5–8 unsigned, 9 float32, 10 float64.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind(pub u8);
 
-impl Values {
-    /// Types 1–4 signed of 1, 2, 4, 8 bytes, 5–8 unsigned, 9 float32, 10 float64.
-    pub(super) fn decode(kind: u8, bytes: Vec<u8>, header: Header) -> Option<Self> {
-        let size = match kind {
-            1 | 5 => return Some(Self::Text(bytes)),
-            2 | 6 => 2,
-            3 | 7 | 9 => 4,
-            4 | 8 | 10 => 8,
-            _ => return None,
-        };
-        if !bytes.len().is_multiple_of(size) {
-            return None;
-        }
-        let words = bytes.chunks_exact(size).map(|w| header.unsigned(w));
-        Some(match kind {
-            2 => Self::Integers(words.map(|w| i64::from(w as u16 as i16)).collect()),
-            3 => Self::Integers(words.map(|w| i64::from(w as u32 as i32)).collect()),
-            4 | 6 | 7 | 8 => Self::Integers(words.map(|w| w as i64).collect()),
-            9 => Self::Reals(words.map(|w| f64::from(f32::from_bits(w as u32))).collect()),
-            _ => Self::Reals(words.map(f64::from_bits).collect()),
-        })
-    }
-
-    pub(super) fn into_integers(self) -> Vec<i64> {
-        match self {
-            Self::Integers(values) => values,
-            Self::Text(_) | Self::Reals(_) => Vec::new(),
+impl Kind {
+    /// Bytes of one value; `None` for a type that does not exist.
+    pub fn size(self) -> Option<usize> {
+        match self.0 {
+            1 | 5 => Some(1),
+            2 | 6 => Some(2),
+            3 | 7 | 9 => Some(4),
+            4 | 8 | 10 => Some(8),
+            _ => None,
         }
     }
 
-    /// As real numbers; `None` for text.
-    pub(super) fn into_reals(self) -> Option<Vec<f64>> {
-        match self {
-            Self::Reals(values) => Some(values),
-            Self::Integers(values) => Some(values.into_iter().map(|v| v as f64).collect()),
-            Self::Text(_) => None,
+    pub fn is_text(self) -> bool {
+        matches!(self.0, 1 | 5)
+    }
+
+    pub fn is_real(self) -> bool {
+        matches!(self.0, 9 | 10)
+    }
+
+    /// Appends the values of `bytes` to `out`, as doubles.
+    pub fn reals(self, header: Header, bytes: &[u8], out: &mut Vec<f64>) {
+        let words = |size| bytes.chunks_exact(size).map(move |w| header.unsigned(w));
+        match (self.0, header.big_endian) {
+            // The two that matter, without going byte by byte.
+            (9, false) => {
+                out.extend(bytes.as_chunks().0.iter().map(|w| f64::from(f32::from_le_bytes(*w))))
+            }
+            (10, false) => out.extend(bytes.as_chunks().0.iter().map(|w| f64::from_le_bytes(*w))),
+            (9, true) => out.extend(words(4).map(|w| f64::from(f32::from_bits(w as u32)))),
+            (10, true) => out.extend(words(8).map(f64::from_bits)),
+            (5..=8, _) => out.extend(words(self.size().unwrap_or(1)).map(|w| w as f64)),
+            _ => out.extend(self.integers(header, bytes).into_iter().map(|v| v as f64)),
         }
     }
 
-    pub(super) fn into_text(self) -> Vec<u8> {
-        match self {
-            Self::Text(text) => text,
-            Self::Integers(_) | Self::Reals(_) => Vec::new(),
+    /// The values of `bytes`, as integers; empty for reals.
+    pub fn integers(self, header: Header, bytes: &[u8]) -> Vec<i64> {
+        let words = |size| bytes.chunks_exact(size).map(move |w| header.unsigned(w));
+        match self.0 {
+            1 => words(1).map(|w| i64::from(w as u8 as i8)).collect(),
+            2 => words(2).map(|w| i64::from(w as u16 as i16)).collect(),
+            3 => words(4).map(|w| i64::from(w as u32 as i32)).collect(),
+            4..=8 => words(self.size().unwrap_or(8)).map(|w| w as i64).collect(),
+            _ => Vec::new(),
         }
-    }
-}
-
-/// Fills `buffer`; false if the file ends before.
-pub(super) fn fill(input: &mut dyn BufRead, buffer: &mut [u8]) -> io::Result<bool> {
-    match input.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(e) => Err(e),
     }
 }
 
-/// The next `length` bytes, or `None` if the file ends before. Grows with what is there,
-/// whatever length a damaged record claims.
-pub(super) fn take(input: &mut dyn BufRead, length: u64) -> io::Result<Option<Vec<u8>>> {
-    let mut bytes = Vec::new();
-    input.take(length).read_to_end(&mut bytes)?;
-    Ok((bytes.len() as u64 == length).then_some(bytes))
+/// Where the values of a data record are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Payload {
+    pub kind: Kind,
+    pub at: u64,
+    pub bytes: u64,
 }
 
-/// Skips `length` bytes; false if the file ends before.
-pub(super) fn skip(input: &mut dyn BufRead, mut length: u64) -> io::Result<bool> {
-    while length > 0 {
-        let there = input.fill_buf()?.len() as u64;
-        if there == 0 {
-            return Ok(false);
+/// What the walk meets.
+pub enum Event<'a> {
+    /// Change to a directory; the path may be relative.
+    Directory(&'a str),
+    Data {
+        name: &'a str,
+        payload: Payload,
+    },
+    /// A record that makes no sense, at this byte; the walk goes on behind it, or not.
+    Damage {
+        at: u64,
+        resumed: Option<u64>,
+        message: String,
+    },
+    /// The end of the file cuts a record at this byte.
+    Cut {
+        at: u64,
+    },
+}
+
+const CD: u8 = 2;
+const DATA: u8 = 3;
+/// Commands: null, cd, data, variable, begin and end of a symbol table, its offset.
+const COMMANDS: std::ops::RangeInclusive<u8> = 1..=7;
+/// Longest path that is taken for one; real ones are far shorter.
+const MAX_PATH: usize = 1024;
+/// Bytes read with a record's head: enough for the names of real records, and where
+/// records are small, for several of them.
+const NEAR: usize = 64;
+const MANY: usize = 1 << 14;
+
+/// Reads the header; `None` if this is no container.
+pub fn header(source: &dyn Source) -> io::Result<Option<Header>> {
+    let mut window = Window::new(source);
+    Ok(window.get(0, 8, 0)?.and_then(Header::parse))
+}
+
+/// Walks all records of a container.
+pub fn walk(
+    source: &dyn Source,
+    header: Header,
+    mut each: impl FnMut(Event<'_>),
+) -> io::Result<()> {
+    let size = source.size()?;
+    let mut window = Window::new(source);
+    let mut at = u64::from(header.length);
+    let mut ahead = MANY;
+    while at < size {
+        match record(&mut window, header, at, size, ahead)? {
+            Ok(Record { length, event }) => {
+                if let Some(event) = event {
+                    each(event);
+                }
+                at += length;
+                ahead = if length < MANY as u64 / 4 { MANY } else { NEAR };
+            }
+            Err(message) => {
+                let resumed = resume(source, header, at + 1, size)?;
+                let cut = resumed.is_none() && message.is_none();
+                each(match message {
+                    None if cut => Event::Cut { at },
+                    message => Event::Damage { at, resumed, message: message.unwrap_or_default() },
+                });
+                let Some(resumed) = resumed else { return Ok(()) };
+                at = resumed;
+            }
         }
-        let step = there.min(length);
-        input.consume(step as usize);
-        length -= step;
     }
-    Ok(true)
+    Ok(())
+}
+
+struct Record<'a> {
+    length: u64,
+    event: Option<Event<'a>>,
+}
+
+/// The record at `at`; what is wrong with it, or `None` if the file ends within it.
+fn record<'a>(
+    window: &'a mut Window<'_>,
+    header: Header,
+    at: u64,
+    size: u64,
+    ahead: usize,
+) -> io::Result<Result<Record<'a>, Option<String>>> {
+    let width = usize::from(header.width);
+    let frame = width + 1;
+    let Some(head) = window.get(at, frame, ahead)? else { return Ok(Err(None)) };
+    let (length, command) = (header.unsigned(&head[..width]), head[width]);
+    if !COMMANDS.contains(&command) || length < frame as u64 {
+        return Ok(Err(Some(format!("command {command} and {length} bytes make no record"))));
+    }
+    if length > size - at {
+        return Ok(Err(None));
+    }
+    let payload = length - frame as u64;
+    let (from, near) = (at + frame as u64, payload.min(MAX_PATH as u64) as usize);
+    match command {
+        CD => {
+            if payload > MAX_PATH as u64 {
+                return Ok(Err(Some(format!("a path of {payload} bytes is too long for one"))));
+            }
+            let Some(path) = window.get(from, near, 0)? else { return Ok(Err(None)) };
+            match text(path) {
+                Some(path) => Ok(Ok(Record { length, event: Some(Event::Directory(path)) })),
+                None => Ok(Err(Some("expected a path, found bytes that are no text".into()))),
+            }
+        }
+        DATA => {
+            let Some(head) = window.get(from, near.min(2 + 255), 0)? else { return Ok(Err(None)) };
+            let [kind, name_length, rest @ ..] = head else {
+                return Ok(Err(Some("expected a type and a name".into())));
+            };
+            let kind = Kind(*kind);
+            let name = rest.get(..usize::from(*name_length)).and_then(text);
+            let (Some(name), Some(item)) = (name.filter(|n| !n.is_empty()), kind.size()) else {
+                return Ok(Err(Some(format!(
+                    "expected a type from 1 to 10 and a name, found type {}",
+                    kind.0
+                ))));
+            };
+            let before = 2 + name.len() as u64;
+            let bytes = payload - before;
+            if !bytes.is_multiple_of(item as u64) {
+                return Ok(Err(Some(format!(
+                    "{name} has {bytes} bytes, no whole number of values"
+                ))));
+            }
+            let payload = Payload { kind, at: from + before, bytes };
+            Ok(Ok(Record { length, event: Some(Event::Data { name, payload }) }))
+        }
+        _ => Ok(Ok(Record { length, event: None })),
+    }
+}
+
+/// Printable text.
+fn text(bytes: &[u8]) -> Option<&str> {
+    let is_printable = bytes.iter().all(|b| (b' '..=b'~').contains(b));
+    std::str::from_utf8(bytes).ok().filter(|_| is_printable)
+}
+
+/// The next record behind a damaged one that changes to an absolute path and is followed
+/// by a possible record.
+fn resume(source: &dyn Source, header: Header, from: u64, size: u64) -> io::Result<Option<u64>> {
+    const CHUNK: usize = 1 << 16;
+    let width = usize::from(header.width);
+    let mut window = Window::new(source);
+    let mut probe = Window::new(source);
+    let mut at = from;
+    while at < size {
+        // Chunks overlap by one byte, so that the pattern cannot fall between two.
+        let length = CHUNK.min((size - at) as usize);
+        let Some(bytes) = window.get(at, length, 0)? else { return Ok(None) };
+        for found in memchr::memmem::find_iter(bytes, [CD, b'/'].as_slice()) {
+            let Some(start) = (at + found as u64).checked_sub(width as u64) else { continue };
+            if start < from {
+                continue;
+            }
+            let Ok(Record { length, event: Some(Event::Directory(_)) }) =
+                record(&mut probe, header, start, size, NEAR)?
+            else {
+                continue;
+            };
+            let next = start + length;
+            if next == size || record(&mut probe, header, next, size, NEAR)?.is_ok() {
+                return Ok(Some(start));
+            }
+        }
+        at += (length - 1).max(1) as u64;
+    }
+    Ok(None)
 }
 
 /// Follows an absolute or relative path with `..`.
-pub(super) fn change_directory(path: &mut Vec<String>, to: &str) {
+pub fn change_directory(path: &mut Vec<String>, to: &str) {
     if to.starts_with('/') {
         path.clear();
     }
     for part in to.split('/').filter(|p| !p.is_empty() && *p != ".") {
         if part == ".." {
             path.pop();
-        } else {
+        } else if path.len() < MAX_DEPTH {
             path.push(part.to_string());
         }
     }
 }
+
+/// Directories within each other; real containers have four.
+const MAX_DEPTH: usize = 16;

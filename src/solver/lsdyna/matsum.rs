@@ -1,11 +1,12 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
-use std::io::{self, BufRead};
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
+use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
 
@@ -50,8 +51,8 @@ pub fn signature(line: &[u8]) -> bool {
     line.starts_with(PART)
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("matsum", input, selection, Matsum::default())
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("matsum", source, selection, Matsum::default)
 }
 
 #[derive(Default)]

@@ -2,6 +2,7 @@
 
 mod ascii;
 pub mod binout;
+mod e12;
 pub mod glstat;
 pub(super) mod header;
 pub mod line;

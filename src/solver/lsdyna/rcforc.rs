@@ -1,11 +1,12 @@
 //! `rcforc`: resultant forces of contact interfaces, one line per side and state.
 
-use std::io::{self, BufRead};
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::{EntityId, Side};
 use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
 
@@ -52,8 +53,8 @@ pub fn signature(line: &[u8]) -> bool {
     undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some())
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("rcforc", input, selection, Rcforc::default())
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("rcforc", source, selection, Rcforc::default)
 }
 
 #[derive(Default)]

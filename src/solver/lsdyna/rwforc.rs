@@ -1,11 +1,12 @@
 //! `rwforc`: forces on rigid walls, one line per wall and state.
 
-use std::io::{self, BufRead};
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
 
@@ -19,8 +20,8 @@ pub fn signature(line: &[u8]) -> bool {
     is_column_line(line) || is_node_set_heading(line)
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("rwforc", input, selection, Rwforc::default())
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("rwforc", source, selection, Rwforc::default)
 }
 
 #[derive(Default)]

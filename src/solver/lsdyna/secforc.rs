@@ -3,12 +3,13 @@
 //! Seen with data only as LSTC's converter `l2a` writes it; of the solver's own files only
 //! ones that end after the header.
 
-use std::io::{self, BufRead};
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
+use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
 
@@ -29,8 +30,8 @@ pub fn signature(line: &[u8]) -> bool {
     line.trim_ascii_start().starts_with(b"line#1  section#")
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("secforc", input, selection, Secforc::default())
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("secforc", source, selection, Secforc::default)
 }
 
 #[derive(Default)]

@@ -4,14 +4,20 @@
 //! under a state line of its own with the same cycle and time. The column line tells
 //! which block it is.
 
-use std::io::{self, BufRead};
+mod blocks;
+mod stride;
+
+use std::io;
 
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
+use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
+pub use blocks::Blocks;
+use stride::Stride;
 
 /// Opens every block's state line.
 const STATE: &[u8] = b" n o d a l   p r i n t   o u t   f o r   t i m e  s t e p";
@@ -53,8 +59,8 @@ pub fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(input: &mut dyn BufRead, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("nodout", input, selection, Nodout::default())
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("nodout", source, selection, Nodout::default)
 }
 
 #[derive(Default)]
@@ -64,6 +70,11 @@ struct Nodout {
     announced: Option<(i64, f64, Place)>,
     cycle: Option<i64>,
     block: Option<Block>,
+    /// Where the pending state and the announced one begin, if the latter is a new state.
+    pending_start: Option<Place>,
+    new_start: Option<Place>,
+    /// How states are laid out, from the last one that was read line by line.
+    stride: Option<Stride>,
 }
 
 #[derive(Clone, Copy)]
@@ -84,6 +95,7 @@ impl Body for Nodout {
         } else if line.text.starts_with(STATE) {
             self.block = None;
             self.announced = self.state_line(line, states);
+            self.note_start(states);
         } else if line.text.starts_with(COLUMN_LINE) {
             self.block = self.column_line(line, states);
         } else if let Some(block) = self.block {
@@ -103,6 +115,35 @@ impl Body for Nodout {
         }
     }
 
+    fn leap(&mut self, source: &dyn Source, states: &mut States<'_>) -> io::Result<Option<Place>> {
+        let Some((above, start)) = self.pending_start.zip(self.new_start.take()) else {
+            self.pending_start = self.pending_start.or(self.new_start.take());
+            return Ok(None);
+        };
+        self.pending_start = Some(start);
+        let kept = states.kept();
+        states.close(false);
+        if states.kept() == kept {
+            return Ok(None);
+        }
+        let tables = self.tables.unwrap_or([TableId::default(); 2]);
+        for learn in [self.stride.is_none(), true] {
+            if learn {
+                self.stride = Stride::learn(source, above, start, states, tables)?;
+            }
+            let Some(stride) = &self.stride else { return Ok(None) };
+            if let Some(end) = stride.leap(source, start, states)? {
+                self.announced = None;
+                self.pending_start = None;
+                return Ok(Some(end));
+            }
+            if learn {
+                break;
+            }
+        }
+        Ok(None)
+    }
+
     fn end(&mut self, _: Place, states: &mut States<'_>) {
         // A state line without the rows it announces.
         if self.continue_announced(states) {
@@ -112,18 +153,19 @@ impl Body for Nodout {
 }
 
 impl Nodout {
+    /// Notes the place of the announced state if it is not the pending one's other block.
+    fn note_start(&mut self, states: &mut States<'_>) {
+        states.times_are_distinct();
+        if let Some((cycle, time, place)) = self.announced
+            && (states.pending_time() != Some(time) || self.cycle != Some(cycle))
+        {
+            self.new_start = Some(place);
+        }
+    }
+
     /// Cycle number right after `s t e p`, time between `( at time` and `)`.
     fn state_line(&self, line: &Line<'_>, states: &mut States<'_>) -> Option<(i64, f64, Place)> {
-        let rest = &line.text[STATE.len()..];
-        let at = memchr::memmem::find(rest, b"( at time");
-        let close = memchr::memchr(b')', rest);
-        let parsed = at.zip(close).and_then(|(at, close)| {
-            let cycle = integer(&rest[..at])?;
-            match real(rest.get(at + b"( at time".len()..close)?) {
-                Field::Real(time) => Some((cycle, time, Place::from(line))),
-                _ => None,
-            }
-        });
+        let parsed = cycle_and_time(line.text).map(|(cycle, time)| (cycle, time, line.into()));
         if parsed.is_none() {
             // Without its time the block cannot be placed: what was pending ends here.
             states.begin(None, line.into());
@@ -174,6 +216,19 @@ impl Nodout {
             states.begin(Some(time), place);
         }
         Some(block)
+    }
+}
+
+/// Cycle and time of a state line.
+fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
+    const AT: &[u8] = b"( at time";
+    let rest = line.strip_prefix(STATE)?;
+    let at = memchr::memmem::find(rest, AT)?;
+    let close = memchr::memchr(b')', rest)?;
+    let cycle = integer(&rest[..at])?;
+    match real(rest.get(at + AT.len()..close)?) {
+        Field::Real(time) => Some((cycle, time)),
+        _ => None,
     }
 }
 

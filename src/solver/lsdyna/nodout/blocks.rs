@@ -1,0 +1,136 @@
+//! A whole nodout state by state, for a consumer that writes each state straight on.
+
+use std::io;
+
+use rayon::prelude::*;
+
+use super::Nodout;
+use super::stride::{Stride, Wanted};
+use crate::history::EntityId;
+use crate::solver::lsdyna::ascii::Frame;
+use crate::solver::source::{Source, Window};
+use crate::solver::states::TableId;
+use crate::solver::{Selection, SolverFile};
+
+/// An undamaged nodout whose states all have the same layout.
+pub struct Blocks {
+    source: Box<dyn Source>,
+    stride: Stride,
+    /// Byte of the first state.
+    start: u64,
+    wanted: Vec<Wanted>,
+    /// What the file says of itself, with the times of all states and no history.
+    pub file: SolverFile,
+    /// What a state's values are, in their order.
+    pub columns: Vec<Column>,
+}
+
+/// One component of some entities: neighbouring values of a state.
+pub struct Column {
+    pub component: String,
+    pub entities: Vec<EntityId>,
+}
+
+impl Blocks {
+    /// `None` if the file is damaged, or has too few states to tell their layout: then the
+    /// line reader gives what there is.
+    pub fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
+        let mut frame = Frame::new("nodout", &*source, selection);
+        let mut body = Nodout::default();
+        let mut above = None;
+        let start = loop {
+            if !frame.step(&mut body)? {
+                return Ok(None);
+            }
+            match (above, body.new_start.take()) {
+                (Some(above), Some(new)) => break (above, new),
+                (None, Some(first)) => above = Some(first),
+                _ => {}
+            }
+        };
+        frame.states.close(false);
+        body.announced = None;
+        let Some(tables) = body.tables.filter(|_| frame.states.kept() == 1) else {
+            return Ok(None);
+        };
+        let learnt = Stride::learn(&*source, start.0, start.1, &frame.states, tables)?;
+        let Some(stride) = learnt else { return Ok(None) };
+        let wanted = stride.wanted_by_column(&frame.states);
+        let rows: Vec<Vec<EntityId>> = (0..wanted.len())
+            .map(|k| {
+                let all = frame.states.rows(stride.table(k));
+                wanted[k].rows().iter().map(|&row| all[row]).collect()
+            })
+            .collect();
+        let start = start.0.byte;
+        let size = source.size()?;
+        let count = stride.count(size, start);
+        let times = times(&*source, &stride, start, count)?;
+        let mut file = frame.finish(&mut body);
+        let ends_there = size <= start + count as u64 * stride.period();
+        let rising = times.as_ref().is_some_and(|t| t.is_sorted_by(|a, b| a < b));
+        let (Some(times), true) = (times, ends_there && rising && file.problems.is_empty()) else {
+            return Ok(None);
+        };
+        file.time = times.into();
+        file.histories.clear();
+        let mut columns: Vec<(usize, Column)> = Vec::new();
+        for ((k, wanted), rows) in wanted.iter().enumerate().zip(&rows) {
+            let components = body.components(stride.table(k));
+            for (i, &column) in wanted.columns().iter().enumerate() {
+                let first = wanted.range().start + i * rows.len();
+                let component = components[column].to_string();
+                columns.push((first, Column { component, entities: rows.clone() }));
+            }
+        }
+        columns.sort_by_key(|(first, _)| *first);
+        let columns = columns.into_iter().map(|(_, column)| column).collect();
+        Ok(Some(Self { source, stride, start, wanted, file, columns }))
+    }
+
+    /// Number of values of one state.
+    pub fn values(&self) -> usize {
+        self.wanted.iter().map(Wanted::values).sum()
+    }
+
+    /// A buffer for [`Blocks::read`], of one thread.
+    pub fn window(&self) -> Window<'_> {
+        Window::new(&*self.source)
+    }
+
+    /// Reads one state into `out`, column by column; false if it is damaged.
+    pub fn read(&self, window: &mut Window<'_>, state: usize, out: &mut [f64]) -> io::Result<bool> {
+        let at = self.start + state as u64 * self.stride.period();
+        let time = self.stride.state(window, at, &self.wanted, false, out)?;
+        Ok(time == Some(self.file.time[state]))
+    }
+}
+
+/// The times of all states; `None` if what stands around the rows of any differs.
+fn times(
+    source: &dyn Source,
+    stride: &Stride,
+    start: u64,
+    count: usize,
+) -> io::Result<Option<Vec<f64>>> {
+    let nothing: Vec<Wanted> = stride.nothing();
+    (0..count)
+        .into_par_iter()
+        .map_init(
+            || Window::new(source),
+            |window, k| {
+                let at = start + k as u64 * stride.period();
+                stride.state(window, at, &nothing, false, &mut [])
+            },
+        )
+        .collect()
+}
+
+impl Nodout {
+    fn components(&self, table: TableId) -> &'static [&'static str] {
+        match self.tables {
+            Some([translations, _]) if translations == table => &super::TRANSLATIONS,
+            _ => &super::ROTATIONS,
+        }
+    }
+}

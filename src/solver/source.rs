@@ -1,0 +1,260 @@
+//! Where bytes come from: files, memory maps and memory, read at a position.
+//!
+//! Plain reading is the default, because the file of a run that is still going may grow or
+//! shrink at any time: a plain read then ends early, while the access to a map beyond the
+//! end of its file kills the process.
+
+use std::fs::File;
+use std::io::{self, BufRead, Read};
+use std::path::Path;
+
+/// Bytes that can be read at any position, from several threads at once.
+pub trait Source: Send + Sync {
+    /// Number of bytes now; a file that is being written may have another number later.
+    fn size(&self) -> io::Result<u64>;
+
+    /// Reads up to `buffer.len()` bytes from `offset`; 0 at the end.
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize>;
+
+    /// All bytes, where they are in memory already.
+    fn bytes(&self) -> Option<&[u8]> {
+        None
+    }
+}
+
+/// How files are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Access {
+    /// By positional reads: safe whatever happens to the file meanwhile.
+    #[default]
+    Plain,
+    /// Through a memory map, which saves a copy. Only for files that nothing writes to: if
+    /// the file is cut while it is read, the operating system ends the process.
+    Map,
+}
+
+/// Opens a file. A pipe or device, which has no positions, is copied to a temporary file.
+pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
+    let mut file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        let mut copy = tempfile::tempfile()?;
+        io::copy(&mut file, &mut copy)?;
+        file = copy;
+    }
+    Ok(match access {
+        Access::Plain => Box::new(file),
+        Access::Map => Box::new(Mapped::new(&file)?),
+    })
+}
+
+impl Source for File {
+    fn size(&self) -> io::Result<u64> {
+        Ok(self.metadata()?.len())
+    }
+
+    #[cfg(unix)]
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        std::os::unix::fs::FileExt::read_at(self, buffer, offset)
+    }
+
+    #[cfg(windows)]
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        std::os::windows::fs::FileExt::seek_read(self, buffer, offset)
+    }
+}
+
+/// A file mapped into memory.
+struct Mapped(memmap2::Mmap);
+
+impl Mapped {
+    #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
+    fn new(file: &File) -> io::Result<Self> {
+        // SAFETY: the user asked for a map and so promised that nothing writes to the file.
+        unsafe { memmap2::Mmap::map(file) }.map(Self)
+    }
+}
+
+impl Source for Mapped {
+    fn size(&self) -> io::Result<u64> {
+        Ok(self.0.len() as u64)
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.as_ref().read_at(offset, buffer)
+    }
+
+    fn bytes(&self) -> Option<&[u8]> {
+        Some(&self.0)
+    }
+}
+
+impl Source for &[u8] {
+    fn size(&self) -> io::Result<u64> {
+        Ok(self.len() as u64)
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        let rest = usize::try_from(offset).ok().and_then(|from| self.get(from..));
+        let rest = rest.unwrap_or_default();
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
+        Ok(count)
+    }
+
+    fn bytes(&self) -> Option<&[u8]> {
+        Some(self)
+    }
+}
+
+/// Fills as much of `buffer` as the source has from `offset` on; returns how much.
+pub fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match source.read_at(offset + filled as u64, &mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(filled)
+}
+
+/// Bytes per read of a [`Stream`].
+const STREAM_BUFFER: usize = 1 << 16;
+
+/// A source read from front to back, with jumps.
+pub struct Stream<'a> {
+    source: &'a dyn Source,
+    /// Position of the buffer's end.
+    at: u64,
+    buffer: Vec<u8>,
+    used: usize,
+}
+
+impl<'a> Stream<'a> {
+    pub fn new(source: &'a dyn Source) -> Self {
+        Self { source, at: 0, buffer: Vec::new(), used: 0 }
+    }
+
+    /// Position of the next byte.
+    pub fn position(&self) -> u64 {
+        self.at - (self.buffer.len() - self.used) as u64
+    }
+
+    /// Goes on at `position`; bytes that are in the buffer are not read again.
+    pub fn go_to(&mut self, position: u64) {
+        let start = self.at - self.buffer.len() as u64;
+        if (start..=self.at).contains(&position) {
+            self.used = (position - start) as usize;
+        } else {
+            self.buffer.clear();
+            self.used = 0;
+            self.at = position;
+        }
+    }
+}
+
+impl Read for Stream<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let there = self.fill_buf()?;
+        let count = there.len().min(out.len());
+        out[..count].copy_from_slice(&there[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl BufRead for Stream<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.used == self.buffer.len() {
+            self.buffer.resize(STREAM_BUFFER, 0);
+            self.used = 0;
+            let read = fill_at(self.source, self.at, &mut self.buffer);
+            self.buffer.truncate(*read.as_ref().unwrap_or(&0));
+            self.at += read? as u64;
+        }
+        Ok(&self.buffer[self.used..])
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.used += count.min(self.buffer.len() - self.used);
+    }
+}
+
+/// Reads ranges that lie close together with few calls, in a buffer that is used again.
+pub struct Window<'a> {
+    source: &'a dyn Source,
+    buffer: Vec<u8>,
+    /// Range of the source that the buffer holds.
+    start: u64,
+}
+
+impl<'a> Window<'a> {
+    pub fn new(source: &'a dyn Source) -> Self {
+        Self { source, buffer: Vec::new(), start: 0 }
+    }
+
+    /// `length` bytes from `offset`, or `None` if the source ends before. Up to `ahead`
+    /// further bytes are read in the same call.
+    pub fn get(&mut self, offset: u64, length: usize, ahead: usize) -> io::Result<Option<&[u8]>> {
+        if let Some(bytes) = self.source.bytes() {
+            let from = usize::try_from(offset).unwrap_or(usize::MAX);
+            let end = from.saturating_add(length);
+            return Ok(bytes.get(from..end));
+        }
+        let held = self.start..self.start + self.buffer.len() as u64;
+        if offset < held.start || offset + length as u64 > held.end {
+            // What is held and wanted again moves to the front; the rest is read.
+            let keep = held.contains(&offset).then(|| (offset - held.start) as usize);
+            let kept = match keep {
+                Some(from) => {
+                    self.buffer.drain(..from);
+                    self.buffer.len()
+                }
+                None => 0,
+            };
+            self.buffer.resize(length + ahead, 0);
+            let read = fill_at(self.source, offset + kept as u64, &mut self.buffer[kept..]);
+            self.start = offset;
+            self.buffer.truncate(kept + *read.as_ref().unwrap_or(&0));
+            read?;
+        }
+        let from = (offset - self.start) as usize;
+        Ok(self.buffer.get(from..from + length))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_jumps_back_and_forth() {
+        let bytes: Vec<u8> = (0..200_000u32).map(|i| i as u8).collect();
+        let source = &bytes[..];
+        let mut stream = Stream::new(&source);
+        for at in [0u64, 70_000, 69_999, 3, 199_999, 65_536] {
+            stream.go_to(at);
+            let mut byte = [0];
+            assert_eq!(stream.read(&mut byte).unwrap(), 1);
+            assert_eq!((byte[0], stream.position()), (at as u8, at + 1));
+        }
+        stream.go_to(1_000_000);
+        assert!(stream.fill_buf().unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_window_reads_ahead_and_ends() {
+        let mut file = tempfile::tempfile().unwrap();
+        let bytes: Vec<u8> = (0..100u8).collect();
+        io::Write::write_all(&mut file, &bytes).unwrap();
+        let mut window = Window::new(&file);
+        assert_eq!(window.get(10, 5, 20).unwrap(), Some(&bytes[10..15]));
+        assert_eq!(window.get(30, 5, 0).unwrap(), Some(&bytes[30..35]), "was read ahead");
+        assert_eq!(window.get(33, 40, 0).unwrap(), Some(&bytes[33..73]));
+        assert_eq!(window.get(90, 10, 50).unwrap(), Some(&bytes[90..100]));
+        assert_eq!(window.get(95, 10, 0).unwrap(), None);
+        assert_eq!(window.get(0, 2, 0).unwrap(), Some(&bytes[..2]));
+    }
+}
