@@ -1,6 +1,6 @@
 //! Writing files so that a reader sees the old content or the new, never half of it.
 
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -47,6 +47,28 @@ pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     Ok(())
 }
 
+/// Writes a file as [`write_whole`] does, by a function that fills it at any positions.
+/// Gives back what the function gives; nothing is replaced if that is `None`.
+///
+/// The content is not forced to the disk: it is derived from a file that is still there.
+///
+/// # Errors
+/// [`WriteError`] names the path; nothing half-written stays behind.
+pub fn write_at<T>(
+    path: &Path,
+    fill: impl FnOnce(&File) -> io::Result<Option<T>>,
+) -> Result<Option<T>, WriteError> {
+    let write = || -> io::Result<Option<T>> {
+        let (temporary, target) = temporary(path)?;
+        let done = fill(temporary.as_file())?;
+        if done.is_some() {
+            temporary.persist(target).map_err(|e| e.error)?;
+        }
+        Ok(done)
+    };
+    write().map_err(|source| WriteError { path: path.into(), source })
+}
+
 /// Whether two paths name the same existing file.
 pub fn is_same(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
@@ -54,14 +76,23 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
 
 /// Writes the bytes to a temporary file beside their target; to a device at once.
 fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathBuf)>> {
+    if fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+        let mut device = OpenOptions::new().write(true).open(path)?;
+        device.write_all(bytes)?;
+        device.flush()?;
+        return Ok(None);
+    }
+    let (mut temporary, target) = temporary(path)?;
+    temporary.write_all(bytes)?;
+    temporary.as_file().sync_all()?;
+    Ok(Some((temporary, target)))
+}
+
+/// An empty temporary file beside the target of `path`, and that target.
+fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
     let existing = match fs::metadata(path) {
         Ok(meta) if meta.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-        Ok(meta) if !meta.is_file() => {
-            let mut device = OpenOptions::new().write(true).open(path)?;
-            device.write_all(bytes)?;
-            device.flush()?;
-            return Ok(None);
-        }
+        Ok(meta) if !meta.is_file() => return Err(io::ErrorKind::Unsupported.into()),
         Ok(meta) => Some(meta.permissions()),
         Err(_) => None,
     };
@@ -81,10 +112,8 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathB
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(existing.unwrap_or_else(|| fs::Permissions::from_mode(0o666)));
     }
-    let mut temporary = builder.tempfile_in(folder)?;
-    temporary.write_all(bytes)?;
-    temporary.as_file().sync_all()?;
-    Ok(Some((temporary, target)))
+    let temporary = builder.tempfile_in(folder)?;
+    Ok((temporary, target))
 }
 
 #[cfg(test)]

@@ -54,7 +54,13 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         keep_input(&args.file, output)?;
     }
     let target = output.map(Target::of).transpose()?;
-    let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
+    // JSON on standard output beside a file needs the values themselves.
+    let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !manners.json);
+    let format = args.format.as_deref();
+    let file = match straight {
+        Some(path) => crumple::database::convert_histories(&args.file, format, &selection, path)?,
+        None => solver::read(&args.file, format, &selection)?,
+    };
     if let Some(section) = &args.section
         && *section != file.section
     {
@@ -73,6 +79,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             write_csv(&mut csv, &file)?;
             write_whole(path, &csv)?;
         }
+        (Some(_), Some(Target::Hdf5)) if straight.is_some() => {}
         (Some(path), Some(Target::Hdf5)) => {
             write_whole(path, &crumple::database::histories_to_hdf5(&file)?)?;
         }
@@ -110,10 +117,12 @@ fn write_csv(out: &mut dyn Write, file: &SolverFile) -> io::Result<()> {
         write!(out, ",{}", history.label())?;
     }
     writeln!(out)?;
+    let mut digits = ryu::Buffer::new();
     for (state, time) in file.time.iter().enumerate() {
-        write!(out, "{time:?}")?;
+        out.write_all(digits.format(*time).as_bytes())?;
         for history in &file.histories {
-            write!(out, ",{:?}", history.values[state])?;
+            out.write_all(b",")?;
+            out.write_all(digits.format(history.values[state]).as_bytes())?;
         }
         writeln!(out)?;
     }

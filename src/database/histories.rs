@@ -1,34 +1,73 @@
 //! Histories as HDF5: one dataset per component, states by entities.
 
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use hdf5_pure::{AttrValue, FileBuilder};
+use hdf5_pure::{AttrValue, DatasetBuilder, FileBuilder};
+use rayon::prelude::*;
 
 use super::DatabaseError;
+use super::skeleton::{Skeleton, write_all_at};
+use crate::file::{WriteError, write_at, write_whole};
 use crate::history::{EntityId, History};
-use crate::solver::SolverFile;
+use crate::solver::{self, Blocks, ReadError, Selection, SolverFile};
+
+/// Why a solver's file could not be converted.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvertError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// Converts the selected histories of the file at `input` to HDF5, in the solver's units.
+///
+/// An undamaged nodout is written state by state while it is read, on all threads, and
+/// never held as a whole; any other file is read first. Gives back what the file says of
+/// itself, with its problems; the histories are left out where they went straight on.
+///
+/// # Errors
+/// [`ConvertError`] if the file cannot be read or the output not be written; the output is
+/// then unchanged.
+pub fn convert_histories(
+    input: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+    output: &Path,
+) -> Result<SolverFile, ConvertError> {
+    let is_device = output.metadata().is_ok_and(|meta| !meta.is_file());
+    if !is_device
+        && let Some(blocks) = solver::blocks(input, format, selection)?
+        && let Some(file) = stream(input, blocks, output)?
+    {
+        return Ok(file);
+    }
+    let file = solver::read(input, format, selection)?;
+    write_whole(output, &histories_to_hdf5(&file)?)?;
+    Ok(file)
+}
 
 /// Encodes the selected histories of a file, in the solver's units.
 ///
 /// `/time` holds one time per state; `/<component>` has the shape states × entities (or
 /// states, for a global quantity) and the attribute `ids`, for interfaces also `sides`.
+/// Of more than 8 000 entities, which no attribute holds, the ids are the dataset
+/// `/ids/<component>`.
 pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
-    let mut out = FileBuilder::new();
-    out.set_attr("format", AttrValue::String("crumple histories".into()));
-    out.set_attr("source_format", AttrValue::String(file.format.into()));
-    for (name, value) in [("title", &file.title), ("version", &file.version)] {
-        if let Some(value) = value {
-            out.set_attr(name, AttrValue::String(value.clone()));
-        }
-    }
-    let states = file.time.len();
-    out.create_dataset("time").with_f64_data(&file.time);
+    let mut out = builder(file);
     let mut components: Vec<&Arc<str>> = Vec::new();
     for history in &file.histories {
         if !components.contains(&&history.component) {
             components.push(&history.component);
         }
     }
+    let mut long = Vec::new();
     for component in components {
         let channels: Vec<&History> =
             file.histories.iter().filter(|h| h.component == *component).collect();
@@ -38,17 +77,140 @@ pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
             dataset.with_f64_data(&channels[0].values);
             continue;
         }
-        let rows: Vec<f64> =
-            (0..states).flat_map(|state| channels.iter().map(move |h| h.values[state])).collect();
-        dataset
-            .with_f64_data(&rows)
-            .with_shape(&[states as u64, channels.len() as u64])
-            .set_attr("ids", AttrValue::I64Array(entities.iter().map(|e| e.id).collect()));
-        let sides: Vec<String> =
-            entities.iter().filter_map(|e| e.side).map(|s| s.name().to_string()).collect();
-        if sides.len() == entities.len() {
-            dataset.set_attr("sides", AttrValue::StringArray(sides));
+        let mut rows = Vec::with_capacity(file.time.len() * channels.len());
+        for state in 0..file.time.len() {
+            rows.extend(channels.iter().map(|h| h.values[state]));
+        }
+        dataset.with_f64_data(&rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
+        if !describe(dataset, &entities) {
+            long.push((component.to_string(), entities));
         }
     }
-    out.finish().map_err(|e| DatabaseError::Encode { detail: e.to_string() })
+    long_ids(&mut out, &long);
+    out.finish().map_err(encode)
+}
+
+fn encode(error: hdf5_pure::Error) -> DatabaseError {
+    DatabaseError::Encode { detail: error.to_string() }
+}
+
+/// A file with what describes the source, and the times.
+fn builder(file: &SolverFile) -> FileBuilder {
+    let mut out = FileBuilder::new();
+    out.set_attr("format", AttrValue::String("crumple histories".into()));
+    out.set_attr("source_format", AttrValue::String(file.format.into()));
+    for (name, value) in [("title", &file.title), ("version", &file.version)] {
+        if let Some(value) = value {
+            out.set_attr(name, AttrValue::String(value.clone()));
+        }
+    }
+    out.create_dataset("time").with_f64_data(&file.time);
+    out
+}
+
+/// Entities whose ids an attribute can hold (64 KiB).
+const MAX_IDS: usize = 8_000;
+
+/// Writes the entities of a dataset as its attributes; false if there are too many.
+fn describe(dataset: &mut DatasetBuilder, entities: &[EntityId]) -> bool {
+    if entities.len() > MAX_IDS {
+        return false;
+    }
+    dataset.set_attr("ids", AttrValue::I64Array(entities.iter().map(|e| e.id).collect()));
+    let sides: Vec<String> =
+        entities.iter().filter_map(|e| e.side).map(|s| s.name().to_string()).collect();
+    if sides.len() == entities.len() {
+        dataset.set_attr("sides", AttrValue::StringArray(sides));
+    }
+    true
+}
+
+fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) {
+    if long.is_empty() {
+        return;
+    }
+    let mut group = out.create_group("ids");
+    for (component, entities) in long {
+        let ids: Vec<i64> = entities.iter().map(|e| e.id).collect();
+        group.create_dataset(component).with_i64_data(&ids);
+    }
+    out.add_group(group.finish());
+}
+
+/// States that are handed on together, so that writes are not too short.
+const TOGETHER: usize = 2;
+
+/// Writes a nodout state by state. `None` if it turns out to be damaged.
+fn stream(input: &Path, blocks: Blocks, output: &Path) -> Result<Option<SolverFile>, ConvertError> {
+    let states = blocks.file.time.len();
+    let mut out = builder(&blocks.file);
+    let mut skeleton = Skeleton::default();
+    let mut long = Vec::new();
+    for column in &blocks.columns {
+        let dataset = out.create_dataset(&column.component);
+        skeleton.reserve(dataset, states, column.entities.len());
+        if !describe(dataset, &column.entities) {
+            long.push((column.component.clone(), column.entities.clone()));
+        }
+    }
+    long_ids(&mut out, &long);
+    let failed_read = |source| ReadError::Io { path: PathBuf::from(input), source };
+    let mut read_error = None;
+    let written = write_at(output, |file| {
+        let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
+        match fill(&blocks, &offsets, file) {
+            Ok(whole) => Ok(whole.then_some(())),
+            Err(Trouble::Writing(error)) => Err(error),
+            Err(Trouble::Reading(error)) => {
+                read_error = Some(error);
+                Ok(None)
+            }
+        }
+    })?;
+    if let Some(error) = read_error {
+        return Err(failed_read(error).into());
+    }
+    Ok(written.map(|()| blocks.file))
+}
+
+enum Trouble {
+    Reading(io::Error),
+    Writing(io::Error),
+}
+
+/// Reads all states and writes their values to `offsets`, one per column; false if a state
+/// is damaged.
+fn fill(blocks: &Blocks, offsets: &[u64], file: &File) -> Result<bool, Trouble> {
+    let states = blocks.file.time.len();
+    let values = blocks.values();
+    let damaged = AtomicBool::new(false);
+    (0..states.div_ceil(TOGETHER)).into_par_iter().try_for_each_init(
+        || (blocks.window(), vec![0.0; values * TOGETHER], Vec::new()),
+        |(window, read, bytes), group| {
+            let first = group * TOGETHER;
+            let count = TOGETHER.min(states - first);
+            for (k, state) in read.chunks_exact_mut(values).take(count).enumerate() {
+                if damaged.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                if !blocks.read(window, first + k, state).map_err(Trouble::Reading)? {
+                    damaged.store(true, Ordering::Relaxed);
+                }
+            }
+            let mut start = 0;
+            for (column, offset) in blocks.columns.iter().zip(offsets) {
+                let width = column.entities.len();
+                bytes.clear();
+                for state in read.chunks_exact(values).take(count) {
+                    let row = &state[start..start + width];
+                    bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+                }
+                let at = offset + (first * width * size_of::<f64>()) as u64;
+                write_all_at(file, bytes, at).map_err(Trouble::Writing)?;
+                start += width;
+            }
+            Ok(())
+        },
+    )?;
+    Ok(!damaged.into_inner())
 }

@@ -7,6 +7,7 @@
 mod histories;
 mod layout;
 mod lock;
+mod skeleton;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::{Case, CurveError};
 use crate::file::{WriteError, write_whole};
-pub use histories::histories_to_hdf5;
+pub use histories::{ConvertError, convert_histories, histories_to_hdf5};
 pub use lock::{LockError, WriterLock};
 
 /// The cases of one database file.

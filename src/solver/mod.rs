@@ -59,6 +59,19 @@ pub const FORMATS: &[Format] = &[
     text("secforc", lsdyna::secforc::signature, lsdyna::secforc::read),
     text("glstat", lsdyna::glstat::signature, lsdyna::glstat::read),
     text("matsum", lsdyna::matsum::signature, lsdyna::matsum::read),
+    text("spcforc", lsdyna::spcforc::signature, lsdyna::spcforc::read),
+    text("bndout", lsdyna::bndout::signature, lsdyna::bndout::read),
+    text("sleout", lsdyna::sleout::signature, lsdyna::sleout::read),
+    text("swforc", lsdyna::swforc::signature, lsdyna::swforc::read),
+    text("abstat", lsdyna::abstat::signature, lsdyna::abstat::read),
+    text("curvout", lsdyna::curvout::signature, lsdyna::curvout::read),
+    text("deforc", lsdyna::deforc::signature, lsdyna::deforc::read),
+    text("jntforc", lsdyna::jntforc::signature, lsdyna::jntforc::read),
+    text("rbdout", lsdyna::rbdout::signature, lsdyna::rbdout::read),
+    text("nodfor", lsdyna::nodfor::signature, lsdyna::nodfor::read),
+    // Before elout, whose name begins the same.
+    text("eloutdet", lsdyna::elout::signature_of_details, lsdyna::elout::read_details),
+    text("elout", lsdyna::elout::signature, lsdyna::elout::read),
     Format {
         name: "binout",
         reader: Reader::Binary {
@@ -259,7 +272,14 @@ fn entity_word(format: &str) -> &'static str {
         "rwforc" | "rwforc/forces" => "rigid wall",
         "secforc" => "section",
         "matsum" => "part",
-        "rcforc" => "interface",
+        "rcforc" | "sleout" => "interface",
+        "spcforc" | "bndout" | "nodfor" | "eloutdet" => "node",
+        "elout" | "deforc" => "element",
+        "swforc" => "weld",
+        "abstat" => "airbag",
+        "jntforc" => "joint",
+        "rbdout" => "rigid body",
+        "curvout" => "curve",
         _ => "entity",
     }
 }

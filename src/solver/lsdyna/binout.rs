@@ -201,7 +201,9 @@ impl Section {
             }
             None => return,
         };
-        if self.components[index].records.insert(state, place).is_some() {
+        let again = self.components[index].records.insert(state, place).is_some();
+        // Within one state a record may be there twice; behind later states it is a restart.
+        if again && state + 1 < self.states.len() {
             self.repeated += 1;
             self.first_repeated.get_or_insert(self.states[state]);
         }
@@ -275,8 +277,8 @@ impl Reader<'_> {
                 }
             }
             for point in 0..points {
-                let name = match points {
-                    1 => component.name.clone(),
+                let name = match point {
+                    0 => component.name.clone(),
                     _ => format!("{}_ip{}", component.name, point + 1).into(),
                 };
                 components.push(name.clone());

@@ -12,6 +12,9 @@ use crate::solver::source::{Source, Window};
 use crate::solver::states::TableId;
 use crate::solver::{Selection, SolverFile};
 
+/// Values below which reading state by state saves nothing.
+const MIN_VALUES: usize = 1 << 17;
+
 /// An undamaged nodout whose states all have the same layout.
 pub struct Blocks {
     source: Box<dyn Source>,
@@ -32,8 +35,8 @@ pub struct Column {
 }
 
 impl Blocks {
-    /// `None` if the file is damaged, or has too few states to tell their layout: then the
-    /// line reader gives what there is.
+    /// `None` if the file is damaged, has too few states to tell their layout, or too few
+    /// values to be worth it: then the line reader gives what there is.
     pub fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
         let mut frame = Frame::new("nodout", &*source, selection);
         let mut body = Nodout::default();
@@ -65,6 +68,10 @@ impl Blocks {
         let start = start.0.byte;
         let size = source.size()?;
         let count = stride.count(size, start);
+        let values = wanted.iter().map(Wanted::values).sum::<usize>();
+        if values.saturating_mul(count) < MIN_VALUES {
+            return Ok(None);
+        }
         let times = times(&*source, &stride, start, count)?;
         let mut file = frame.finish(&mut body);
         let ends_there = size <= start + count as u64 * stride.period();

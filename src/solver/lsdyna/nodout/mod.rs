@@ -116,29 +116,23 @@ impl Body for Nodout {
     }
 
     fn leap(&mut self, source: &dyn Source, states: &mut States<'_>) -> io::Result<Option<Place>> {
-        let Some((above, start)) = self.pending_start.zip(self.new_start.take()) else {
-            self.pending_start = self.pending_start.or(self.new_start.take());
-            return Ok(None);
-        };
-        self.pending_start = Some(start);
+        let Some(start) = self.new_start.take() else { return Ok(None) };
+        let above = self.pending_start.replace(start);
         let kept = states.kept();
         states.close(false);
-        if states.kept() == kept {
-            return Ok(None);
-        }
-        let tables = self.tables.unwrap_or([TableId::default(); 2]);
-        for learn in [self.stride.is_none(), true] {
-            if learn {
+        // A state that was left out tells no layout, but an earlier one may have told it.
+        let above = above.filter(|_| states.kept() > kept);
+        let tables = self.tables.unwrap_or_default();
+        for known in [true, false] {
+            if !known {
+                let Some(above) = above else { break };
                 self.stride = Stride::learn(source, above, start, states, tables)?;
             }
-            let Some(stride) = &self.stride else { return Ok(None) };
+            let Some(stride) = &self.stride else { continue };
             if let Some(end) = stride.leap(source, start, states)? {
                 self.announced = None;
                 self.pending_start = None;
                 return Ok(Some(end));
-            }
-            if learn {
-                break;
             }
         }
         Ok(None)

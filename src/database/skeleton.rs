@@ -1,0 +1,108 @@
+//! An HDF5 file whose large datasets get their values later, in any order and from any thread.
+//!
+//! The library encodes a file in memory, data included. Here each large dataset is given
+//! zeros that nothing ever touched, so that they take no memory, behind a mark; where the
+//! encoder hands over the marked bytes, their place in the file is noted and nothing is
+//! written.
+
+use std::fs::File;
+use std::io::{self, Write};
+
+use hdf5_pure::{DatasetBuilder, FileBuilder, make_f64_type};
+
+const MARK: &[u8; 16] = b"VALUESCOMELATER!";
+
+/// The datasets that get their values later.
+#[derive(Default)]
+pub struct Skeleton {
+    /// Bytes of each.
+    lengths: Vec<usize>,
+}
+
+impl Skeleton {
+    /// Gives a dataset its shape and its place.
+    pub fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
+        let values = rows * columns;
+        let mut bytes = vec![0u8; values * size_of::<f64>()];
+        let mark = mark(self.lengths.len());
+        let count = mark.len().min(bytes.len());
+        bytes[..count].copy_from_slice(&mark[..count]);
+        self.lengths.push(bytes.len());
+        dataset
+            .with_raw_data(make_f64_type(), bytes, values as u64)
+            .with_shape(&[rows as u64, columns as u64]);
+    }
+
+    /// Writes everything but the values; where those of each dataset begin. `None` if the
+    /// encoder did not hand all of them over in one piece.
+    pub fn write(&self, builder: FileBuilder, file: &File) -> io::Result<Option<Vec<u64>>> {
+        let mut offsets = vec![None; self.lengths.len()];
+        let mut sink = Sink { lengths: &self.lengths, file, at: 0, offsets: &mut offsets };
+        builder.finish_to(&mut sink).map_err(io::Error::other)?;
+        let end = sink.at;
+        let offsets: Option<Vec<u64>> = offsets.into_iter().collect();
+        if offsets.is_some() {
+            allocate(file, end)?;
+        }
+        Ok(offsets)
+    }
+}
+
+/// Reserves the file's blocks at once, which makes writing them cheaper.
+fn allocate(file: &File, length: u64) -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    if rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, length).is_ok() {
+        return Ok(());
+    }
+    file.set_len(length)
+}
+
+fn mark(number: usize) -> [u8; 24] {
+    let mut mark = [0; 24];
+    mark[..16].copy_from_slice(MARK);
+    mark[16..].copy_from_slice(&(number as u64).to_le_bytes());
+    mark
+}
+
+/// Takes the encoder's bytes and leaves out those that are marked.
+struct Sink<'a> {
+    lengths: &'a [usize],
+    file: &'a File,
+    at: u64,
+    offsets: &'a mut [Option<u64>],
+}
+
+impl Write for Sink<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let marked = bytes.get(16..24).filter(|_| bytes.starts_with(MARK));
+        let number = marked.and_then(|n| n.try_into().ok()).map(u64::from_le_bytes);
+        let number = number.and_then(|n| usize::try_from(n).ok());
+        match number.filter(|&n| self.lengths.get(n) == Some(&bytes.len())) {
+            Some(number) => self.offsets[number] = Some(self.at),
+            None => write_all_at(self.file, bytes, self.at)?,
+        }
+        self.at += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes all bytes at a position.
+#[cfg(unix)]
+pub fn write_all_at(file: &File, bytes: &[u8], at: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, at)
+}
+
+/// Writes all bytes at a position.
+#[cfg(windows)]
+pub fn write_all_at(file: &File, mut bytes: &[u8], mut at: u64) -> io::Result<()> {
+    while !bytes.is_empty() {
+        let written = std::os::windows::fs::FileExt::seek_write(file, bytes, at)?;
+        bytes = &bytes[written..];
+        at += written as u64;
+    }
+    Ok(())
+}

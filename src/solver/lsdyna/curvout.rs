@@ -1,0 +1,70 @@
+//! `curvout`: values of load curves over time.
+//!
+//! Seen only with states that list no curve.
+
+use std::io;
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::Place;
+use crate::solver::source::Source;
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+const STATE: &[u8] = b" curve data for time step";
+const COLUMN_LINE: &[u8] = b" curve id";
+
+pub fn signature(line: &[u8]) -> bool {
+    line.starts_with(STATE)
+}
+
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("curvout", source, selection, Curvout::default)
+}
+
+#[derive(Default)]
+struct Curvout {
+    table: Option<TableId>,
+}
+
+impl Body for Curvout {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        states.may_be_empty();
+        if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.ended) {
+            return;
+        }
+        if line.text.starts_with(STATE) {
+            let time = super::at_time(line.text);
+            states.begin(time, line.into());
+            if time.is_none() || !line.ended {
+                states.damage(line, None, "expected \"( at time … )\"".into());
+            }
+        } else if self.row(line, states).is_none() {
+            let found = shown(line.columns(1, 40));
+            let message =
+                format!("expected a curve's id and value, found \"{}\"", found.trim_end());
+            states.damage(line, None, message);
+        }
+    }
+
+    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}
+
+impl Curvout {
+    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        let start = text.iter().position(|b| !b.is_ascii_whitespace())?;
+        let id_end = start + text[start..].iter().position(u8::is_ascii_whitespace)?;
+        let id = integer(&text[..id_end])?;
+        let is_number = matches!(real(&text[id_end..]), Field::Real(_));
+        (is_number && line.ended).then_some(())?;
+        let table = *self.table.get_or_insert_with(|| states.table("curves", &["ordinate"]));
+        states.row(table, EntityId::new(id), line, |_| Some((id_end + 1, text.len())));
+        Some(())
+    }
+}

@@ -1,0 +1,88 @@
+//! Cards that name what a run holds: outputs, history nodes, contacts, walls, parts.
+
+use super::card::{Card, text};
+use super::kind::Kind;
+use super::reader::{Block, Reader, keep};
+use super::{At, Interface, Named, Output};
+
+impl Reader<'_, '_> {
+    /// DT BINARY LCUR IOOPT.
+    pub(super) fn output(&mut self, file: &'static str, block: &Block, card: &Card<'_>) {
+        let interval = self.real(card, 0).unwrap_or(None);
+        let binary = self.integer(card, 1).unwrap_or(None);
+        let output = Output { file, interval, binary, at: self.at(block.place) };
+        keep(&mut self.deck.outputs, output, "output files", &mut self.full);
+    }
+
+    pub(super) fn history(&mut self, kind: Kind, card: &Card<'_>, k: usize) {
+        let Ok(Some(id)) = self.integer(card, k) else { return };
+        if id == 0 {
+            return;
+        }
+        if matches!(kind, Kind::HistoryNodeSets | Kind::HistoryNodeSetsLocal) {
+            keep(&mut self.deck.history_node_sets, id, "history node sets", &mut self.full);
+        } else {
+            let node = Named { id, title: None, at: self.at(card.place) };
+            keep(&mut self.deck.history_nodes, node, "history nodes", &mut self.full);
+        }
+    }
+
+    pub(super) fn history_with_heading(&mut self, card: &Card<'_>) {
+        if card.is_blank() {
+            return;
+        }
+        let (field, title) = card.id_and_text();
+        if let Some(id) = self.required_id_of(field, card.place) {
+            let node = Named { id, title, at: self.at(card.place) };
+            keep(&mut self.deck.history_nodes, node, "history nodes", &mut self.full);
+        }
+    }
+
+    pub(super) fn interface(
+        &mut self,
+        kind: Kind,
+        keyword: String,
+        at: At,
+        id: Option<i64>,
+        title: Option<String>,
+    ) {
+        let interface = Interface { id: id.filter(|&id| id != 0), title, keyword, at };
+        if kind == Kind::Wall {
+            keep(&mut self.deck.rigid_walls, interface, "rigid walls", &mut self.full);
+        } else {
+            keep(&mut self.deck.contacts, interface, "contacts", &mut self.full);
+        }
+    }
+
+    /// Heading; PID SECID MID …; then the cards of the options, for each part. Those of
+    /// `_INERTIA` come first: XC YC ZC TM IRCS …; inertias; velocities; axes when IRCS is 1.
+    pub(super) fn part(&mut self, block: &mut Block, card: &Card<'_>) {
+        match (block.cards, block.kind) {
+            (1, _) => {
+                block.text = text(card.text);
+                block.ids = [None; 3];
+            }
+            (2, _) => {
+                // Two blank lines are the end of a keyword, not a part.
+                if !card.is_blank() || block.text.is_some() {
+                    block.ids[0] = self.required_id(card, 0);
+                }
+                if let Some(id) = block.ids[0] {
+                    let part = Named { id, title: block.text.take(), at: self.at(card.place) };
+                    keep(&mut self.deck.parts, part, "parts", &mut self.full);
+                }
+            }
+            (3, Kind::Parts { inertia: true, .. }) => {
+                block.ids[1] = self.integer(card, 4).unwrap_or(None);
+            }
+            (5, Kind::Parts { inertia: true, .. }) => self.velocity_of_inertia(block, card),
+            _ => {}
+        }
+        if let Kind::Parts { cards, inertia } = block.kind {
+            let axes = usize::from(block.ids[1] == Some(1));
+            if block.cards >= cards + if inertia { 3 + axes } else { 0 } {
+                block.cards = 0;
+            }
+        }
+    }
+}

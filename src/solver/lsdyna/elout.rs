@@ -1,0 +1,305 @@
+//! `elout` and `eloutdet`: stresses, strains and resultants of elements, and stresses and
+//! strains of nodes.
+//!
+//! Seen with data: solids, beams, averages at nodes. Shells, thick shells and the details of
+//! elements are read as the source of LSTC's converter `l2a` writes them. Components are
+//! named as in a binout; those of a second integration point end with `_ip2`, and so on.
+//! Elements may erode: their values are then NaN.
+
+use std::io;
+
+use super::ascii::{self, Body};
+use super::line::{Line, integer, shown};
+use crate::history::EntityId;
+use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::source::Source;
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+const STRESS: &[u8] = b" e l e m e n t   s t r e s s   c a l c u l a t i o n s";
+const STRAIN: &[u8] = b" e l e m e n t   s t r a i n   c a l c u l a t i o n s";
+const BEAM: &[u8] = b" r e s u l t a n t s   a n d   s t r e s s e s";
+const NODAL_STRESS: &[u8] = b" n o d a l  s t r e s s";
+const NODAL_STRAIN: &[u8] = b" n o d a l  s t r a i n";
+const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
+/// Behind 17 columns that tell integration point, surface and state: six numbers of 12, then
+/// further ones of 14, at nodes of 12.
+const LABEL: usize = 17;
+const WIDTH: usize = 12;
+const WIDE: usize = 14;
+/// Beams: resultants of 11 behind 11 columns; stresses of 15 behind 16.
+const RESULTANTS: [&str; 7] =
+    ["axial", "shear_s", "shear_t", "moment_s", "moment_t", "torsion", "pl_eps"];
+const RESULTANT_AT: usize = 11;
+const RESULTANT_WIDTH: usize = 11;
+const BEAM_STRESSES: [&str; 4] = ["sigma_11", "sigma_12", "sigma_31", "plastic_eps"];
+const BEAM_STRESS_AT: usize = 16;
+const BEAM_STRESS_WIDTH: usize = 15;
+/// Combinations of quantity, point and surface in one file; more are damage.
+const MAX_TABLES: usize = 1_000;
+
+pub fn signature(line: &[u8]) -> bool {
+    [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
+}
+
+/// Whether a line can only stand in an `eloutdet`.
+pub fn signature_of_details(line: &[u8]) -> bool {
+    line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
+}
+
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("elout", source, selection, Elout::default)
+}
+
+pub fn read_details(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("eloutdet", source, selection, Elout::default)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Quantity {
+    Stress,
+    Strain,
+    Beam,
+    NodalStress,
+    NodalStrain,
+}
+
+#[derive(Default)]
+struct Elout {
+    tables: Vec<(Vec<String>, TableId)>,
+    quantity: Option<Quantity>,
+    cycle: Option<Vec<u8>>,
+    /// Names of the numbers behind the tensor, by the column lines.
+    further: &'static [&'static str],
+    entity: Option<EntityId>,
+    /// Inside a beam's stresses at its integration points.
+    at_points: bool,
+    unread: Option<Place>,
+}
+
+impl Body for Elout {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line) || signature_of_details(line)
+    }
+
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        states.may_be_empty();
+        if line.is_blank() {
+            return;
+        }
+        if self.heading(line, states) || self.column_line(line) {
+            return;
+        }
+        let read = match self.quantity {
+            Some(Quantity::Beam) => self.beam(line, states),
+            Some(_) => self.tensor(line, states),
+            None => None,
+        };
+        if read.is_none() {
+            let found = shown(line.columns(1, 40));
+            let message =
+                format!("expected an element or its values, found \"{}\"", found.trim_end());
+            states.damage(line, None, message);
+        }
+    }
+
+    fn end(&mut self, _: Place, states: &mut States<'_>) {
+        if self.unread.is_some() {
+            let message = "rows of muscle data are not read".into();
+            states.problems.add(ProblemCode::UnreadRows, self.unread, None, message);
+        }
+    }
+}
+
+impl Elout {
+    /// Whether the line begins a block; begins its state if it is a new one.
+    fn heading(&mut self, line: &Line<'_>, states: &mut States<'_>) -> bool {
+        let quantities = [
+            (STRESS, Quantity::Stress),
+            (STRAIN, Quantity::Strain),
+            (BEAM, Quantity::Beam),
+            (NODAL_STRESS, Quantity::NodalStress),
+            (NODAL_STRAIN, Quantity::NodalStrain),
+        ];
+        let found = quantities.iter().find(|(heading, _)| line.text.starts_with(heading));
+        let Some(&(_, quantity)) = found else { return false };
+        self.further = &[];
+        self.entity = None;
+        let step = memchr::memmem::find(line.text, b"s t e p").map(|at| at + 7);
+        let to = memchr::memmem::find(line.text, b"( at time");
+        let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
+        let time = super::at_time(line.text).filter(|_| line.ended);
+        let repeats = self.quantity == Some(quantity) && quantity != Quantity::Beam;
+        self.quantity = Some(quantity);
+        let is_same = states.is_pending()
+            && time.is_some()
+            && states.pending_time() == time
+            && self.cycle.as_deref() == cycle
+            && !repeats;
+        if !is_same {
+            states.begin(time, line.into());
+            self.cycle = cycle.map(<[u8]>::to_vec);
+        }
+        if time.is_none() {
+            states.damage(line, None, "expected a cycle number and \"( at time … )\"".into());
+        }
+        true
+    }
+
+    /// Whether the line names columns; notes those behind the tensor.
+    fn column_line(&mut self, line: &Line<'_>) -> bool {
+        let text = line.text.trim_ascii_start();
+        let has = |word: &[u8]| memchr::memmem::find(text, word).is_some();
+        if has(b"sig-xx") {
+            self.further = match () {
+                () if has(b"plastic") => &["plastic_strain"],
+                () => &["effsg", "yield"],
+            };
+        }
+        const STARTS: [&[u8]; 12] = [
+            b"element ",
+            b"ipt",
+            b"num/ipt",
+            b"state",
+            b"node (",
+            b"stress ",
+            b"strain",
+            b"resultants",
+            b"integration point stresses",
+            b"sigma 11",
+            b"muscle data",
+            b"strains (",
+        ];
+        let is_column_line = line.ended && STARTS.iter().any(|start| text.starts_with(start));
+        if is_column_line && text.starts_with(b"integration") {
+            self.at_points = true;
+        }
+        if is_column_line && text.starts_with(b"muscle") {
+            self.unread.get_or_insert(line.into());
+        }
+        is_column_line
+    }
+
+    fn table(&mut self, names: Vec<String>, states: &mut States<'_>) -> Option<TableId> {
+        if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == names) {
+            return Some(*table);
+        }
+        (self.tables.len() < MAX_TABLES).then_some(())?;
+        let table =
+            states.varying_table("elements", &names.iter().map(String::as_str).collect::<Vec<_>>());
+        self.tables.push((names, table));
+        Some(table)
+    }
+
+    fn beam(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        if let Some(rest) = text.strip_prefix(b" beam/truss # =") {
+            let digits = rest.trim_ascii_start();
+            let end = digits.iter().position(|b| !b.is_ascii_digit())?;
+            line.ended.then_some(())?;
+            self.entity = Some(EntityId::new(integer(&digits[..end])?));
+            self.at_points = false;
+            return Some(());
+        }
+        let entity = self.entity?;
+        if !self.at_points {
+            let numbers = text.len().checked_sub(RESULTANT_AT)? / RESULTANT_WIDTH;
+            let whole = text.len() == RESULTANT_AT + numbers * RESULTANT_WIDTH;
+            (whole && (6..=7).contains(&numbers) && line.ended).then_some(())?;
+            let names = RESULTANTS[..numbers].iter().map(|n| n.to_string()).collect();
+            let table = self.table(names, states)?;
+            states.row(table, entity, line, |k| {
+                let from = RESULTANT_AT + k * RESULTANT_WIDTH;
+                Some((from + 1, from + RESULTANT_WIDTH))
+            });
+            return Some(());
+        }
+        let point = integer(text.get(..BEAM_STRESS_AT)?)?;
+        let width = BEAM_STRESS_AT + BEAM_STRESSES.len() * BEAM_STRESS_WIDTH;
+        (text.len() == width).then_some(())?;
+        let names = BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect();
+        let table = self.table(names, states)?;
+        states.row(table, entity, line, |k| {
+            let from = BEAM_STRESS_AT + k * BEAM_STRESS_WIDTH;
+            Some((from + 1, from + BEAM_STRESS_WIDTH))
+        });
+        Some(())
+    }
+
+    /// An element's or node's line, or one of its tensors.
+    fn tensor(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        if text.len() < LABEL + WIDTH {
+            // "id-part" of an element, "id-" of a node.
+            let dash = memchr::memchr(b'-', text)?;
+            let part = &text[dash + 1..];
+            (line.ended && (part.is_empty() || integer(part).is_some())).then_some(())?;
+            self.entity = Some(EntityId::new(integer(&text[..dash])?));
+            return Some(());
+        }
+        let entity = self.entity?;
+        let quantity = self.quantity?;
+        let nodal = matches!(quantity, Quantity::NodalStress | Quantity::NodalStrain);
+        let (point, surface) = place(text.get(..LABEL)?)?;
+        // Details of elements end with the place of the point.
+        let location = [b"int. point".as_slice(), b"node "]
+            .iter()
+            .find_map(|word| memchr::memmem::rfind(text, word).map(|at| (at, word.len())));
+        let (numbers, location) = match location.filter(|(at, _)| *at > LABEL) {
+            Some((at, length)) => {
+                let number = integer(&text[at + length..])?;
+                let what = if text[at] == b'i' { "point" } else { "node" };
+                (text[..at].trim_ascii_end(), format!("_{what}{number}"))
+            }
+            None => (text, String::new()),
+        };
+        let further: &[&str] = match quantity {
+            Quantity::Stress => self.further,
+            Quantity::NodalStress => &["yield"],
+            _ => &[],
+        };
+        let wide = if nodal { WIDTH } else { WIDE };
+        let tensor_end = LABEL + TENSOR.len() * WIDTH;
+        let more = numbers.len().checked_sub(tensor_end)? / wide;
+        // Thick shells have no effective stress.
+        let further = match (further, more) {
+            (["effsg", last], 1) => std::slice::from_ref(last),
+            (all, more) if all.len() == more => all,
+            _ => return None,
+        };
+        (numbers.len() == tensor_end + further.len() * wide && line.ended).then_some(())?;
+        let kind = match quantity {
+            Quantity::Stress | Quantity::NodalStress => "sig",
+            _ => "eps",
+        };
+        let tail = format!("{}{location}", suffix(point));
+        let tensor = TENSOR.iter().map(|axes| format!("{surface}{kind}_{axes}{tail}"));
+        let names = tensor.chain(further.iter().map(|name| format!("{surface}{name}{tail}")));
+        let table = self.table(names.collect(), states)?;
+        states.row(table, entity, line, |k| {
+            let (from, width) = match k.checked_sub(TENSOR.len()) {
+                None => (LABEL + k * WIDTH, WIDTH),
+                Some(k) => (tensor_end + k * wide, wide),
+            };
+            Some((from + 1, from + width))
+        });
+        Some(())
+    }
+}
+
+/// Integration point and surface that the first columns of a row tell.
+fn place(label: &[u8]) -> Option<(i64, &'static str)> {
+    let text = label.trim_ascii_start();
+    // The middle of a shell is what a binout calls its lower surface.
+    let surfaces = [(b"lower".as_slice(), "lower_"), (b"mid.", "lower_"), (b"upper", "upper_")];
+    if let Some((_, name)) = surfaces.iter().find(|(word, _)| text.starts_with(word)) {
+        return Some((1, name));
+    }
+    let digits = text.iter().position(|b| !b.is_ascii_digit()).unwrap_or(text.len());
+    Some((integer(&text[..digits])?, ""))
+}
+
+/// What the components of an integration point end with.
+fn suffix(point: i64) -> String {
+    if point == 1 { String::new() } else { format!("_ip{point}") }
+}

@@ -1,0 +1,18 @@
+//! `jntforc`: forces of joints and moments of joint stiffnesses.
+
+use std::io;
+
+use super::ascii;
+use super::dotted::{self, Dotted};
+use crate::solver::source::Source;
+use crate::solver::{Selection, SolverFile};
+
+const ENTITIES: &[&str] = &["joint number", "joint ID", "joint stiffness id number"];
+
+pub fn signature(line: &[u8]) -> bool {
+    dotted::label(line).is_some_and(|label| ENTITIES.contains(&label))
+}
+
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("jntforc", source, selection, || Dotted::new(ENTITIES))
+}

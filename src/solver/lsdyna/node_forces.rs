@@ -1,0 +1,195 @@
+//! Forces and energies of nodes or rigid bodies with their sum, as `bndout` and `nodfor`
+//! print them: `nd#  200034  xforce=… yforce=… zforce=… energy=…`, then `xtotal=…`.
+
+use super::ascii::Body;
+use super::label_values::{Labelled, components, fields, labelled};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::states::{States, TableId};
+
+const WIDTH: usize = 13;
+/// Marks of a row: a node, or a rigid body.
+const MARKS: [&[u8]; 4] = [b"nd#", b"mat#", b"mt#", b"rb#"];
+const ID: &[u8] = b"xforce=";
+
+const ROW: [Labelled; 7] = [
+    labelled("x_force", "xforce=", WIDTH),
+    labelled("y_force", "yforce=", WIDTH),
+    labelled("z_force", "zforce=", WIDTH),
+    labelled("energy", "energy=", WIDTH),
+    labelled("xmoment", "xmoment=", WIDTH),
+    labelled("ymoment", "ymoment=", WIDTH),
+    labelled("zmoment", "zmoment=", WIDTH),
+];
+/// Moments of a rigid body, on a line of their own.
+const MOMENTS: [Labelled; 3] = [
+    labelled("xmoment", "xmoment=", WIDTH),
+    labelled("ymoment", "ymoment=", WIDTH),
+    labelled("zmoment", "zmoment=", WIDTH),
+];
+const TOTALS: [Labelled; 7] = [
+    labelled("x_total", "xtotal=", WIDTH),
+    labelled("y_total", "ytotal=", WIDTH),
+    labelled("z_total", "ztotal=", WIDTH),
+    labelled("etotal", "etotal=", WIDTH),
+    labelled("x_local", "xlocal=", WIDTH),
+    labelled("y_local", "ylocal=", WIDTH),
+    labelled("z_local", "zlocal=", WIDTH),
+];
+/// Groups or kinds of boundary condition of one file; more are damage.
+const MAX_BLOCKS: usize = 200;
+
+/// What the two files differ in.
+pub struct Layout {
+    /// Begins a state; the time stands behind `t=`.
+    pub state: &'static [u8],
+    /// Name of the block that a heading begins, such as a group; `None` for other lines.
+    pub block: fn(&[u8]) -> Option<String>,
+}
+
+/// Reader of either file. Components of all blocks but the first of the file have the
+/// block's name in front, because the same node may stand in several.
+pub struct NodeForces {
+    layout: &'static Layout,
+    blocks: Vec<Block>,
+    current: Option<usize>,
+    body: Option<i64>,
+}
+
+struct Block {
+    name: String,
+    tables: Option<[TableId; 2]>,
+}
+
+impl NodeForces {
+    pub fn new(layout: &'static Layout) -> Self {
+        Self { layout, blocks: Vec::new(), current: None, body: None }
+    }
+
+    fn prefix(&self) -> String {
+        match self.current {
+            None | Some(0) => String::new(),
+            Some(k) => format!("{}_", self.blocks[k].name),
+        }
+    }
+
+    fn enter(&mut self, name: String, line: &Line<'_>, states: &mut States<'_>) {
+        let known = self.blocks.iter().position(|b| b.name == name);
+        if known.is_none() && self.blocks.len() == MAX_BLOCKS {
+            let message = format!("\"{name}\" is left out: there are too many groups");
+            states.problems.add(ProblemCode::UnreadRows, Some(line.into()), None, message);
+            states.mark_damaged();
+            return;
+        }
+        self.current = Some(known.unwrap_or_else(|| {
+            self.blocks.push(Block { name, tables: None });
+            self.blocks.len() - 1
+        }));
+    }
+
+    fn tables(&mut self, states: &mut States<'_>) -> [TableId; 2] {
+        let prefix = self.prefix();
+        let current = self.current.unwrap_or(0);
+        if self.blocks.is_empty() {
+            self.blocks.push(Block { name: String::new(), tables: None });
+        }
+        *self.blocks[current].tables.get_or_insert_with(|| {
+            let table = |states: &mut States<'_>, what, names: &[&str]| {
+                let names: Vec<String> = names.iter().map(|n| format!("{prefix}{n}")).collect();
+                states.table(what, &names.iter().map(String::as_str).collect::<Vec<_>>())
+            };
+            [
+                table(states, "forces", &components(&ROW)),
+                table(states, "moments", &components(&MOMENTS)),
+            ]
+        })
+    }
+
+    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text;
+        let from = memchr::memchr(b'#', text)? + 1;
+        let to = memchr::memmem::find(text, ID)?;
+        let id = integer(text.get(from..to)?)?;
+        // "setid =  200034" may stand between the forces and the moments, or last.
+        let tail = b"   setid =        0".len();
+        let fields = fields(line, &ROW, tail)?;
+        fields[..4].iter().all(Option::is_some).then_some(())?;
+        let [table, _] = self.tables(states);
+        self.body = Some(id);
+        states.row(table, EntityId::new(id), line, |k| fields[k]);
+        Some(())
+    }
+
+    fn moments(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let fields = fields(line, &MOMENTS, 0)?;
+        let id = self.body?;
+        fields.iter().all(Option::is_some).then_some(())?;
+        let [_, table] = self.tables(states);
+        states.row(table, EntityId::new(id), line, |k| fields[k]);
+        Some(())
+    }
+
+    fn totals(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let fields = fields(line, &TOTALS, 0)?;
+        let prefix = self.prefix();
+        for (label, field) in TOTALS.iter().zip(fields) {
+            let Some((from, to)) = field else { continue };
+            let name = format!("{prefix}{}", label.component);
+            states.scalar(&name, line.columns(from, to), line, [from, to]);
+        }
+        Some(())
+    }
+}
+
+impl Body for NodeForces {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        line.starts_with(self.layout.state)
+    }
+
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        let text = line.text;
+        let start = text.trim_ascii_start();
+        if line.is_blank() {
+            return;
+        }
+        let done = if text.starts_with(self.layout.state) {
+            self.current = None;
+            let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
+            match at.map(|at| real(&text[at..])) {
+                // Every kind of boundary condition has a heading of its own at one time.
+                Some(Field::Real(time)) if line.ended => {
+                    if states.pending_time() != Some(time) {
+                        states.begin(Some(time), line.into());
+                    }
+                    Some(())
+                }
+                _ => {
+                    states.begin(None, line.into());
+                    None
+                }
+            }
+        } else if MARKS.iter().any(|mark| start.starts_with(mark)) {
+            self.row(line, states)
+        } else if start.starts_with(b"xtotal=") || start.starts_with(b"xlocal=") {
+            self.totals(line, states)
+        } else if start.starts_with(b"xmoment=") {
+            self.moments(line, states)
+        } else if let Some(name) = (self.layout.block)(text).filter(|_| line.ended) {
+            self.enter(name, line, states);
+            Some(())
+        } else {
+            None
+        };
+        if done.is_none() {
+            let found = shown(line.columns(1, 40));
+            let message = format!(
+                "expected a node's forces, a sum or a heading, found \"{}\"",
+                found.trim_end()
+            );
+            states.damage(line, None, message);
+        }
+    }
+
+    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}

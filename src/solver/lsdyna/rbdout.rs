@@ -1,0 +1,126 @@
+//! `rbdout`: motion of rigid bodies in global and in local directions.
+//!
+//! Never seen with data; read as the source of LSTC's converter `l2a` writes it.
+
+use std::io;
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::Place;
+use crate::solver::source::Source;
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
+const BODIES: [&[u8]; 2] = [b" nodal rigid body", b" rigid body"];
+const LOCAL: &[u8] = b" output in principal or user defined local";
+/// Lines that hold no values.
+const HEADINGS: [&[u8]; 5] = [b"1", b"global", b"principal or user defined", b"a ", b"output in"];
+/// Behind the label up to column 17, fields of 12; rows of direction cosines: 10 and 15.
+const LABEL: usize = 17;
+const WIDTH: usize = 12;
+const ROW_LABEL: usize = 10;
+const ROW_WIDTH: usize = 15;
+
+/// Labels of lines, with their components in global and in local directions.
+const LINES: [(&[u8], &[&str], &[&str]); 7] = [
+    (b"coordinates:", &["global_x", "global_y", "global_z"], &[]),
+    (
+        b"displacements:",
+        &["global_dx", "global_dy", "global_dz", "global_rdx", "global_rdy", "global_rdz"],
+        &["local_dx", "local_dy", "local_dz", "local_rdx", "local_rdy", "local_rdz"],
+    ),
+    (
+        b"velocities:",
+        &["global_vx", "global_vy", "global_vz", "global_rvx", "global_rvy", "global_rvz"],
+        &["local_vx", "local_vy", "local_vz", "local_rvx", "local_rvy", "local_rvz"],
+    ),
+    (
+        b"accelerations:",
+        &["global_ax", "global_ay", "global_az", "global_rax", "global_ray", "global_raz"],
+        &["local_ax", "local_ay", "local_az", "local_rax", "local_ray", "local_raz"],
+    ),
+    (b"row 1", &["dircos_11", "dircos_12", "dircos_13"], &[]),
+    (b"row 2", &["dircos_21", "dircos_22", "dircos_23"], &[]),
+    (b"row 3", &["dircos_31", "dircos_32", "dircos_33"], &[]),
+];
+
+pub fn signature(line: &[u8]) -> bool {
+    line.starts_with(STATE)
+}
+
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("rbdout", source, selection, Rbdout::default)
+}
+
+#[derive(Default)]
+struct Rbdout {
+    tables: Option<Vec<[TableId; 2]>>,
+    body: Option<EntityId>,
+    is_local: bool,
+}
+
+impl Body for Rbdout {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        if line.is_blank() || self.value(line, states).is_some() {
+            return;
+        }
+        let found = shown(line.columns(1, 40));
+        let message = format!("expected a rigid body's motion, found \"{}\"", found.trim_end());
+        states.damage(line, None, message);
+    }
+
+    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}
+
+impl Rbdout {
+    fn value(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        if text.starts_with(STATE) {
+            self.body = None;
+            let at = memchr::memmem::find(text, b"time=").map(|at| at + 5);
+            let time = match at.map(|at| real(&text[at..])) {
+                Some(Field::Real(time)) if line.ended => Some(time),
+                _ => None,
+            };
+            states.begin(time, line.into());
+            return time.map(drop);
+        }
+        if let Some(rest) = BODIES.iter().find_map(|label| text.strip_prefix(*label)) {
+            self.is_local = false;
+            self.body = line.ended.then(|| integer(rest)).flatten().map(EntityId::new);
+            return self.body.map(drop);
+        }
+        let start = text.trim_ascii_start();
+        if text.starts_with(LOCAL) {
+            self.is_local = true;
+        }
+        if HEADINGS.iter().any(|heading| start.starts_with(heading)) && line.ended {
+            return Some(());
+        }
+        let index = LINES.iter().position(|(label, ..)| start.starts_with(label))?;
+        let tables = self.tables.get_or_insert_with(|| {
+            let table = |states: &mut States<'_>, names| states.table("rigid bodies", names);
+            LINES
+                .iter()
+                .map(|(_, global, local)| [table(states, global), table(states, local)])
+                .collect()
+        });
+        let (label, global, local) = LINES[index];
+        let components = if self.is_local { local } else { global };
+        let (from, width) = match label.starts_with(b"row") {
+            true => (ROW_LABEL, ROW_WIDTH),
+            false => (LABEL, WIDTH),
+        };
+        (!components.is_empty() && text.len() == from + components.len() * width).then_some(())?;
+        let table = tables[index][usize::from(self.is_local)];
+        states
+            .row(table, self.body?, line, |k| Some((from + k * width + 1, from + (k + 1) * width)));
+        Some(())
+    }
+}

@@ -1,0 +1,109 @@
+//! `swforc`: forces of spot welds and other connections, one row each.
+
+use std::io;
+
+use super::ascii::{self, Body};
+use super::line::{Field, Line, integer, real, shown};
+use crate::history::EntityId;
+use crate::solver::problem::Place;
+use crate::solver::source::Source;
+use crate::solver::states::{States, TableId};
+use crate::solver::{Selection, SolverFile};
+
+const COLUMN_LINE: &[u8] = b" constraint #";
+const COMPONENTS: [&str; 7] =
+    ["axial", "shear", "failure", "length", "resultant_moment", "torsion", "failure_time"];
+/// Columns: order number 1–11 (not the id), axial, shear and time of 13, failure to 59, kind
+/// and id to 91, then up to three numbers of 13, or the time of failure.
+const AXIAL: (usize, usize) = (12, 24);
+const SHEAR: (usize, usize) = (25, 37);
+const TIME: (usize, usize) = (38, 50);
+const FAILURE: (usize, usize) = (51, 59);
+const KIND: (usize, usize) = (60, 82);
+const ID: (usize, usize) = (83, 91);
+const REST: usize = 91;
+const WIDTH: usize = 13;
+const FAILED: &[u8] = b"  failure time=";
+const FAILURE_TIME: (usize, usize) = (107, 118);
+/// Kinds of connection, each with ids of its own.
+const MAX_KINDS: usize = 20;
+
+pub fn signature(line: &[u8]) -> bool {
+    line.starts_with(COLUMN_LINE)
+}
+
+pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+    ascii::read("swforc", source, selection, Swforc::default)
+}
+
+#[derive(Default)]
+struct Swforc {
+    kinds: Vec<(Vec<u8>, TableId)>,
+}
+
+impl Body for Swforc {
+    fn is_signature(&self, line: &[u8]) -> bool {
+        signature(line)
+    }
+
+    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        if line.is_blank() || line.text.starts_with(COLUMN_LINE) {
+            return;
+        }
+        if self.row(line, states).is_none() {
+            let found = shown(line.columns(1, 60));
+            let message = format!(
+                "expected axial and shear force, time, kind and id of a weld, found \"{}\"",
+                found.trim_end()
+            );
+            states.damage(line, Some([1, line.text.len().max(1)]), message);
+        }
+    }
+
+    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+}
+
+impl Swforc {
+    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        integer(text.get(..AXIAL.0 - 1)?)?;
+        let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
+        let kind = line.columns(KIND.0, KIND.1).trim_ascii();
+        let kind = kind.strip_suffix(b"ID")?.trim_ascii_end().to_vec();
+        let id = integer(line.columns(ID.0, ID.1))?;
+        let rest = text.get(REST..)?;
+        let failed = rest.starts_with(FAILED);
+        let numbers = if failed { 0 } else { rest.len() / WIDTH };
+        let whole = match failed {
+            true => text.len() >= FAILURE_TIME.1,
+            false => numbers <= 3 && rest.len() == numbers * WIDTH,
+        };
+        (whole && line.ended).then_some(())?;
+        let known = self.kinds.iter().find(|(k, _)| *k == kind).map(|(_, table)| *table);
+        let table = match known {
+            Some(table) => table,
+            None if self.kinds.len() < MAX_KINDS => {
+                let table = states.table("welds", &COMPONENTS);
+                self.kinds.push((kind, table));
+                table
+            }
+            None => return None,
+        };
+        let entity = EntityId::new(id);
+        // Times have six digits: a repeated weld begins a state as well.
+        if states.pending_time() != Some(time) || states.has_row(table, entity) {
+            states.begin(Some(time), line.into());
+        }
+        // Words and blanks stand there as well.
+        let failure = line.columns(FAILURE.0, FAILURE.1).trim_ascii();
+        let failure = failure.first().is_some_and(u8::is_ascii_digit);
+        states.row(table, entity, line, |k| match k {
+            0 => Some(AXIAL),
+            1 => Some(SHEAR),
+            2 => failure.then_some(FAILURE),
+            6 => failed.then_some(FAILURE_TIME),
+            _ => (k - 3 < numbers).then_some((REST + (k - 3) * WIDTH + 1, REST + (k - 2) * WIDTH)),
+        });
+        Some(())
+    }
+}
