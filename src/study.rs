@@ -8,13 +8,15 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::curve::extract::{ExtractError, Measured, MeasuredForce, Setup, extract};
+use crate::curve::extract::{DeclaredSpeed, ExtractError, Measured, MeasuredForce, Setup, extract};
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
 use crate::curve::{Case, ForceKind, Masses, Source};
 use crate::history::{EntityId, Side};
 use crate::manifest::{self, ManifestError};
+use crate::solver::decks::{self, Search};
+use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
-use crate::unit::{ImpactSpeedText, MassText, SpeedKind, UnitSystem};
+use crate::unit::{ImpactSpeedText, MassText, SpeedKind, UnitSystem, km_per_h};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
 const EXTRACTION_VERSION: u32 = 2;
@@ -34,9 +36,10 @@ pub struct Manifest {
 #[serde(deny_unknown_fields)]
 pub struct Head {
     pub name: String,
-    /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …
-    #[schemars(with = "String")]
-    pub units: UnitSystem,
+    /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
+    /// if absent.
+    #[schemars(with = "Option<String>")]
+    pub units: Option<UnitSystem>,
     /// Group of the curve database.
     pub group: String,
     pub kind: StudyKind,
@@ -64,8 +67,11 @@ pub struct RunEntry {
     pub path: String,
     /// Name of the case; the path if absent.
     pub name: Option<String>,
-    /// Impact speed; taken from the first state if absent.
+    /// Impact speed; taken from the deck or the first state if absent.
     pub speed: Option<ImpactSpeedText>,
+    /// Keyword deck of the run, relative to the manifest; looked for in the run's folder if
+    /// absent.
+    pub deck: Option<String>,
     /// Mass of the body, or of each body of a pair.
     pub mass: MassText,
     /// Mass of the other body, if the bodies of a pair differ.
@@ -92,6 +98,10 @@ pub enum RunError {
     Read(#[from] ReadError),
     #[error("{path}: {source}")]
     Extract { path: PathBuf, source: ExtractError },
+    #[error(
+        "the manifest gives no units and {why}: add units = \"mm-t-s\" (or what they are) to [study]"
+    )]
+    NoUnits { why: String },
 }
 
 /// A source file of a run before it is read.
@@ -113,6 +123,9 @@ pub struct LocatedRun<'a> {
     study: &'a Study,
     entry: &'a RunEntry,
     files: Vec<Located>,
+    /// The run's keyword deck, and what is to be said of the search for it.
+    deck: Option<Located>,
+    deck_notes: Vec<String>,
     recipe: String,
     pub fingerprint: String,
 }
@@ -226,15 +239,41 @@ impl Study {
             .into_iter()
             .map(|name| locate_file(&folder, name))
             .collect::<Result<Vec<_>, _>>()?;
+        let (deck, deck_notes) = self.locate_deck(entry, &folder)?;
         let recipe = self.recipe_json(entry);
         let mut hash = blake3::Hasher::new();
         hash.update(&EXTRACTION_VERSION.to_le_bytes());
         hash.update(recipe.as_bytes());
-        for file in &files {
+        for file in files.iter().chain(&deck) {
             hash.update(file.blake3.as_bytes());
         }
         let fingerprint = hash.finalize().to_hex().to_string();
-        Ok(LocatedRun { study: self, entry, files, recipe, fingerprint })
+        Ok(LocatedRun { study: self, entry, files, deck, deck_notes, recipe, fingerprint })
+    }
+
+    /// The deck that the manifest names, or the only one of the run's folder.
+    fn locate_deck(
+        &self,
+        entry: &RunEntry,
+        folder: &Path,
+    ) -> Result<(Option<Located>, Vec<String>), RunError> {
+        let mut notes = Vec::new();
+        let path = match &entry.deck {
+            Some(name) => Some(self.folder.join(name)),
+            None => match decks::find(folder) {
+                Search::None => None,
+                Search::One(path) => Some(path),
+                Search::Several(found) => {
+                    notes.push(format!(
+                        "deck: the folder has {} that do not include each other; none is used (name one with deck = …)",
+                        found.len()
+                    ));
+                    None
+                }
+            },
+        };
+        let located = path.map(|path| hashed("deck", path)).transpose()?;
+        Ok((located, notes))
     }
 
     /// Everything of the manifest that decides the case's numbers.
@@ -248,6 +287,7 @@ impl Study {
             "recipe": self.manifest.recipe,
             "run": {
                 "path": entry.path,
+                "deck": entry.deck,
                 "speed_m_per_s": entry.speed.map(|s| s.0),
                 "mass_kg": entry.mass.0,
                 "other_mass_kg": entry.other_mass.map(|m| m.0),
@@ -282,6 +322,14 @@ impl LocatedRun<'_> {
         let study = self.study;
         let head = &study.manifest.study;
         let recipe = &study.manifest.recipe;
+        let mut notes = self.deck_notes.clone();
+        let mut warnings = Vec::new();
+        let deck = match &self.deck {
+            Some(located) => Some((located, decks::read(&located.path)?)),
+            None => None,
+        };
+        let units = self.units(deck.as_ref(), &mut notes, &mut warnings)?;
+        let declared_speed = self.speed(deck.as_ref(), units, &mut notes, &mut warnings);
         let motion_file = self.file(&recipe.deflection.file);
         let motion = read_motion(motion_file, &recipe.deflection)?;
         let force_file = self.file(force_file(&recipe.force));
@@ -313,7 +361,7 @@ impl LocatedRun<'_> {
         let force_history = force_history
             .ok_or_else(|| lacking(&force_file.path, force_component(&recipe.force), &force))?;
         let measured = Measured {
-            units: head.units,
+            units,
             displacement: &displacement,
             minus_displacement: minus_displacement.as_ref(),
             velocity: velocity.as_ref(),
@@ -329,13 +377,14 @@ impl LocatedRun<'_> {
             kind: study.speed_kind(),
             half_model: head.half_model,
             masses,
-            declared_speed_m_per_s: self.entry.speed.map(|s| s.0),
+            declared_speed,
         };
         let extracted = extract(&measured, &setup).map_err(|source| {
             let file = if source.is_of_force() { force_file } else { motion_file };
             RunError::Extract { path: file.path.clone(), source }
         })?;
-        let mut notes = extracted.notes;
+        notes.extend(extracted.notes);
+        warnings.extend(extracted.warnings);
         if let ForceSource::Contact { id, side: None, .. } = recipe.force
             && let Some(side) = force_history.entity.and_then(|e| e.side)
         {
@@ -344,7 +393,6 @@ impl LocatedRun<'_> {
                 side.name()
             ));
         }
-        let mut warnings = extracted.warnings;
         compare_twin(motion_file, &motion, &mut notes, &mut warnings);
         if self.files.len() > 1 {
             compare_twin(force_file, &force, &mut notes, &mut warnings);
@@ -371,10 +419,106 @@ impl LocatedRun<'_> {
             audit: extracted.audit,
             recipe: self.recipe.clone(),
             fingerprint: self.fingerprint.clone(),
-            sources: read.iter().map(|(l, f)| self.source(l, f)).collect(),
+            sources: read
+                .iter()
+                .map(|(l, f)| self.source(l, f))
+                .chain(deck.iter().map(|(l, d)| self.deck_source(l, d)))
+                .collect(),
             notes,
             warnings,
         })
+    }
+
+    /// The manifest's units, or those that the deck states.
+    fn units(
+        &self,
+        deck: Option<&(&Located, Deck)>,
+        notes: &mut Vec<String>,
+        warnings: &mut Vec<String>,
+    ) -> Result<UnitSystem, RunError> {
+        let stated = deck.and_then(|(located, deck)| {
+            let units = deck.units.as_ref()?;
+            Some((shown_name(&located.path), units, units.system?))
+        });
+        match (self.study.manifest.study.units, stated) {
+            (Some(units), Some((name, stated, system))) if system != units => {
+                warnings.push(format!(
+                    "units: the deck {name} states \"{}\", the manifest has others; the manifest's are used",
+                    stated.text.trim()
+                ));
+                Ok(units)
+            }
+            (Some(units), _) => Ok(units),
+            (None, Some((name, stated, system))) => {
+                notes.push(format!(
+                    "units: \"{}\" taken from the deck {name}, line {}",
+                    stated.text.trim(),
+                    stated.at.line
+                ));
+                Ok(system)
+            }
+            (None, None) => Err(RunError::NoUnits {
+                why: match deck {
+                    Some((located, _)) => {
+                        format!("the deck {} states none", located.path.display())
+                    }
+                    None => "the run has no deck that could".into(),
+                },
+            }),
+        }
+    }
+
+    /// The manifest's speed, or the deck's; for half a model the closing speed.
+    fn speed(
+        &self,
+        deck: Option<&(&Located, Deck)>,
+        units: UnitSystem,
+        notes: &mut Vec<String>,
+        warnings: &mut Vec<String>,
+    ) -> Option<DeclaredSpeed> {
+        let bodies = if self.study.manifest.study.half_model { 2.0 } else { 1.0 };
+        let of_deck = deck.and_then(|(located, deck)| {
+            let found = deck.impact_speed()?;
+            Some((shown_name(&located.path), found.at.line, bodies * found.speed * units.speed()))
+        });
+        match (self.entry.speed, of_deck) {
+            (Some(declared), of_deck) => {
+                if let Some((name, _, speed)) = of_deck
+                    && (speed - declared.0).abs() > SAME_SPEED * declared.0
+                {
+                    warnings.push(format!(
+                        "speed: the manifest says {}, the deck {name} {}; the manifest's is used",
+                        km_per_h(declared.0),
+                        km_per_h(speed)
+                    ));
+                }
+                Some(DeclaredSpeed { m_per_s: declared.0, by: "manifest" })
+            }
+            (None, Some((name, line, m_per_s))) => {
+                let shown = km_per_h(m_per_s);
+                notes.push(format!("speed: {shown} taken from the deck {name}, line {line}"));
+                Some(DeclaredSpeed { m_per_s, by: "deck" })
+            }
+            (None, None) => None,
+        }
+    }
+
+    fn deck_source(&self, located: &Located, deck: &Deck) -> Source {
+        Source {
+            path: located
+                .path
+                .strip_prefix(&self.study.folder)
+                .unwrap_or(&located.path)
+                .display()
+                .to_string(),
+            size_bytes: located.size_bytes,
+            blake3: located.blake3.clone(),
+            format: "keyword".into(),
+            solver: Some("LS-DYNA".into()),
+            version: None,
+            title: deck.title.clone(),
+            problems: deck.problems.len(),
+        }
     }
 
     /// The located file of a recipe's file name; `locate` found every one.
@@ -444,6 +588,11 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
             return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
         }
     };
+    Ok(Located { section, twin, ..hashed(name, path)? })
+}
+
+/// A file with its size and hash.
+fn hashed(name: &str, path: PathBuf) -> Result<Located, RunError> {
     let io = |source| RunError::Io { path: path.clone(), source };
     let mut hasher = blake3::Hasher::new();
     let file = File::open(&path).map_err(io)?;
@@ -453,9 +602,16 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
         size_bytes: hasher.count(),
         blake3: hasher.finalize().to_hex().to_string(),
         path,
-        section,
-        twin,
+        section: None,
+        twin: None,
     })
+}
+
+/// Declared speeds may differ by this share before a warning is due.
+const SAME_SPEED: f64 = 0.01;
+
+fn shown_name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Whether a binout's section holds what the text file of that name holds.
@@ -486,10 +642,12 @@ fn compare_twin(
     notes: &mut Vec<String>,
     warnings: &mut Vec<String>,
 ) {
-    let shown =
-        |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
     if let Some(section) = &file.section {
-        notes.push(format!("{}: read from section {section} of {}", file.file, shown(&file.path)));
+        notes.push(format!(
+            "{}: read from section {section} of {}",
+            file.file,
+            shown_name(&file.path)
+        ));
     }
     let Some((path, section)) = &file.twin else { return };
     let ids = read.histories.iter().filter_map(|h| h.entity);
@@ -519,10 +677,14 @@ fn compare_twin(
         warnings.push(format!(
             "{} and section {section} of {} differ; the text file was used",
             file.file,
-            shown(path)
+            shown_name(path)
         ));
     } else {
-        notes.push(format!("{}: section {section} of {} agrees with it", file.file, shown(path)));
+        notes.push(format!(
+            "{}: section {section} of {} agrees with it",
+            file.file,
+            shown_name(path)
+        ));
     }
 }
 

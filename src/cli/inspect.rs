@@ -1,20 +1,29 @@
 //! `crumple inspect`: what a solver file holds.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crumple::solver::{self, Access, Entity, Problem, Selection, SolverFile, WithoutData};
+use crumple::solver::decks::{self, Search};
+use crumple::solver::lsdyna::deck::Deck;
+use crumple::solver::{
+    self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData,
+};
 use serde::Serialize;
 
+use super::deck_report::DeckReport;
 use super::output;
 use super::{CommandResult, Manners, Outcome};
 
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    after_help = "Titles that a file does not give are taken from the keyword deck beside it.
+Examples:
   crumple inspect run/nodout
+  crumple inspect run/main.k               # what a deck says of its run
   crumple inspect run/nodout run/rcforc --json
-  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged")]
+  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged"
+)]
 pub struct Args {
     /// Files written by a solver
     #[arg(required = true)]
@@ -44,6 +53,9 @@ struct Report<'a> {
     without_data: &'a [WithoutData],
     components: Vec<&'a str>,
     problems: &'a [Problem],
+    /// Deck that titles were taken from, or what a deck itself says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deck: Option<DeckReport<'a>>,
 }
 
 #[derive(Serialize)]
@@ -51,14 +63,41 @@ struct Document<'a> {
     files: Vec<Report<'a>>,
 }
 
+/// One section of a file, or a deck.
+enum Read {
+    Section { file: SolverFile, titles_from: Option<(PathBuf, usize)> },
+    Deck(Box<Deck>),
+}
+
+impl Read {
+    fn problems(&self) -> &[Problem] {
+        match self {
+            Self::Section { file, .. } => &file.problems,
+            Self::Deck(deck) => &deck.problems,
+        }
+    }
+}
+
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
-    let mut read = Vec::new();
+    let mut read: Vec<(&PathBuf, Read)> = Vec::new();
     let mut outcome = Outcome::Clean;
     let access = if args.map { Access::Map } else { Access::Plain };
     let selection = Selection { access, ..Selection::nothing() };
     for path in &args.files {
         match solver::read_sections(path, args.format.as_deref(), &selection) {
-            Ok(sections) => read.extend(sections.into_iter().map(|file| (path, file))),
+            Ok(mut sections) => {
+                let deck = deck_for(path, &sections);
+                for mut file in sections.drain(..) {
+                    let filled = deck
+                        .as_ref()
+                        .map(|(from, deck)| (from.clone(), decks::fill_titles(&mut file, deck)));
+                    let titles_from = filled.filter(|(_, count)| *count > 0);
+                    read.push((path, Read::Section { file, titles_from }));
+                }
+            }
+            Err(ReadError::Deck { .. }) => {
+                read.push((path, Read::Deck(Box::new(decks::read(path)?))));
+            }
             Err(error) if args.files.len() == 1 => return Err(error.into()),
             Err(error) => {
                 eprintln!("error: {error}");
@@ -66,10 +105,16 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             }
         }
     }
-    if outcome == Outcome::Clean && read.iter().any(|(_, f)| !f.problems.is_empty()) {
+    if outcome == Outcome::Clean && read.iter().any(|(_, r)| !r.problems().is_empty()) {
         outcome = Outcome::Warned;
     }
-    let files: Vec<Report> = read.iter().map(|(path, file)| report(path, file)).collect();
+    let files: Vec<Report> = read
+        .iter()
+        .map(|(path, read)| match read {
+            Read::Section { file, titles_from } => report(path, file, titles_from.as_ref()),
+            Read::Deck(deck) => deck_report(path, deck),
+        })
+        .collect();
     if manners.json {
         output::print_json(&Document { files })?;
     } else {
@@ -78,7 +123,42 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     Ok(outcome)
 }
 
-fn report<'a>(path: &std::path::Path, file: &'a SolverFile) -> Report<'a> {
+/// The deck beside a file, if an entity of the file lacks a title.
+fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
+    let lacks = |file: &SolverFile| file.entities.iter().any(|e| e.title.is_none());
+    if !sections.iter().any(lacks) {
+        return None;
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match decks::find(folder) {
+        Search::One(path) => decks::read(&path).ok().map(|deck| (path, deck)),
+        Search::None | Search::Several(_) => None,
+    }
+}
+
+fn deck_report<'a>(path: &Path, deck: &'a Deck) -> Report<'a> {
+    Report {
+        path: path.display().to_string(),
+        format: "keyword",
+        section: None,
+        solver: Some("LS-DYNA"),
+        version: None,
+        title: deck.title.as_deref(),
+        states: 0,
+        time: None,
+        entities: &[],
+        without_data: &[],
+        components: Vec::new(),
+        problems: &deck.problems,
+        deck: Some(DeckReport::of(deck)),
+    }
+}
+
+fn report<'a>(
+    path: &Path,
+    file: &'a SolverFile,
+    titles_from: Option<&'a (PathBuf, usize)>,
+) -> Report<'a> {
     Report {
         path: path.display().to_string(),
         format: file.format,
@@ -92,6 +172,7 @@ fn report<'a>(path: &std::path::Path, file: &'a SolverFile) -> Report<'a> {
         without_data: &file.without_data,
         components: file.components.iter().map(|c| &**c).collect(),
         problems: &file.problems,
+        deck: titles_from.map(|(path, count)| DeckReport::titles(path, *count)),
     }
 }
 
@@ -108,7 +189,11 @@ fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
         writeln!(out, "  solver      {solver} {}", file.version.unwrap_or_default())?;
     }
     writeln!(out, "  title       {}", file.title.unwrap_or("(none)"))?;
+    if let Some(deck) = &file.deck {
+        deck.print(out)?;
+    }
     match file.time {
+        _ if file.format == "keyword" => {}
         Some([first, last]) => {
             writeln!(out, "  states      {}, time {first:?} to {last:?}", file.states)?;
         }

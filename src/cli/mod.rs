@@ -4,6 +4,7 @@ mod arguments;
 mod build;
 mod compare;
 mod db;
+mod deck_report;
 mod demo;
 mod export;
 mod histories;

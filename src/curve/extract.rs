@@ -33,7 +33,14 @@ pub struct Setup<'a> {
     /// deflection are twice the run's.
     pub half_model: bool,
     pub masses: Masses,
-    pub declared_speed_m_per_s: Option<f64>,
+    pub declared_speed: Option<DeclaredSpeed>,
+}
+
+/// An impact speed that was not measured, and who says so: "manifest" or "deck".
+#[derive(Clone, Copy, Debug)]
+pub struct DeclaredSpeed {
+    pub m_per_s: f64,
+    pub by: &'static str,
 }
 
 /// The curve of a run and what was found on the way.
@@ -395,11 +402,11 @@ fn speed(
     warnings: &mut Vec<String>,
 ) -> Result<Speed, ExtractError> {
     let first = first_rate_m_per_s.abs();
-    let m_per_s = match setup.declared_speed_m_per_s {
-        Some(declared) => {
+    let m_per_s = match setup.declared_speed {
+        Some(DeclaredSpeed { m_per_s: declared, by }) => {
             if measured.velocity.is_some() && (first - declared).abs() > SAME_SPEED * declared {
                 warnings.push(format!(
-                    "speed: the manifest says {}, the first state moves at {}; the manifest's is used",
+                    "speed: the {by} says {}, the first state moves at {}; the {by}'s is used",
                     km_per_h(declared),
                     km_per_h(first)
                 ));

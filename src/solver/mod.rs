@@ -4,6 +4,7 @@
 //! damage as part of the result ([`Problem`]): complete states are returned, what is
 //! missing is named. It never prints, panics, or holds more than was selected.
 
+pub mod decks;
 pub mod lsdyna;
 pub mod openradioss;
 mod problem;
@@ -249,6 +250,10 @@ pub enum ReadError {
     Io { path: PathBuf, source: io::Error },
     #[error("{path}: {looks_like}: the readers take {known}")]
     UnknownFormat { path: PathBuf, looks_like: String, known: String },
+    #[error(
+        "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
+    )]
+    Deck { path: PathBuf },
     #[error("{path}: it has several sections: select one of {known}")]
     SeveralSections { path: PathBuf, known: String },
     #[error("{path}: it has no section \"{section}\": it has {known}")]
@@ -462,6 +467,9 @@ fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError
     while let Some(line) = lines.next_line().map_err(io)? {
         if line.number > DETECT_LINES {
             return Err(unknown("no solver output is recognised in it"));
+        }
+        if lsdyna::deck::signature(line.text) {
+            return Err(ReadError::Deck { path: path.into() });
         }
         is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
         if line.number <= 2 {

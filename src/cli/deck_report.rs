@@ -1,0 +1,141 @@
+//! What `crumple inspect` says of a keyword deck.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crumple::solver::lsdyna::deck::{Deck, Interface, Named};
+use serde::Serialize;
+
+/// A deck's metadata, or only where titles were taken from.
+#[derive(Default, Serialize)]
+pub struct DeckReport<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    titles_from: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    titles: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    units: Option<&'a str>,
+    /// In the deck's units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    impact_speed: Option<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    outputs: Vec<Output>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    history_nodes: Vec<Entry<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    contacts: Vec<Entry<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    rigid_walls: Vec<Entry<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<Entry<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    includes: Vec<Include<'a>>,
+}
+
+#[derive(Serialize)]
+struct Output {
+    file: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interval: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Entry<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<i64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    title: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Include<'a> {
+    name: &'a str,
+    found: bool,
+}
+
+impl<'a> DeckReport<'a> {
+    pub fn of(deck: &'a Deck) -> Self {
+        let named = |list: &'a [Named]| -> Vec<Entry<'a>> {
+            list.iter().map(|n| Entry { id: Some(n.id), title: n.title.as_deref() }).collect()
+        };
+        let interfaces = |list: &'a [Interface]| -> Vec<Entry<'a>> {
+            list.iter().map(|n| Entry { id: n.id, title: n.title.as_deref() }).collect()
+        };
+        Self {
+            titles_from: None,
+            titles: None,
+            units: deck.units.as_ref().map(|u| u.text.trim()),
+            impact_speed: deck.impact_speed().map(|s| s.speed),
+            outputs: deck
+                .outputs
+                .iter()
+                .map(|o| Output { file: o.file, interval: o.interval })
+                .collect(),
+            history_nodes: named(&deck.history_nodes),
+            contacts: interfaces(&deck.contacts),
+            rigid_walls: interfaces(&deck.rigid_walls),
+            parts: named(&deck.parts),
+            includes: deck
+                .includes
+                .iter()
+                .map(|i| Include { name: &i.name, found: i.found })
+                .collect(),
+        }
+    }
+
+    /// A note that titles of a solver file come from the deck at `path`.
+    pub fn titles(path: &Path, count: usize) -> Self {
+        Self {
+            titles_from: Some(path.display().to_string()),
+            titles: Some(count),
+            ..Self::default()
+        }
+    }
+
+    pub fn print(&self, out: &mut dyn Write) -> io::Result<()> {
+        if let (Some(path), Some(count)) = (&self.titles_from, self.titles) {
+            writeln!(out, "  titles      {count} taken from the deck {path}")?;
+        }
+        if let Some(units) = self.units {
+            writeln!(out, "  units       {units}")?;
+        }
+        if let Some(speed) = self.impact_speed {
+            writeln!(out, "  speed       {speed} (initial velocity, in the deck's units)")?;
+        }
+        let outputs: Vec<String> = self
+            .outputs
+            .iter()
+            .map(|o| o.interval.map_or(o.file.to_string(), |dt| format!("{} each {dt}", o.file)))
+            .collect();
+        if !outputs.is_empty() {
+            writeln!(out, "  outputs     {}", outputs.join(", "))?;
+        }
+        list(out, "nodes", &self.history_nodes)?;
+        list(out, "contacts", &self.contacts)?;
+        list(out, "walls", &self.rigid_walls)?;
+        list(out, "parts", &self.parts)?;
+        for include in &self.includes {
+            let missing = if include.found { "" } else { "  (not found)" };
+            writeln!(out, "  include     {}{missing}", include.name)?;
+        }
+        Ok(())
+    }
+}
+
+/// Entries printed in full; of longer lists the rest is counted.
+const SHOWN: usize = 20;
+
+fn list(out: &mut dyn Write, what: &str, entries: &[Entry<'_>]) -> io::Result<()> {
+    if entries.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "  {what:<11} {}", entries.len())?;
+    for entry in entries.iter().take(SHOWN) {
+        let id = entry.id.map_or("(no id)".to_string(), |id| id.to_string());
+        writeln!(out, "    {id}{}", entry.title.map_or(String::new(), |t| format!("  {t}")))?;
+    }
+    if entries.len() > SHOWN {
+        writeln!(out, "    … and {} more (--json lists all)", entries.len() - SHOWN)?;
+    }
+    Ok(())
+}

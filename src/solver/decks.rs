@@ -1,0 +1,123 @@
+//! The deck of a run: found beside its files, read with its includes, held against them.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::lsdyna::deck::{self, Deck, Interface, Named};
+use super::lsdyna::line::Lines;
+use super::{Entity, ReadError, SolverFile};
+
+/// Endings of keyword decks.
+const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
+/// Names of a folder that are looked at, and decks among them that are read.
+const MAX_NAMES: usize = 10_000;
+const MAX_DECKS: usize = 20;
+/// Lines looked at for the first keyword.
+const HEAD_LINES: usize = 1_000;
+
+/// What a folder has of decks.
+pub enum Search {
+    None,
+    One(PathBuf),
+    /// Several that do not include each other.
+    Several(Vec<PathBuf>),
+}
+
+/// Reads a deck; included files are looked for beside it.
+///
+/// # Errors
+/// [`ReadError::Io`] if the deck itself cannot be read.
+pub fn read(path: &Path) -> Result<Deck, ReadError> {
+    let io = |source| ReadError::Io { path: path.into(), source };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut open = |name: &str| -> Option<Box<dyn BufRead>> {
+        // Names are often written on Windows.
+        let path = folder.join(name.replace('\\', "/"));
+        // A pipe would block.
+        let is_file = fs::metadata(&path).is_ok_and(|meta| meta.is_file());
+        let file = is_file.then(|| File::open(path).ok())??;
+        Some(Box::new(BufReader::new(file)))
+    };
+    if !fs::metadata(path).map_err(io)?.is_file() {
+        return Err(io(std::io::Error::other("this is no file")));
+    }
+    let mut file = BufReader::new(File::open(path).map_err(io)?);
+    deck::read(&mut file, &mut open).map_err(io)
+}
+
+/// Looks for the main deck in a folder: the one that no other of the folder includes.
+pub fn find(folder: &Path) -> Search {
+    let Ok(entries) = folder.read_dir() else { return Search::None };
+    let mut candidates: Vec<PathBuf> = entries
+        .filter_map(Result::ok)
+        .take(MAX_NAMES)
+        .map(|entry| entry.path())
+        .filter(|path| has_ending(path) && is_deck(path))
+        .collect();
+    candidates.sort();
+    if candidates.len() > 1 && candidates.len() <= MAX_DECKS {
+        let included: Vec<String> = candidates
+            .iter()
+            .filter_map(|path| read(path).ok())
+            .flat_map(|deck| deck.includes)
+            .map(|include| include.name.replace('\\', "/"))
+            .collect();
+        candidates.retain(|path| {
+            let name = path.file_name().map(|n| n.to_string_lossy());
+            !included.iter().any(|i| Path::new(i).file_name().map(|n| n.to_string_lossy()) == name)
+        });
+    }
+    match candidates.len() {
+        0 => Search::None,
+        1 => candidates.pop().map_or(Search::None, Search::One),
+        _ => Search::Several(candidates),
+    }
+}
+
+fn has_ending(path: &Path) -> bool {
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+}
+
+/// Whether the first keyword of a file is one of a deck.
+fn is_deck(path: &Path) -> bool {
+    let is_file = fs::metadata(path).is_ok_and(|meta| meta.is_file());
+    let Some(file) = is_file.then(|| File::open(path).ok()).flatten() else { return false };
+    let mut lines = Lines::new(BufReader::new(file));
+    for _ in 0..HEAD_LINES {
+        match lines.next_line() {
+            Ok(Some(line)) if line.text.starts_with(b"*") => return deck::signature(line.text),
+            Ok(Some(_)) => {}
+            _ => return false,
+        }
+    }
+    false
+}
+
+/// Fills titles that a file does not give itself from the deck; how many.
+pub fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
+    let named = |list: &[Named]| -> Vec<(i64, Option<String>)> {
+        list.iter().map(|n| (n.id, n.title.clone())).collect()
+    };
+    let interfaces = |list: &[Interface]| -> Vec<(i64, Option<String>)> {
+        list.iter().filter_map(|n| Some((n.id?, n.title.clone()))).collect()
+    };
+    let section = file.section.split('/').next().unwrap_or_default();
+    let titles = match section {
+        "nodout" => named(&deck.history_nodes),
+        "matsum" => named(&deck.parts),
+        "rcforc" | "sleout" => interfaces(&deck.contacts),
+        "rwforc" => interfaces(&deck.rigid_walls),
+        _ => return 0,
+    };
+    let mut filled = 0;
+    for Entity { id, title } in file.entities.iter_mut().filter(|e| e.title.is_none()) {
+        let found = titles.iter().find(|(known, _)| *known == id.id);
+        if let Some((_, Some(found))) = found {
+            *title = Some(found.clone());
+            filled += 1;
+        }
+    }
+    filled
+}
