@@ -402,6 +402,7 @@ impl LocatedRun<'_> {
             _ => vec![(motion_file, &motion), (force_file, &force)],
         };
         for (located, file) in &read {
+            notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
             warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
         }
         Ok(Case {

@@ -7,7 +7,7 @@ use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
 use proptest::prelude::*;
 
 fn read(format: &str, bytes: &[u8]) -> SolverFile {
-    read_from(format, &bytes, &Selection::all()).unwrap()
+    read_from(format, &[Box::new(bytes.to_vec())], &Selection::all()).unwrap().remove(0)
 }
 
 /// Byte offsets at which the states of a nodout begin: its state lines, one per state.
@@ -101,7 +101,11 @@ fn a_missing_rotational_block_is_named() {
 
 #[test]
 fn the_other_formats_cut_at_every_byte_of_their_end() {
-    for format in ["rcforc", "rwforc", "glstat", "secforc", "matsum"] {
+    for format in text_formats() {
+        let Some(folder) = common::shared("samples/lsdyna") else { return };
+        if format == "nodout" || !folder.join(format).is_dir() {
+            continue;
+        }
         let Some(files) = samples(format) else { return };
         for path in files {
             let text = std::fs::read(&path).unwrap();
@@ -192,14 +196,10 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-const TEXT_FORMATS: [&str; 6] = ["nodout", "rcforc", "rwforc", "secforc", "glstat", "matsum"];
-
-#[test]
-fn every_format_is_damaged_somewhere() {
-    for format in FORMATS {
-        let binary = ["binout", "t01"].contains(&format.name); // in tests of their own
-        assert!(binary || TEXT_FORMATS.contains(&format.name), "{}", format.name);
-    }
+/// The formats that are lines of text.
+fn text_formats() -> Vec<&'static str> {
+    let binary = ["binout", "t01"]; // in tests of their own
+    FORMATS.iter().map(|f| f.name).filter(|name| !binary.contains(name)).collect()
 }
 
 fn any_result(format: &str, bytes: &[u8]) {
@@ -214,7 +214,7 @@ proptest! {
 
     #[test]
     fn random_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..2_000)) {
-        for format in TEXT_FORMATS {
+        for format in text_formats() {
             any_result(format, &bytes);
         }
     }

@@ -12,7 +12,7 @@ fn read(format: &str, body: &str) -> SolverFile {
 
 fn read_with(format: &str, body: &str, selection: &Selection) -> SolverFile {
     let text = format!("{HEADER}{body}");
-    read_from(format, &text.as_bytes(), selection).unwrap()
+    read_from(format, &[Box::new(text.into_bytes())], selection).unwrap().remove(0)
 }
 
 fn values(file: &SolverFile, id: i64, component: &str) -> Vec<f64> {

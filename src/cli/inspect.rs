@@ -53,6 +53,8 @@ struct Report<'a> {
     without_data: &'a [WithoutData],
     components: Vec<&'a str>,
     problems: &'a [Problem],
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    notes: &'a [String],
     /// Deck that titles were taken from, or what a deck itself says.
     #[serde(skip_serializing_if = "Option::is_none")]
     deck: Option<DeckReport<'a>>,
@@ -150,6 +152,7 @@ fn deck_report<'a>(path: &Path, deck: &'a Deck) -> Report<'a> {
         without_data: &[],
         components: Vec::new(),
         problems: &deck.problems,
+        notes: &[],
         deck: Some(DeckReport::of(deck)),
     }
 }
@@ -172,6 +175,7 @@ fn report<'a>(
         without_data: &file.without_data,
         components: file.components.iter().map(|c| &**c).collect(),
         problems: &file.problems,
+        notes: &file.notes,
         deck: titles_from.map(|(path, count)| DeckReport::titles(path, *count)),
     }
 }
@@ -222,6 +226,9 @@ fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
             solver::NoDataReason::LegendOnly => "in the legend only",
         };
         writeln!(out, "    {}{}  ({reason})", entity.id, titled(&entity.title))?;
+    }
+    for note in file.notes {
+        writeln!(out, "  note        {note}")?;
     }
     for problem in file.problems {
         writeln!(out, "  problem     {problem}")?;

@@ -234,6 +234,8 @@ pub struct SolverFile {
     pub time: Arc<[f64]>,
     pub histories: Vec<History>,
     pub problems: Vec<Problem>,
+    /// What was done to the file's values, such as differentiating impulses.
+    pub notes: Vec<String>,
 }
 
 impl SolverFile {
@@ -414,26 +416,21 @@ fn family(path: &Path, format: &Format) -> Vec<PathBuf> {
     parts
 }
 
-/// Reads the selected histories of a text format's file from `source`.
+/// Reads the selected histories of every section from sources: a file and, of a binary
+/// format, its continuations.
 ///
 /// Unlike [`read`], it does not hold the selection against what the file has.
 ///
 /// # Errors
-/// [`ReadError::NoSuchFormat`] if the format is not one of text, or [`ReadError::Io`]
-/// (without a path) from `source`.
+/// [`ReadError::NoSuchFormat`] if there is no such format, or [`ReadError::Io`] (without a
+/// path) from a source.
 pub fn read_from(
     format: &str,
-    source: &dyn Source,
+    parts: &[Box<dyn Source>],
     selection: &Selection,
-) -> Result<SolverFile, ReadError> {
-    match named(format)?.reader {
-        Reader::Text { read, .. } => {
-            read(source, selection).map_err(|source| ReadError::Io { path: PathBuf::new(), source })
-        }
-        Reader::Binary { .. } => {
-            Err(ReadError::NoSuchFormat { name: format.into(), known: "text formats".into() })
-        }
-    }
+) -> Result<Vec<SolverFile>, ReadError> {
+    let io = |source| ReadError::Io { path: PathBuf::new(), source };
+    named(format)?.read(parts, selection).map_err(io)
 }
 
 fn named(name: &str) -> Result<&'static Format, ReadError> {

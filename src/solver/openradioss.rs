@@ -1,9 +1,10 @@
 //! OpenRadioss time history `T01`: binary records framed as Fortran writes them.
 //!
 //! Its groups are given as the sections of LS-DYNA that hold the same: nodes as `nodout`,
-//! rigid walls as `rwforc`, contact interfaces as `rcforc`, global variables as `glstat`.
-//! T01 stores the *impulse* of walls and contacts; the forces here are its central
-//! difference over time (one-sided at both ends), means over two output intervals.
+//! rigid walls as `rwforc`, contact interfaces as `rcforc`, cross sections as `secforc` (never
+//! seen in a file), global variables as `glstat`. T01 stores the *impulse* of walls, contacts
+//! and sections; the forces here are its central difference over time (one-sided at both
+//! ends), means over two output intervals.
 
 use std::collections::HashSet;
 use std::io::{self, BufRead, Read};
@@ -24,6 +25,7 @@ const MAX_COUNT: i32 = 50_000_000;
 const NODES: i32 = 0;
 const INTERFACE: i32 = 101;
 const RIGID_WALL: i32 = 102;
+const SECTION: i32 = 104;
 
 /// Node variables by code, from 1: those of a nodout without its coordinates.
 const NODE_COMPONENTS: &[&str] = TRANSLATIONS.split_at(9).0;
@@ -53,7 +55,7 @@ const GLOBAL_COMPONENTS: [&str; 22] = [
     "outlet_energy",
 ];
 /// Components made from the impulses FNX FNY FNZ FTX FTY FTZ (codes 1 to 6).
-const FORCE_COMPONENTS: [&str; 4] = ["normal_force", "x_force", "y_force", "z_force"];
+const FORCE_COMPONENTS: [&str; 3] = ["x_force", "y_force", "z_force"];
 const IMPULSES: usize = 6;
 
 /// Whether a file begins like a T01: a record of a code and a title of 80 characters.
@@ -68,13 +70,13 @@ pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<
     let Some(source) = parts.first() else { return Ok(Vec::new()) };
     let input = Stream::new(&**source);
     let mut problems = Problems::default();
-    let mut records = Records { input, at: 0 };
+    let mut records = Records { input };
     let Some(header) = Header::read(&mut records)? else {
         problems.add(
             ProblemCode::CutRecord,
             None,
             None,
-            format!("the header is damaged or cut at byte {}", records.at),
+            format!("the header is damaged or cut at byte {}", records.input.position()),
         );
         let file = SolverFile { problems: problems.into_list(), ..empty("glstat") };
         return Ok(vec![file]);
@@ -87,7 +89,6 @@ pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<
 /// Records: 4-byte length, that many bytes, the same length again, all big-endian.
 struct Records<'a> {
     input: Stream<'a>,
-    at: u64,
 }
 
 impl Records<'_> {
@@ -108,7 +109,6 @@ impl Records<'_> {
         if bytes.len() < length || self.length()? != Some(length) {
             return Ok(None);
         }
-        self.at += length as u64 + 8;
         Ok(Some(bytes))
     }
 
@@ -116,6 +116,9 @@ impl Records<'_> {
         Ok(self.next()?.filter(|r| r.len() <= MAX_HEADER_RECORD))
     }
 }
+
+/// Bytes of the length before and behind each record.
+const FRAME: u64 = 4;
 
 /// A group of histories.
 struct Group {
@@ -263,6 +266,7 @@ impl Group {
             NODES => Some("nodout"),
             INTERFACE => Some("rcforc"),
             RIGID_WALL => Some("rwforc"),
+            SECTION => Some("secforc"),
             _ => None,
         }
     }
@@ -288,6 +292,8 @@ struct States {
     /// Lengths of a state's records in bytes: time, globals, parts, subsets, groups.
     lengths: Vec<usize>,
     first_group: usize,
+    /// Kept values that are no finite numbers.
+    not_finite: usize,
 }
 
 impl States {
@@ -312,7 +318,11 @@ impl States {
                     "nodout" => (1..=NODE_COMPONENTS.len())
                         .filter(|&code| selection.wants_component(NODE_COMPONENTS[code - 1]))
                         .collect(),
-                    _ if FORCE_COMPONENTS.iter().any(|c| selection.wants_component(c)) => {
+                    _ if magnitude(section)
+                        .iter()
+                        .chain(&FORCE_COMPONENTS)
+                        .any(|c| selection.wants_component(c)) =>
+                    {
                         (1..=IMPULSES).collect()
                     }
                     _ => Vec::new(),
@@ -338,35 +348,102 @@ impl States {
         lengths.extend([header.subset_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
         let first_group = lengths.len();
         lengths.extend(header.groups.iter().map(|g| 4 * g.objects.len() * g.codes.len()));
-        Self { time: Vec::new(), globals, groups, lengths, first_group }
+        Self { time: Vec::new(), globals, groups, lengths, first_group, not_finite: 0 }
     }
 
-    /// Reads states until the end; one that is cut is left out and said.
+    /// Bytes of one state.
+    fn stride(&self) -> u64 {
+        self.lengths.iter().map(|&n| n as u64 + 2 * FRAME).sum()
+    }
+
+    /// Reads states until the end. One that is damaged is left out and said; as all have the
+    /// same length, the next one is found behind it.
     fn read(&mut self, records: &mut Records<'_>, problems: &mut Problems) -> io::Result<()> {
+        let mut start = records.input.position();
+        let mut number = 0;
+        let mut above: [Option<Vec<Vec<u8>>>; 2] = [None, None];
+        let mut damaged: Option<(u64, usize)> = None;
         loop {
+            records.input.go_to(start);
             if records.input.fill_buf()?.is_empty() {
-                return Ok(());
+                break;
             }
-            let start = records.at;
+            number += 1;
             let mut state = Vec::with_capacity(self.lengths.len());
             for &length in &self.lengths {
                 match records.next()? {
                     Some(record) if record.len() == length => state.push(record),
-                    _ => {
-                        problems.add(
-                            ProblemCode::IncompleteState,
-                            None,
-                            None,
-                            format!(
-                                "state {} at byte {start} is cut or damaged; it and what follows is left out",
-                                self.time.len() + 1
-                            ),
-                        );
-                        return Ok(());
-                    }
+                    _ => break,
                 }
             }
-            self.store(&state, problems);
+            if state.len() == self.lengths.len() {
+                damaged = self.say(damaged, number, problems);
+                self.look_for_zeros(&above, Some(&state), problems);
+                self.store(&state, problems);
+                let [_, last] = above;
+                above = [last, Some(state)];
+            } else if damaged.is_none() {
+                damaged = Some((start, number));
+            }
+            start += self.stride();
+        }
+        self.say(damaged, number + 1, problems);
+        self.look_for_zeros(&above, None, problems);
+        if self.not_finite > 0 {
+            let message = format!(
+                "{} values are no finite numbers; they are returned as such",
+                self.not_finite
+            );
+            problems.add(ProblemCode::NotFinite, None, None, message);
+        }
+        Ok(())
+    }
+
+    /// Says which states are left out: from the damaged one up to the one before `next`.
+    fn say(
+        &self,
+        damaged: Option<(u64, usize)>,
+        next: usize,
+        problems: &mut Problems,
+    ) -> Option<(u64, usize)> {
+        let (byte, first) = damaged?;
+        let message = match next - first {
+            1 => format!("state {first} at byte {byte} is cut or damaged; it is left out"),
+            _ => format!(
+                "states {first} to {} from byte {byte} on are cut or damaged; they are left out",
+                next - 1
+            ),
+        };
+        problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
+        None
+    }
+
+    /// Names the last state above if values of it are zero that are not in the states around
+    /// it: T01 has no check sums, and neither a motion nor an impulse does that.
+    fn look_for_zeros(
+        &self,
+        above: &[Option<Vec<Vec<u8>>>; 2],
+        below: Option<&Vec<Vec<u8>>>,
+        problems: &mut Problems,
+    ) {
+        let [Some(before), Some(state)] = above else { return };
+        let is_zero = |word: &[u8]| word[0] & 0x7f == 0 && word[1..] == [0, 0, 0];
+        let mut count = 0;
+        for (k, record) in state.iter().enumerate().skip(1) {
+            let words = record.chunks_exact(4).zip(before[k].chunks_exact(4)).enumerate();
+            count += words
+                .filter(|(i, (now, before))| {
+                    let after = below.is_none_or(|b| !is_zero(&b[k][4 * i..4 * i + 4]));
+                    is_zero(now) && !is_zero(before) && after
+                })
+                .count();
+        }
+        if count > 0 {
+            let message = format!(
+                "{count} values of the state at time {:?} are zero but not so in the states around it: was the file overwritten there?",
+                self.time.last().copied().unwrap_or(f64::NAN)
+            );
+            problems.add(ProblemCode::SuspectZeros, None, None, message);
         }
     }
 
@@ -389,12 +466,17 @@ impl States {
             );
         }
         self.time.push(time);
+        let mut keep = |channel: &mut Channel, record: &[u8]| {
+            let value = real(record, channel.offset);
+            self.not_finite += usize::from(!value.is_finite());
+            channel.values.push(value);
+        };
         for channel in &mut self.globals {
-            channel.values.push(real(&state[1], channel.offset));
+            keep(channel, &state[1]);
         }
         for (channels, record) in self.groups.iter_mut().zip(&state[self.first_group..]) {
             for channel in channels {
-                channel.values.push(real(record, channel.offset));
+                keep(channel, record);
             }
         }
     }
@@ -443,8 +525,7 @@ impl States {
                     .map(|code| NODE_COMPONENTS[code - 1].into())
                     .collect(),
                 _ if (1..=IMPULSES).all(|code| group.position(code).is_some()) => {
-                    let skipped = usize::from(section == "rcforc");
-                    FORCE_COMPONENTS[skipped..].iter().map(|&c| c.into()).collect()
+                    magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
                 }
                 _ => Vec::new(),
             };
@@ -491,6 +572,15 @@ fn entities(section: &str, id: i64) -> Vec<EntityId> {
     }
 }
 
+/// The component that is the size of a force, where the section has one.
+fn magnitude(section: &str) -> &'static [&'static str] {
+    match section {
+        "rwforc" => &["normal_force"],
+        "secforc" => &["total_force"],
+        _ => &[],
+    }
+}
+
 /// The histories of one object from its variables by code.
 fn histories(
     section: &str,
@@ -515,14 +605,20 @@ fn histories(
     let rate = |values: &[f64]| derivative(time, values);
     let normal: Vec<Vec<f64>> = (0..3).map(|k| rate(all[k])).collect();
     let mut made = Vec::new();
-    if section == "rwforc" {
-        let magnitude = |i: usize| normal.iter().map(|n| n[i] * n[i]).sum::<f64>().sqrt();
-        let values = (0..time.len()).map(magnitude).collect();
-        made.push(history(Some(entity), "normal_force", values, time));
+    let total: Vec<Vec<f64>> = (0..3)
+        .map(|k| {
+            let tangential = rate(all[k + 3]);
+            normal[k].iter().zip(tangential).map(|(n, t)| sign * (n + t)).collect()
+        })
+        .collect();
+    for &component in magnitude(section) {
+        // A wall's normal force, but the whole force of a section.
+        let of = if section == "rwforc" { &normal } else { &total };
+        let length = |i: usize| of.iter().map(|n| n[i] * n[i]).sum::<f64>().sqrt();
+        let values = (0..time.len()).map(length).collect();
+        made.push(history(Some(entity), component, values, time));
     }
-    for (k, component) in ["x_force", "y_force", "z_force"].into_iter().enumerate() {
-        let tangential = rate(all[k + 3]);
-        let values = normal[k].iter().zip(tangential).map(|(n, t)| sign * (n + t)).collect();
+    for (component, values) in FORCE_COMPONENTS.into_iter().zip(total) {
         made.push(history(Some(entity), component, values, time));
     }
     made
@@ -550,5 +646,12 @@ fn empty(section: &str) -> SolverFile {
         time: Arc::new([]),
         histories: Vec::new(),
         problems: Vec::new(),
+        notes: match section {
+            "rwforc" | "rcforc" | "secforc" => vec![DIFFERENTIATED.into()],
+            _ => Vec::new(),
+        },
     }
 }
+
+const DIFFERENTIATED: &str =
+    "forces are the central difference of T01's impulses, a mean over two output intervals";

@@ -387,6 +387,12 @@ impl<'a> States<'a> {
             table.filled.fill(false);
             table.filled_rows = 0;
             table.next_row = 0;
+            // What a state that was left out had must not stand in the next one.
+            if table.varies {
+                for channel in &mut table.channels {
+                    (channel.pending, channel.pending_seen) = (f64::NAN, false);
+                }
+            }
         }
         for scalar in &mut self.scalars {
             scalar.pending = None;
@@ -453,7 +459,6 @@ impl<'a> States<'a> {
             for channel in &mut table.channels {
                 channel.values.push(channel.pending);
                 channel.seen += usize::from(channel.pending_seen);
-                (channel.pending, channel.pending_seen) = (f64::NAN, false);
             }
         }
         for scalar in &mut self.scalars {

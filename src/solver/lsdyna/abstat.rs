@@ -64,7 +64,7 @@ impl Body for Abstat {
 
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         let text = line.text.trim_ascii_start();
-        if line.is_blank() || text.starts_with(b"time   airbag/cv #") {
+        if line.is_blank() || (text.starts_with(b"time   airbag/cv #") && line.is_heading()) {
             return;
         }
         let read = match text.starts_with(MATERIAL) {
@@ -77,6 +77,10 @@ impl Body for Abstat {
                 format!("expected an airbag's or a material's row, found \"{}\"", found.trim_end());
             states.damage(line, None, message);
         }
+    }
+
+    fn interrupt(&mut self) {
+        self.airbag = None;
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}

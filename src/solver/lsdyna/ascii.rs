@@ -18,6 +18,9 @@ pub trait Body {
     /// One line below the header, outside a legend.
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>);
 
+    /// A damaged line was left out: what was begun before it cannot go on behind it.
+    fn interrupt(&mut self) {}
+
     /// The end of the file, at `place`.
     fn end(&mut self, place: Place, states: &mut States<'_>);
 
@@ -48,6 +51,8 @@ pub struct Frame<'a> {
     version: Option<String>,
 }
 
+/// Longest line of a header or legend; real ones have at most 94 columns.
+const MAX_HEADER_LINE: usize = 132;
 /// Entries kept of a legend; real ones have one per entity.
 const MAX_LEGEND: usize = 2_000_000;
 /// Leading states that may be too damaged to tell the entities.
@@ -116,6 +121,15 @@ impl<'a> Frame<'a> {
     /// Takes one line; false at the end of the file.
     pub fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
         let Some(line) = self.lines.next_line()? else { return Ok(false) };
+        let in_header = line.number <= 2 || self.fence.is_open();
+        if in_header && (line.text.len() > MAX_HEADER_LINE || line.is_binary()) {
+            self.states.problems.add(
+                ProblemCode::BadLine,
+                Some((&line).into()),
+                None,
+                "the line is no title, version or legend entry: was the file overwritten?".into(),
+            );
+        }
         match line.number {
             1 => {
                 let text = String::from_utf8_lossy(line.text).trim().to_string();
@@ -143,6 +157,12 @@ impl<'a> Frame<'a> {
                 None,
                 "the line is longer than any line of this file can be; its end is left out".into(),
             );
+        }
+        if line.is_binary() {
+            let message = "expected text, found bytes that are none: was the file overwritten?";
+            self.states.damage(&line, None, message.into());
+            body.interrupt();
+            return Ok(true);
         }
         if self.fence.is_open() && body.is_signature(line.text) {
             self.fence.close();
@@ -224,6 +244,7 @@ impl<'a> Frame<'a> {
             time: collected.time,
             histories: collected.histories,
             problems: collected.problems,
+            notes: Vec::new(),
         }
     }
 }

@@ -261,6 +261,16 @@ impl Reader<'_> {
     fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
         let metadata = self.metadata(section)?;
         let states = self.states(section, problems)?;
+        let lists = [&metadata.ids, &metadata.force_ids, &metadata.moment_ids];
+        let named = lists.into_iter().flatten().chain(states.ids.iter().flatten()).flatten();
+        let lost = named.filter(|id| is_lost(section, **id)).count();
+        if lost > 0 {
+            let message = format!(
+                "{}: {lost} ids are zero (was the file overwritten there?); what belongs to them is left out",
+                section.name
+            );
+            problems.add(ProblemCode::BadRecord, None, None, message);
+        }
         let mut entities: Vec<EntityId> = Vec::new();
         let mut known: HashSet<EntityId> = HashSet::new();
         let mut components: Vec<Arc<str>> = Vec::new();
@@ -271,7 +281,7 @@ impl Reader<'_> {
             else {
                 continue;
             };
-            for id in owners.entities() {
+            for id in owners.entities().iter().filter(|id| !is_lost(section, id.id)) {
                 if !states.whole.is_empty() && known.insert(*id) {
                     entities.push(*id);
                 }
@@ -341,6 +351,7 @@ impl Reader<'_> {
             time: states.time,
             histories,
             problems: Vec::new(),
+            notes: Vec::new(),
         })
     }
 
@@ -546,6 +557,7 @@ impl Reader<'_> {
                 let all = owners.entities().iter().enumerate();
                 let audit = self.selection.audit;
                 all.filter(|(_, id)| audit || self.selection.wants(**id))
+                    .filter(|(_, id)| !is_lost(section, id.id))
                     .map(|(k, id)| (k, Some(*id)))
                     .collect()
             }
@@ -638,6 +650,12 @@ impl Reader<'_> {
 fn positions_of(kept: &[(usize, Option<EntityId>)], ids: &[i64]) -> Vec<Option<usize>> {
     let of: HashMap<i64, usize> = ids.iter().enumerate().map(|(k, &id)| (id, k)).collect();
     kept.iter().map(|(_, entity)| entity.and_then(|e| of.get(&e.id).copied())).collect()
+}
+
+/// Whether an id can only be one that was overwritten with zeros: LS-DYNA counts from 1, but
+/// prints a part 0 for lumped masses.
+fn is_lost(section: &Section, id: i64) -> bool {
+    id == 0 && section.name != "matsum"
 }
 
 fn is_not_result(name: &str) -> bool {

@@ -35,7 +35,7 @@ impl Body for Curvout {
 
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         states.may_be_empty();
-        if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.ended) {
+        if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
             return;
         }
         if line.text.starts_with(STATE) {

@@ -67,6 +67,10 @@ impl Body for Dotted {
         }
     }
 
+    fn interrupt(&mut self) {
+        self.entity = None;
+    }
+
     fn end(&mut self, _: Place, _: &mut States<'_>) {}
 }
 

@@ -103,6 +103,10 @@ impl Body for Elout {
         }
     }
 
+    fn interrupt(&mut self) {
+        self.entity = None;
+    }
+
     fn end(&mut self, _: Place, states: &mut States<'_>) {
         if self.unread.is_some() {
             let message = "rows of muscle data are not read".into();
@@ -128,7 +132,7 @@ impl Elout {
         let step = memchr::memmem::find(line.text, b"s t e p").map(|at| at + 7);
         let to = memchr::memmem::find(line.text, b"( at time");
         let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
-        let time = super::at_time(line.text).filter(|_| line.ended);
+        let time = super::at_time(line.text).filter(|_| line.is_heading());
         let repeats = self.quantity == Some(quantity) && quantity != Quantity::Beam;
         self.quantity = Some(quantity);
         let is_same = states.is_pending()
@@ -136,11 +140,12 @@ impl Elout {
             && states.pending_time() == time
             && self.cycle.as_deref() == cycle
             && !repeats;
-        if !is_same {
+        if time.is_some() && !is_same {
             states.begin(time, line.into());
             self.cycle = cycle.map(<[u8]>::to_vec);
         }
         if time.is_none() {
+            self.quantity = None;
             states.damage(line, None, "expected a cycle number and \"( at time … )\"".into());
         }
         true
@@ -150,7 +155,7 @@ impl Elout {
     fn column_line(&mut self, line: &Line<'_>) -> bool {
         let text = line.text.trim_ascii_start();
         let has = |word: &[u8]| memchr::memmem::find(text, word).is_some();
-        if has(b"sig-xx") {
+        if has(b"sig-xx") && line.is_heading() {
             self.further = match () {
                 () if has(b"plastic") => &["plastic_strain"],
                 () => &["effsg", "yield"],
@@ -170,7 +175,8 @@ impl Elout {
             b"muscle data",
             b"strains (",
         ];
-        let is_column_line = line.ended && STARTS.iter().any(|start| text.starts_with(start));
+        let is_column_line =
+            line.is_heading() && STARTS.iter().any(|start| text.starts_with(start));
         if is_column_line && text.starts_with(b"integration") {
             self.at_points = true;
         }
@@ -196,7 +202,7 @@ impl Elout {
         if let Some(rest) = text.strip_prefix(b" beam/truss # =") {
             let digits = rest.trim_ascii_start();
             let end = digits.iter().position(|b| !b.is_ascii_digit())?;
-            line.ended.then_some(())?;
+            line.is_heading().then_some(())?;
             self.entity = Some(EntityId::new(integer(&digits[..end])?));
             self.at_points = false;
             return Some(());
@@ -240,7 +246,8 @@ impl Elout {
         let entity = self.entity?;
         let quantity = self.quantity?;
         let nodal = matches!(quantity, Quantity::NodalStress | Quantity::NodalStrain);
-        let (point, surface) = place(text.get(..LABEL)?)?;
+        let label = text.get(..LABEL)?;
+        let (point, surface) = place(label).filter(|_| !label.contains(&b'*'))?;
         // Details of elements end with the place of the point.
         let location = [b"int. point".as_slice(), b"node "]
             .iter()

@@ -26,10 +26,16 @@ pub fn signature(line: &[u8]) -> bool {
 }
 
 pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("glstat", source, selection, || Glstat)
+    ascii::read("glstat", source, selection, Glstat::default)
 }
 
-struct Glstat;
+#[derive(Default)]
+struct Glstat {
+    /// Inside a block of mass properties, which ends with a row of stars.
+    in_properties: bool,
+}
+
+const PROPERTIES: &[u8] = b"m a s s   p r o p e r t i e s";
 
 impl Body for Glstat {
     fn is_signature(&self, line: &[u8]) -> bool {
@@ -39,7 +45,7 @@ impl Body for Glstat {
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
-            if !line.ended {
+            if !line.is_heading() {
                 states.mark_damaged();
             }
             return;
@@ -50,8 +56,22 @@ impl Body for Glstat {
             return;
         }
         let Some(mut component) = component else {
+            let text = line.text.trim_ascii();
+            let is_stars = !text.is_empty() && text.iter().all(|&b| b == b'*');
+            let is_ruler = self.in_properties && is_stars;
+            self.in_properties = (self.in_properties && !is_ruler) || text.starts_with(PROPERTIES);
+            if !is_ruler && !line.is_heading() {
+                states.damage(line, None, "expected a label and its value, found stars".into());
+            }
             return; // Text between the labels: mass properties, warnings.
         };
+        // Only a wall's number may stand behind the value.
+        let rest = line.text.get(VALUE.1..).unwrap_or_default().trim_ascii();
+        if !rest.is_empty() && wall_number(line.text).is_none() {
+            let message = "expected the line to end behind its value";
+            states.damage(line, Some([VALUE.1 + 1, line.text.len()]), message.into());
+            return;
+        }
         // With several walls the label repeats, and the wall follows the value.
         if let Some(wall) = wall_number(line.text) {
             component = format!("{component}_wall_{wall}");

@@ -26,7 +26,12 @@ pub fn fields(
         })
         .collect();
     let end = fields.iter().flatten().map(|(_, to)| *to).max()?;
-    (end == text.len() || (tail > 0 && end + tail == text.len())).then_some(fields)
+    // Stars outside a number: lines were overwritten, and what stands behind is of another.
+    let in_number =
+        |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
+    let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));
+    let whole = end == text.len() || (tail > 0 && end + tail == text.len());
+    (whole && !stars).then_some(fields)
 }
 
 /// The components' names.

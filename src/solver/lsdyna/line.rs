@@ -28,6 +28,17 @@ impl Line<'_> {
         self.text.iter().all(u8::is_ascii_whitespace)
     }
 
+    /// Whether the line has bytes that no text has: the file was overwritten there.
+    pub fn is_binary(&self) -> bool {
+        self.text.iter().any(|b| b.is_ascii_control() && !matches!(b, b'\t' | b'\r' | b'\x0c'))
+    }
+
+    /// Whether a line that holds no numbers is as the solver wrote it: whole, and without
+    /// stars, which stand only where a number should be.
+    pub fn is_heading(&self) -> bool {
+        self.ended && memchr::memmem::find(self.text, b"**").is_none()
+    }
+
     /// Columns `from..=to`, counted from 1, as far as the line reaches.
     pub fn columns(&self, from: usize, to: usize) -> &[u8] {
         let end = to.min(self.text.len());

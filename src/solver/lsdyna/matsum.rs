@@ -3,6 +3,7 @@
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::{Labelled, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -15,34 +16,39 @@ const PART: &[u8] = b" mat.#=";
 /// Width of every number, right behind its label.
 const WIDTH: usize = 13;
 
-/// A component and its label.
-type Labelled = (&'static str, &'static [u8]);
-
 /// The lines of a part; the last one is there only if hourglass energy is computed.
 const LINES: [(&str, &[Labelled]); 4] = [
     (
         "parts' energies",
         &[
-            ("internal_energy", b"inten="),
-            ("kinetic_energy", b"kinen="),
-            ("eroded_internal_energy", b"eroded_ie="),
-            ("eroded_kinetic_energy", b"eroded_ke="),
+            labelled("internal_energy", "inten=", WIDTH),
+            labelled("kinetic_energy", "kinen=", WIDTH),
+            labelled("eroded_internal_energy", "eroded_ie=", WIDTH),
+            labelled("eroded_kinetic_energy", "eroded_ke=", WIDTH),
         ],
     ),
     (
         "parts' momenta",
-        &[("x_momentum", b"x-mom="), ("y_momentum", b"y-mom="), ("z_momentum", b"z-mom=")],
+        &[
+            labelled("x_momentum", "x-mom=", WIDTH),
+            labelled("y_momentum", "y-mom=", WIDTH),
+            labelled("z_momentum", "z-mom=", WIDTH),
+        ],
     ),
     (
         "parts' velocities",
-        &[("x_rbvelocity", b"x-rbv="), ("y_rbvelocity", b"y-rbv="), ("z_rbvelocity", b"z-rbv=")],
+        &[
+            labelled("x_rbvelocity", "x-rbv=", WIDTH),
+            labelled("y_rbvelocity", "y-rbv=", WIDTH),
+            labelled("z_rbvelocity", "z-rbv=", WIDTH),
+        ],
     ),
     (
         "parts' hourglass energies",
         &[
-            ("hourglass_energy", b"hgeng="),
-            ("added_mass", b"+mass="),
-            ("eroded_hourglass_energy", b"eroded_he="),
+            labelled("hourglass_energy", "hgeng=", WIDTH),
+            labelled("added_mass", "+mass=", WIDTH),
+            labelled("eroded_hourglass_energy", "eroded_he=", WIDTH),
         ],
     ),
 ];
@@ -85,7 +91,8 @@ impl Body for Matsum {
             }
             return;
         }
-        let is_first = |labels: &[Labelled]| memchr::memmem::find(text, labels[0].1).is_some();
+        let is_first =
+            |labels: &[Labelled]| memchr::memmem::find(text, labels[0].label.as_bytes()).is_some();
         let found = LINES.iter().position(|(_, labels)| is_first(labels));
         if text.starts_with(PART) {
             self.part = memchr::memmem::find(text, b"inten=")
@@ -94,13 +101,17 @@ impl Body for Matsum {
         match (found, self.part) {
             (Some(index), Some(part)) => self.values(index, part, line, states),
             // "Maximum mass increase in …" and the like, below the parts.
-            (None, _) if line.ended && !text.starts_with(PART) => {}
+            (None, _) if line.is_heading() && !text.starts_with(PART) => {}
             _ => states.damage(
                 line,
                 None,
                 format!("expected a part's values, found \"{}\"", shown(line.columns(1, 40))),
             ),
         }
+    }
+
+    fn interrupt(&mut self) {
+        self.part = None;
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}
@@ -110,25 +121,14 @@ impl Matsum {
     fn values(&mut self, index: usize, part: i64, line: &Line<'_>, states: &mut States<'_>) {
         let tables = *self.tables.get_or_insert_with(|| {
             LINES.map(|(name, labels)| {
-                let components: Vec<&str> = labels.iter().map(|(c, _)| *c).collect();
+                let components: Vec<&str> = labels.iter().map(|l| l.component).collect();
                 states.table(name, &components)
             })
         });
-        let text = line.text.trim_ascii_end();
-        let labels = LINES[index].1;
-        let fields: Vec<Option<(usize, usize)>> = labels
-            .iter()
-            .map(|(_, label)| {
-                let at = memchr::memmem::find(text, label)? + label.len();
-                Some((at + 1, at + WIDTH))
-            })
-            .collect();
-        // The row ends with its last number; a cut one does not.
-        let end = fields.iter().flatten().map(|(_, to)| *to).max();
-        if end != Some(text.len()) {
-            states.damage(line, end.map(|e| [1, e]), "expected labels and their numbers".into());
+        let Some(fields) = fields(line, LINES[index].1, 0) else {
+            states.damage(line, None, "expected labels and their numbers".into());
             return;
-        }
+        };
         states.row(tables[index], EntityId::new(part), line, |k| fields[k]);
     }
 }

@@ -67,10 +67,11 @@ impl NodeForces {
         Self { layout, blocks: Vec::new(), current: None, body: None }
     }
 
-    fn prefix(&self) -> String {
-        match self.current {
-            None | Some(0) => String::new(),
-            Some(k) => format!("{}_", self.blocks[k].name),
+    /// What the names of the block's components begin with.
+    fn prefix(&self, block: usize) -> String {
+        match block {
+            0 => String::new(),
+            k => format!("{}_", self.blocks[k].name),
         }
     }
 
@@ -88,13 +89,11 @@ impl NodeForces {
         }));
     }
 
-    fn tables(&mut self, states: &mut States<'_>) -> [TableId; 2] {
-        let prefix = self.prefix();
-        let current = self.current.unwrap_or(0);
-        if self.blocks.is_empty() {
-            self.blocks.push(Block { name: String::new(), tables: None });
-        }
-        *self.blocks[current].tables.get_or_insert_with(|| {
+    /// The tables of the current block; `None` where its heading is missing.
+    fn tables(&mut self, states: &mut States<'_>) -> Option<[TableId; 2]> {
+        let current = self.current?;
+        let prefix = self.prefix(current);
+        let tables = *self.blocks[current].tables.get_or_insert_with(|| {
             let table = |states: &mut States<'_>, what, names: &[&str]| {
                 let names: Vec<String> = names.iter().map(|n| format!("{prefix}{n}")).collect();
                 states.table(what, &names.iter().map(String::as_str).collect::<Vec<_>>())
@@ -103,7 +102,8 @@ impl NodeForces {
                 table(states, "forces", &components(&ROW)),
                 table(states, "moments", &components(&MOMENTS)),
             ]
-        })
+        });
+        Some(tables)
     }
 
     fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
@@ -115,7 +115,7 @@ impl NodeForces {
         let tail = b"   setid =        0".len();
         let fields = fields(line, &ROW, tail)?;
         fields[..4].iter().all(Option::is_some).then_some(())?;
-        let [table, _] = self.tables(states);
+        let [table, _] = self.tables(states)?;
         self.body = Some(id);
         states.row(table, EntityId::new(id), line, |k| fields[k]);
         Some(())
@@ -125,14 +125,14 @@ impl NodeForces {
         let fields = fields(line, &MOMENTS, 0)?;
         let id = self.body?;
         fields.iter().all(Option::is_some).then_some(())?;
-        let [_, table] = self.tables(states);
+        let [_, table] = self.tables(states)?;
         states.row(table, EntityId::new(id), line, |k| fields[k]);
         Some(())
     }
 
     fn totals(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
         let fields = fields(line, &TOTALS, 0)?;
-        let prefix = self.prefix();
+        let prefix = self.prefix(self.current?);
         for (label, field) in TOTALS.iter().zip(fields) {
             let Some((from, to)) = field else { continue };
             let name = format!("{prefix}{}", label.component);
@@ -175,7 +175,7 @@ impl Body for NodeForces {
             self.totals(line, states)
         } else if start.starts_with(b"xmoment=") {
             self.moments(line, states)
-        } else if let Some(name) = (self.layout.block)(text).filter(|_| line.ended) {
+        } else if let Some(name) = (self.layout.block)(text).filter(|_| line.is_heading()) {
             self.enter(name, line, states);
             Some(())
         } else {
@@ -189,6 +189,10 @@ impl Body for NodeForces {
             );
             states.damage(line, None, message);
         }
+    }
+
+    fn interrupt(&mut self) {
+        self.body = None;
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}

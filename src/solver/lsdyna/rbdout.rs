@@ -75,6 +75,10 @@ impl Body for Rbdout {
         states.damage(line, None, message);
     }
 
+    fn interrupt(&mut self) {
+        self.body = None;
+    }
+
     fn end(&mut self, _: Place, _: &mut States<'_>) {}
 }
 
@@ -100,7 +104,7 @@ impl Rbdout {
         if text.starts_with(LOCAL) {
             self.is_local = true;
         }
-        if HEADINGS.iter().any(|heading| start.starts_with(heading)) && line.ended {
+        if HEADINGS.iter().any(|heading| start.starts_with(heading)) && line.is_heading() {
             return Some(());
         }
         let index = LINES.iter().position(|(label, ..)| start.starts_with(label))?;

@@ -199,5 +199,6 @@ fn undefined_interface(text: &[u8]) -> Option<i64> {
     let rest = text.trim_ascii_start().strip_prefix(INTERFACE)?;
     let comma = memchr::memchr(b',', rest)?;
     memchr::memmem::find(rest, UNDEFINED)?;
-    integer(&rest[..comma])
+    let is_whole = memchr::memmem::find(rest, b"**").is_none();
+    integer(&rest[..comma]).filter(|_| is_whole)
 }

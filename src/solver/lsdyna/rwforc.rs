@@ -43,13 +43,14 @@ impl Body for Rwforc {
         if line.is_blank() {
             return;
         }
-        if is_column_line(text) {
+        let heading = line.is_heading();
+        if is_column_line(text) && heading {
             self.unread = None;
-        } else if text.trim_ascii().starts_with(b"seg#") {
+        } else if heading && text.trim_ascii().starts_with(b"seg#") {
             self.unread = Some("wall segments");
-        } else if is_node_set_heading(text) {
+        } else if is_node_set_heading(text) && heading {
             self.unread = Some("node-set transducers");
-        } else if text.trim_ascii().starts_with(b"total force") {
+        } else if heading && text.trim_ascii().starts_with(b"total force") {
             self.unread = None;
         } else if self.unread.is_some() {
             self.unread_rows += 1;

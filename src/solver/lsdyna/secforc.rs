@@ -49,9 +49,13 @@ impl Body for Secforc {
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         if line.is_blank() {
             self.section = None;
-        } else if !line.text.trim_ascii_start().starts_with(b"line#") {
+        } else if !(line.text.trim_ascii_start().starts_with(b"line#") && line.is_heading()) {
             self.values(line, states);
         }
+    }
+
+    fn interrupt(&mut self) {
+        self.section = None;
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}

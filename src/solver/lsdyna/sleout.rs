@@ -50,7 +50,7 @@ impl Body for Sleout {
 
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
         let text = line.text;
-        if line.is_blank() || text.trim_ascii_start().starts_with(b"#") {
+        if line.is_blank() || (text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
             return;
         }
         if let Some(rest) = text.strip_prefix(STATE) {
@@ -81,14 +81,17 @@ impl Sleout {
         let text = line.text.trim_ascii_end();
         let label = SUMS.iter().find(|(label, _)| memchr::memmem::find(text, label).is_some());
         if let Some((_, name)) = label {
-            (text.len() == SUM.1).then_some(())?;
+            let stars = memchr::memmem::find(line.columns(1, SUM.0 - 1), b"**");
+            (text.len() == SUM.1 && stars.is_none()).then_some(())?;
             states.scalar(name, line.columns(SUM.0, SUM.1), line, [SUM.0, SUM.1]);
             return Some(());
         }
         let id = integer(line.columns(ID.0, ID.1))?;
         let columns = FIELDS.iter().position(|(_, to)| *to == text.len())? + 1;
         let whole = line.ended && (text.len() >= self.width || self.width < FIELDS[2].1);
-        (whole || text.len() == FIELDS[2].1).then_some(())?;
+        let between = line.columns(FIELDS[1].1 + 1, FIELDS[2].0 - 1);
+        let is_apart = between.trim_ascii().is_empty();
+        (is_apart && (whole || text.len() == FIELDS[2].1)).then_some(())?;
         self.width = self.width.max(text.len());
         let table = *self.table.get_or_insert_with(|| states.table("interfaces", &COMPONENTS));
         states.row(table, EntityId::new(id), line, |k| (k < columns).then_some(FIELDS[k]));

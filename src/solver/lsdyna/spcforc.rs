@@ -86,7 +86,8 @@ impl Spcforc {
         let end = from + 3 * WIDTH;
         let field = |k: usize| (from + k * WIDTH + 1, from + (k + 1) * WIDTH);
         let Some(table) = table else {
-            (text.len() == end).then_some(())?;
+            let is_alone = text[..at].trim_ascii().is_empty();
+            (text.len() == end && is_alone).then_some(())?;
             for (k, name) in ["x_resultant", "y_resultant", "z_resultant"].iter().enumerate() {
                 let (first, last) = field(k);
                 states.scalar(name, line.columns(first, last), line, [first, last]);

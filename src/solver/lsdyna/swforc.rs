@@ -47,7 +47,7 @@ impl Body for Swforc {
     }
 
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
-        if line.is_blank() || line.text.starts_with(COLUMN_LINE) {
+        if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
             return;
         }
         if self.row(line, states).is_none() {
@@ -70,6 +70,7 @@ impl Swforc {
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
         let kind = line.columns(KIND.0, KIND.1).trim_ascii();
         let kind = kind.strip_suffix(b"ID")?.trim_ascii_end().to_vec();
+        (!kind.contains(&b'*')).then_some(())?;
         let id = integer(line.columns(ID.0, ID.1))?;
         let rest = text.get(REST..)?;
         let failed = rest.starts_with(FAILED);

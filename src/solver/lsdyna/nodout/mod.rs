@@ -96,7 +96,7 @@ impl Body for Nodout {
             self.block = None;
             self.announced = self.state_line(line, states);
             self.note_start(states);
-        } else if line.text.starts_with(COLUMN_LINE) {
+        } else if line.text.starts_with(COLUMN_LINE) && line.is_heading() {
             self.block = self.column_line(line, states);
         } else if let Some(block) = self.block {
             row(block, line, states);
@@ -113,6 +113,11 @@ impl Body for Nodout {
                 format!("expected a state line, found \"{}\"", found.trim_end()),
             );
         }
+    }
+
+    fn interrupt(&mut self) {
+        self.block = None;
+        self.announced = None;
     }
 
     fn leap(&mut self, source: &dyn Source, states: &mut States<'_>) -> io::Result<Option<Place>> {
@@ -221,7 +226,7 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
     let close = memchr::memchr(b')', rest)?;
     let cycle = integer(&rest[..at])?;
     match real(rest.get(at + AT.len()..close)?) {
-        Field::Real(time) => Some((cycle, time)),
+        Field::Real(time) if rest[close + 1..].trim_ascii().is_empty() => Some((cycle, time)),
         _ => None,
     }
 }

@@ -86,7 +86,7 @@ impl Stride {
             let Some(line) = lines.next_line()? else { return Ok(None) };
             let text = line.text;
             let (is_blank, byte) = (line.is_blank(), line.byte);
-            let is_column = text.starts_with(COLUMN_LINE);
+            let is_column = text.starts_with(COLUMN_LINE) && line.is_heading();
             if text.starts_with(STATE) {
                 state_line = head.len()..head.len() + text.len();
             }
