@@ -45,6 +45,16 @@ fn text_and_binary_of_one_run_agree() {
             let matsum = folder.join("matsum/rowan_r14.1.1_run0010_5_no_hgeng");
             let matsum = read(&matsum, None, &Selection::all()).unwrap();
             assert_eq!(agrees(&matsum, &section(&binary, "matsum"), 5), 2 * 10);
+            // Every other text of this run, in the digits that it prints.
+            for (file, name, values) in [
+                ("spcforc/rowan_r14.1.1_run0010_5_moments", "spcforc", 2 * (1306 * 6 + 3)),
+                ("bndout/rowan_r14.1.1_run0010_5", "bndout/velocity/nodes", 2 * (135 * 7 + 4)),
+                ("elout/rowan_r14.1.1_solid_run0010_5", "elout/solid", 2 * 7 * 14),
+                ("eloutdet/rowan_r14.1.1_run0010_5", "eloutdet/nodavg", 2 * 52 * 13),
+            ] {
+                let text = read(&folder.join(file), None, &Selection::all()).unwrap();
+                assert_eq!(agrees(&text, &section(&binary, name), 5), values, "{file}");
+            }
         }
     }
     // l2a printed this one from the binout: seven digits of its float32 values.

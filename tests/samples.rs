@@ -250,10 +250,255 @@ fn matsum_values_are_the_files() {
     }
 }
 
+/// The number behind a label.
+fn behind(line: &str, label: &str) -> f64 {
+    numbers(&line[line.find(label).unwrap()..])[0]
+}
+
+fn push_all(table: &mut Table, names: &[&str], id: &str, values: &[f64]) {
+    for (name, value) in names.iter().zip(values) {
+        push(table, format!("{name}[{id}]"), *value);
+    }
+}
+
+/// A time, unless the state above has it: blocks of one state repeat it.
+fn push_time(table: &mut Table, time: f64) {
+    let times = table.entry("time".into()).or_default();
+    if times.last() != Some(&time) {
+        times.push(time);
+    }
+}
+
+#[test]
+fn spcforc_values_are_the_files() {
+    let Some(files) = samples("spcforc") else { return };
+    for path in files {
+        let mut theirs = Table::new();
+        for line in std::fs::read_to_string(&path).unwrap().lines() {
+            if line.contains("output at time") {
+                push(&mut theirs, "time".into(), numbers(line)[0]);
+            } else if line.contains("node=") {
+                let id = line[6..].split_whitespace().next().unwrap();
+                let kind = if line.contains("moments") { "moment" } else { "force" };
+                for (axis, value) in AXES.iter().zip(numbers(line)) {
+                    push(&mut theirs, format!("{axis}_{kind}[{id}]"), value);
+                }
+            } else if line.contains("resultants") {
+                for (axis, value) in AXES.iter().zip(numbers(line)) {
+                    push(&mut theirs, format!("{axis}_resultant"), value);
+                }
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn bndout_values_are_the_files() {
+    let Some(files) = samples("bndout") else { return };
+    let row = ["x_force", "y_force", "z_force", "energy", "xmoment", "ymoment", "zmoment"];
+    for path in files {
+        let mut theirs = Table::new();
+        for line in std::fs::read_to_string(&path).unwrap().lines() {
+            if line.contains("o u t p u t") {
+                push(&mut theirs, "time".into(), behind(line, "t="));
+            } else if line.contains("nd#") {
+                let id = line.split('#').nth(1).unwrap().split_whitespace().next().unwrap();
+                push_all(&mut theirs, &row, id, &numbers(line));
+            } else if line.contains("xtotal") {
+                let names = ["x_total", "y_total", "z_total", "etotal"];
+                for (name, value) in names.iter().zip(numbers(line)) {
+                    push(&mut theirs, name.to_string(), value);
+                }
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn sleout_values_are_the_files() {
+    let Some(files) = samples("sleout") else { return };
+    for path in files {
+        let mut theirs = Table::new();
+        for line in std::fs::read_to_string(&path).unwrap().lines().skip(2) {
+            let sums = [
+                ("total s", "total_slave"),
+                ("total surfa", "total_slave"),
+                ("total m", "total_master"),
+                ("total surfb", "total_master"),
+                ("total energy", "total_energy"),
+                ("friction energy", "total_friction"),
+            ];
+            let sum = sums.iter().rev().find(|(label, _)| line.contains(label));
+            if line.contains("energy file") {
+                push(&mut theirs, "time".into(), numbers(line)[0]);
+            } else if let Some((_, name)) = sum {
+                push(&mut theirs, name.to_string(), numbers(line)[0]);
+            } else if numbers(line).len() == 3 {
+                let id = line.split_whitespace().next().unwrap();
+                let names = ["slave", "master", "friction_energy"];
+                push_all(&mut theirs, &names, id, &numbers(line));
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn swforc_values_are_the_files() {
+    let Some(files) = samples("swforc") else { return };
+    for path in files {
+        let mut theirs = Table::new();
+        for line in std::fs::read_to_string(&path).unwrap().lines() {
+            let Some((left, right)) = line.split_once(" ID ") else { continue };
+            let left: Vec<&str> = left.split_whitespace().collect();
+            let mut right = right.split_whitespace();
+            let id = right.next().unwrap();
+            push_time(&mut theirs, numbers(left[3])[0]);
+            let failure = match left[4].contains('+') {
+                true => numbers(left[4])[0],
+                false => left[4].parse().unwrap(),
+            };
+            let first = [numbers(left[1])[0], numbers(left[2])[0], failure];
+            push_all(&mut theirs, &["axial", "shear", "failure"], id, &first);
+            let rest: Vec<f64> = right.map(|word| numbers(word)[0]).collect();
+            push_all(&mut theirs, &["length", "resultant_moment", "torsion"], id, &rest);
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn abstat_values_are_the_files() {
+    let Some(files) = samples("abstat") else { return };
+    let names = [
+        "volume",
+        "pressure",
+        "internal_energy",
+        "dm_dt_in",
+        "density",
+        "dm_dt_out",
+        "total_mass",
+        "gas_temp",
+        "surface_area",
+        "reaction",
+        "dm_dt_outp",
+        "dm_dt_outv",
+    ];
+    for path in files {
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        for line in std::fs::read_to_string(&path).unwrap().lines().skip(2) {
+            let values = numbers(line);
+            if values.len() == 13 {
+                push(&mut theirs, "time".into(), values[0]);
+                push_all(&mut theirs, &names, "1", &values[1..]);
+            } else if line.contains("Material I.D.") {
+                let material = line.split('=').nth(1).unwrap().split_whitespace().next().unwrap();
+                for (name, value) in
+                    ["unblocked_area", "blocked_area", "leakage"].iter().zip(values)
+                {
+                    push(&mut theirs, format!("{name}_mat{material}[1]"), value);
+                }
+            }
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+#[test]
+fn elout_and_eloutdet_values_are_the_files() {
+    let tensor = ["xx", "yy", "zz", "xy", "yz", "zx"];
+    let files = samples("elout").into_iter().chain(samples("eloutdet")).flatten();
+    for path in files {
+        let mut theirs = Table::from([("time".to_string(), Vec::new())]);
+        let (mut id, mut quantity) = (String::new(), "");
+        for line in std::fs::read_to_string(&path).unwrap().lines().skip(2) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            if let Some(at) = line.find("( at time") {
+                push_time(&mut theirs, numbers(&line[at..])[0]);
+                quantity = if line.contains("s t r a i n") { "eps" } else { "sig" };
+            } else if line.contains("beam/truss") {
+                id = words[3].into();
+            } else if words.first().is_some_and(|w| w.ends_with('-')) {
+                id = words[0].trim_end_matches('-').into();
+            }
+            let values = numbers(line);
+            let names: Vec<String> = match values.len() {
+                7 if words[0] == "mid." => tensor
+                    .iter()
+                    .map(|axes| format!("lower_sig_{axes}"))
+                    .chain(["lower_yield".to_string()])
+                    .collect(),
+                6 if words[0] == "mid." => {
+                    tensor.iter().map(|axes| format!("lower_eps_{axes}")).collect()
+                }
+                7 => ["axial", "shear_s", "shear_t", "moment_s", "moment_t", "torsion", "pl_eps"]
+                    .map(str::to_string)
+                    .to_vec(),
+                4 => {
+                    let point =
+                        if words[0] == "1" { String::new() } else { format!("_ip{}", words[0]) };
+                    ["sigma_11", "sigma_12", "sigma_31", "plastic_eps"]
+                        .map(|name| format!("{name}{point}"))
+                        .to_vec()
+                }
+                6 | 8 => tensor
+                    .iter()
+                    .map(|axes| format!("{quantity}_{axes}"))
+                    .chain(["effsg".to_string(), "yield".to_string()])
+                    .take(values.len())
+                    .collect(),
+                _ => continue,
+            };
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            push_all(&mut theirs, &names, &id, &values);
+        }
+        same(&histories(&path), &theirs, &path);
+    }
+}
+
+/// Every sample is read, or refused with the right reason.
+#[test]
+fn every_sample_is_read_or_refused() {
+    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    let mut read = 0;
+    let mut kinds: Vec<_> = folder.read_dir().unwrap().map(|e| e.unwrap().path()).collect();
+    kinds.retain(|path| path.is_dir());
+    for kind in kinds {
+        let name = kind.file_name().unwrap().to_str().unwrap().to_string();
+        for path in kind.read_dir().unwrap().map(|e| e.unwrap().path()) {
+            let output = crumple_in(Path::new("."), &["inspect", "--json", path.to_str().unwrap()]);
+            let error = String::from_utf8(output.stderr).unwrap();
+            let shown = path.display().to_string();
+            let reason = match name.as_str() {
+                _ if shown.contains("not_binout") => "it has no section of a binout",
+                "ncforc" => "an LS-DYNA text file of a kind that is not read",
+                "d3plot" => {
+                    assert!(path.is_dir());
+                    "this is a folder"
+                }
+                _ => {
+                    assert_eq!(output.status.code(), Some(0), "{shown}: {error}");
+                    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+                    assert_eq!(report["files"][0]["format"], *name, "{shown}");
+                    let problems = report["files"][0]["problems"].as_array().unwrap();
+                    assert!(problems.is_empty() || name == "keyword", "{shown}: {problems:?}");
+                    read += 1;
+                    continue;
+                }
+            };
+            assert_eq!(output.status.code(), Some(1), "{shown}");
+            assert!(error.contains(reason), "{shown}: {error}");
+        }
+    }
+    assert!(read > 55, "{read} samples were read");
+}
+
 /// States, first and last time, ids of every sample, counted by hand (`grep -c` and `head`).
 #[test]
 fn inspect_says_states_times_and_ids() {
-    let cases: [(&str, usize, Option<[f64; 2]>, usize); 19] = [
+    let cases: [(&str, usize, Option<[f64; 2]>, usize); 33] = [
         ("nodout/l2a_scheckmate_root_r10.1_smp_s_norot", 101, Some([0.0, 9.9999873]), 1),
         ("nodout/lstoolbox_r13.1_smp_d_header_only_crlf", 0, None, 0),
         ("nodout/mlp6_113151_smp_d_1000nodes", 3, Some([0.0, 1.9962452e-4]), 1000),
@@ -273,6 +518,20 @@ fn inspect_says_states_times_and_ids() {
         ("glstat/amoudes_148931_mpp_d_massprops_first50", 50, Some([0.0, 4.89068e-7]), 0),
         ("glstat/mlp6_78769_smp_s", 21, Some([0.0, 9.99997e-3]), 0),
         ("glstat/pillars_r13.1.1_smp_d", 1001, Some([0.0, 4.99989]), 0),
+        ("abstat/pillars_r13.1.1_airbag_open", 41, Some([1.1e-7, 20.0]), 1),
+        ("bndout/pillars_r13.1.1_first300", 300, Some([2.1187e-4, 1.49517]), 17),
+        ("bndout/rowan_r14.1.1_run0010_5", 2, Some([0.0, 2.5]), 135),
+        ("curvout/l2a_scheckmate_root_r10.1_smp_s", 101, Some([0.0, 9.99999]), 0),
+        ("elout/l2a_scheckmate_root_r10.1_solid_strain_first50", 50, Some([0.0, 0.489972]), 1),
+        ("elout/pillars_r13.1.1_beam", 1001, Some([0.0, 4.99989]), 1),
+        ("elout/rowan_r14.1.1_solid_run0010_5", 2, Some([0.0, 2.5]), 7),
+        ("eloutdet/rowan_r14.1.1_run0010_5", 2, Some([0.0, 2.5]), 52),
+        ("eloutdet/rowan_r14.1.1_run0013_1", 9, Some([0.0, 20.0866]), 0),
+        ("sleout/pillars_r13.1.1_smp_d", 1001, Some([0.0, 4.999888]), 3),
+        ("spcforc/node997_r14_smp_d", 2, Some([0.0, 0.1]), 32),
+        ("spcforc/rowan_r14.1.1_run0010_5_moments", 2, Some([0.0, 2.5]), 1306),
+        ("swforc/l2a_qd_r6.1.2_mpp_d_first20", 20, Some([0.0, 1.89981]), 26),
+        ("swforc/pillars_r13.1.1_smp_d_beamweld", 1001, Some([0.0, 4.99989]), 1),
     ];
     let Some(folder) = common::shared("samples/lsdyna") else { return };
     for (name, states, time, entities) in cases {

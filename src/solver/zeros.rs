@@ -43,6 +43,10 @@ pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
     let mut states: Vec<(usize, usize, String)> = Vec::new();
     for history in histories {
         let values = &history.values;
+        // Most have no zero at all, which is found fast.
+        if !values.contains(&0.0) {
+            continue;
+        }
         for state in vanishing(values) {
             let others = of_entity.get(&history.entity);
             let alone = others.is_none_or(|all| all.iter().any(|h| h.values[state] != 0.0));

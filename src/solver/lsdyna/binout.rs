@@ -9,6 +9,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::io;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -323,7 +324,7 @@ impl Reader<'_> {
         let rank: HashMap<EntityId, usize> =
             entities.iter().enumerate().map(|(k, &id)| (id, k)).collect();
         // Entity by entity, as in the text files.
-        histories.sort_by_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
+        histories.sort_by_cached_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
         let ids: HashSet<i64> = known.iter().map(|e| e.id).collect();
         let mut legend: Vec<(&i64, &String)> =
             metadata.titles.iter().filter(|(id, _)| !ids.contains(id)).collect();
@@ -562,44 +563,53 @@ impl Reader<'_> {
                     .collect()
             }
         };
-        let mut columns = vec![vec![f64::NAN; states.whole.len()]; kept.len()];
+        let mut columns = Columns::new(kept.len(), states.whole.len());
         let (mut absent, mut not_finite) = (0, 0);
-        let mut row = Vec::new();
+        let (mut bytes, mut row) = (Vec::new(), Vec::new());
         // Where each entity's value is, while the states' ids stay the same.
-        let mut positions: Vec<Option<usize>> = kept.iter().map(|&(k, _)| Some(k)).collect();
+        let mut pick = Pick::new(kept.iter().map(|&(k, _)| Some(k)).collect());
         let mut current: Option<&Vec<i64>> = None;
         for (k, state) in states.whole.iter().enumerate() {
             let width = match owners {
                 Owners::Global => 1,
                 Owners::Fixed(ids) => ids.len(),
                 Owners::OfState(_) => {
-                    let Some(ids) = states.ids.as_ref().map(|ids| &ids[k]) else { continue };
+                    let Some(ids) = states.ids.as_ref().map(|ids| &ids[k]) else {
+                        columns.row().fill(f64::NAN);
+                        continue;
+                    };
                     if current != Some(ids) {
                         current = Some(ids);
-                        positions = positions_of(&kept, ids);
+                        pick = Pick::new(positions_of(&kept, ids));
                     }
                     ids.len()
                 }
             };
-            let per_entity = point.map_or(1, |_| {
-                component.records.get(state).map_or(1, |p| p.width() / width.max(1))
-            });
-            let place = component.records.get(state);
-            let Some(&place) = place.filter(|p| p.width() == width * per_entity) else {
+            let place = component.records.get(state).copied();
+            let per_entity = point.and(place).map_or(1, |place| place.width() / width.max(1));
+            let Some(place) = place.filter(|p| p.width() == width * per_entity) else {
                 absent += 1;
+                columns.row().fill(f64::NAN);
                 continue;
             };
-            let index = |position: usize| position * per_entity + point.unwrap_or(0);
-            let wanted = positions.iter().flatten().map(|&p| index(p));
-            let Some((from, to)) = wanted.clone().min().zip(wanted.max()) else { continue };
+            let values = columns.row();
+            let (point, span) = (point.unwrap_or(0), pick.span.clone());
+            if span.is_empty() {
+                values.fill(f64::NAN);
+                continue;
+            }
+            let range = span.start * per_entity..(span.end - 1) * per_entity + point + 1;
             row.clear();
-            self.values(place, from, to + 1, &mut row)?;
-            for (column, position) in columns.iter_mut().zip(&positions) {
-                let value = position.and_then(|p| row.get(index(p) - from));
-                if let Some(&value) = value {
-                    column[k] = value;
-                    not_finite += usize::from(!value.is_finite());
-                }
+            self.values(place, range, &mut bytes, &mut row)?;
+            if pick.is_run && per_entity == 1 && row.len() == values.len() {
+                values.copy_from_slice(&row);
+                not_finite += row.iter().filter(|v| !v.is_finite()).count();
+                continue;
+            }
+            for (value, position) in values.iter_mut().zip(&pick.positions) {
+                let read = position.and_then(|p| row.get((p - span.start) * per_entity + point));
+                *value = read.copied().unwrap_or(f64::NAN);
+                not_finite += usize::from(read.is_some_and(|v| !v.is_finite()));
             }
         }
         if absent > 0 && !kept.is_empty() {
@@ -623,26 +633,98 @@ impl Reader<'_> {
             time: states.time.clone(),
             values,
         };
-        Ok((kept.into_iter().zip(columns).map(history).collect(), problems))
+        Ok((kept.into_iter().zip(columns.finish()).map(history).collect(), problems))
     }
 
-    /// Appends the values from `from` up to `to` of a record.
-    fn values(&self, place: Place, from: usize, to: usize, out: &mut Vec<f64>) -> io::Result<()> {
+    /// Appends some values of a record to `out`; `bytes` is scratch.
+    fn values(
+        &self,
+        place: Place,
+        range: Range<usize>,
+        bytes: &mut Vec<u8>,
+        out: &mut Vec<f64>,
+    ) -> io::Result<()> {
         let (kind, header) = (place.payload.kind, self.headers[place.part]);
-        if let (Some(size), Some(header)) = (kind.size(), header) {
-            let source = &*self.parts[place.part];
-            let at = place.payload.at + (from * size) as u64;
-            let length = (to - from) * size;
-            if let Some(all) = source.bytes() {
-                let from = usize::try_from(at).unwrap_or(usize::MAX);
-                let bytes = all.get(from..from.saturating_add(length)).unwrap_or_default();
-                kind.reals(header, bytes, out);
-            } else {
-                let bytes = self.bytes(place, (from * size) as u64, length)?;
-                kind.reals(header, &bytes, out);
-            }
+        let (Some(size), Some(header)) = (kind.size(), header) else { return Ok(()) };
+        let source = &*self.parts[place.part];
+        let at = place.payload.at + (range.start * size) as u64;
+        let length = range.len() * size;
+        if let Some(all) = source.bytes() {
+            let from = usize::try_from(at).unwrap_or(usize::MAX);
+            let there = all.get(from..from.saturating_add(length)).unwrap_or_default();
+            kind.reals(header, there, out);
+        } else {
+            bytes.resize(length, 0);
+            let read = fill_at(source, at, bytes)?;
+            kind.reals(header, &bytes[..read], out);
         }
         Ok(())
+    }
+}
+
+/// Where the kept entities' values are in a state's record.
+struct Pick {
+    /// `None` for an entity that the state lacks.
+    positions: Vec<Option<usize>>,
+    /// From the first to behind the last of them.
+    span: Range<usize>,
+    /// Whether they are neighbours in their order.
+    is_run: bool,
+}
+
+impl Pick {
+    fn new(positions: Vec<Option<usize>>) -> Self {
+        let known = || positions.iter().flatten().copied();
+        let span = match known().min().zip(known().max()) {
+            Some((first, last)) => first..last + 1,
+            None => 0..0,
+        };
+        let is_run = positions.iter().copied().eq(span.clone().map(Some));
+        Self { positions, span, is_run }
+    }
+}
+
+/// Rows of states turned into columns, several rows at a time: a value alone would cost a
+/// cache line.
+struct Columns {
+    columns: Vec<Vec<f64>>,
+    rows: Vec<f64>,
+    pending: usize,
+}
+
+/// Rows turned at once: the values of a cache line and more.
+const ROWS: usize = 16;
+
+impl Columns {
+    fn new(columns: usize, states: usize) -> Self {
+        Self {
+            columns: (0..columns).map(|_| Vec::with_capacity(states)).collect(),
+            rows: vec![f64::NAN; columns * ROWS],
+            pending: 0,
+        }
+    }
+
+    /// The next state's row, to be filled.
+    fn row(&mut self) -> &mut [f64] {
+        if self.pending == ROWS {
+            self.turn();
+        }
+        let width = self.columns.len();
+        self.pending += 1;
+        &mut self.rows[(self.pending - 1) * width..self.pending * width]
+    }
+
+    fn turn(&mut self) {
+        let (width, pending) = (self.columns.len(), self.pending);
+        for (k, column) in self.columns.iter_mut().enumerate() {
+            column.extend((0..pending).map(|row| self.rows[row * width + k]));
+        }
+        self.pending = 0;
+    }
+
+    fn finish(mut self) -> Vec<Vec<f64>> {
+        self.turn();
+        self.columns
     }
 }
 
