@@ -1,7 +1,7 @@
 //! The readers on small texts, each with one peculiarity of real files.
 
 use crumple::history::{EntityId, Side};
-use crumple::solver::{NoDataReason, ProblemCode, Selection, SolverFile, read_from};
+use crumple::solver::{FORMATS, NoDataReason, ProblemCode, Selection, SolverFile, read_from};
 
 const HEADER: &str =
     " title\n                    ls-dyna smp d R14 R14.0_515_8a12796 date 12/12/2022\n";
@@ -67,7 +67,8 @@ fn touching_fields_and_rotations() {
 
 #[test]
 fn header_only_is_no_error() {
-    for format in ["nodout", "rcforc", "rwforc", "glstat"] {
+    let text_formats = FORMATS.iter().filter(|f| !["binout", "t01"].contains(&f.name));
+    for format in text_formats.map(|f| f.name) {
         let file = read(format, "");
         assert_eq!((file.time.len(), file.problems.len()), (0, 0), "{format}");
         assert_eq!(file.version.as_deref(), Some("smp d R14 R14.0_515_8a12796"));
@@ -278,4 +279,240 @@ fn times_that_go_back_are_named() {
     let file = read("rcforc", &(row("1.00000E+00") + &row("2.00000E+00") + &row("1.50000E+00")));
     assert_eq!(&file.time[..], [1.0, 2.0, 1.5]);
     assert_eq!(codes(&file), [ProblemCode::TimeGoesBack]);
+}
+
+/// A line of a label with dots to column 30 and its value.
+fn dotted(label: &str, value: &str) -> String {
+    format!(" {label:.<29}{value:>14}\n")
+}
+
+/// Layouts of deforc, jntforc, rbdout, nodfor and of bndout's rigid bodies are known from
+/// the source of LSTC's converter l2a only: these texts are as it writes them.
+#[test]
+fn discrete_elements() {
+    let mut text = String::new();
+    for (time, value) in [("0.00000E+00", "1.50000E+00"), ("1.00000E-03", "-2.50000E+00")] {
+        text += "\n";
+        text += &dotted("time", time);
+        for id in [7, 1234567] {
+            text += &format!(" {:.<29}{id:>10}\n", "spring/damper number");
+            for label in ["x-force", "y-force", "z-force", "resultant force", "change in length"] {
+                text += &dotted(label, value);
+            }
+        }
+        text += &format!(" {:.<29}{:>10}\n", "spring/damper number", 8);
+        for label in ["x-moment", "y-moment", "z-moment", "resultant moment", "relative rotation"] {
+            text += &dotted(label, value);
+        }
+    }
+    let file = read("deforc", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(&file.time[..], [0.0, 1e-3]);
+    assert_eq!(values(&file, 1234567, "displacement"), [1.5, -2.5]);
+    assert_eq!(values(&file, 8, "relative_rotation"), [1.5, -2.5]);
+    assert!(file.history(Some(EntityId::new(8)), "x_force").is_none());
+    for cut in text.len() - 100..text.len() - 1 {
+        let file = read("deforc", &text[..cut]);
+        assert_eq!((file.time.len(), file.problems.is_empty()), (1, false), "cut at {cut}");
+    }
+}
+
+#[test]
+fn joints_and_joint_stiffnesses() {
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E-03"] {
+        text += &dotted("time", time);
+        text += &format!(" {:.<29}{:>10}\n", "joint ID", 3);
+        for label in ["x-force  (local) ", "resultant force", "resultant moment"] {
+            text += &dotted(label, "3.00000E+00");
+        }
+        text += &format!(" {:.<29}{:>10}\n", "joint stiffness id number", 4);
+        for label in
+            ["phi (degrees)", "d(phi)/dt (degrees)", "phi moment-stiffness", "joint energy"]
+        {
+            text += &dotted(label, "4.00000E+00");
+        }
+    }
+    let file = read("jntforc", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(values(&file, 3, "x_force"), [3.0; 2]);
+    assert_eq!(values(&file, 4, "d(phi)_dt"), [4.0; 2]);
+    assert_eq!(values(&file, 4, "phi_moment_stiffness"), [4.0; 2]);
+}
+
+#[test]
+fn rigid_bodies() {
+    let six = "  1.0000E+00 -2.0000E+00  3.0000E+00  4.0000E+00  5.0000E+00  6.0000E+00";
+    let mut text = String::new();
+    for time in ["0.000000E+00", "1.000000E-03"] {
+        text += &format!(
+            "1\n\n  r i g i d   b o d y   m o t i o n   a t  cycle={:8}    time={time:>15}\n",
+            1
+        );
+        for name in [" rigid body      12", " nodal rigid body      13"] {
+            text += &format!(
+                "\n{name}\n   global             x           y           z          x-rot       y-rot       z-rot\n"
+            );
+            text += "   coordinates:    1.0000E+00 -2.0000E+00  3.0000E+00\n";
+            let motion = |label: &str| format!("{label:>15}  {six}\n");
+            let motions: String =
+                ["displacements:", "velocities:", "accelerations:"].map(motion).concat();
+            text += &motions;
+            text += "\nprincipal or user defined local coordinate direction vectors\n                     a           b           c\n";
+            for row in 1..=3 {
+                text += &format!("     row {row}{}\n", format!("{:>15}", "1.0000E+00").repeat(3));
+            }
+            text += "\n output in principal or user defined local coordinate directions\n                      a           b           c          a-rot       b-rot       c-rot\n";
+            text += &motions;
+        }
+    }
+    let file = read("rbdout", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(values(&file, 13, "global_rvz"), [6.0; 2]);
+    assert_eq!(values(&file, 12, "local_dy"), [-2.0; 2]);
+    assert_eq!(values(&file, 12, "dircos_33"), [1.0; 2]);
+}
+
+fn node_force(mark: &str, id: u32, sum: bool) -> String {
+    let number = format!("{:>13}", "-1.5000E+00");
+    match sum {
+        true => format!(
+            "              xtotal={number}   ytotal={number}  ztotal={number}   etotal={number}\n"
+        ),
+        false => format!(
+            " {mark}{id:>8}  xforce={number}   yforce={number}  zforce={number}   energy={number}\n"
+        ),
+    }
+}
+
+#[test]
+fn groups_of_nodes() {
+    let mut text = String::new();
+    for time in ["0.000E+00", "1.000E-03"] {
+        text += &format!("\n n o d a l   f o r c e   g r o u p    o u t p u t   t={time}\n");
+        for group in [1, 2] {
+            text += &format!("\n\n nodal group output number {group:2}\n\n");
+            text += &node_force("nd#", 7, false);
+            text += &node_force("", 0, true);
+        }
+    }
+    let file = read("nodfor", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(&file.time[..], [0.0, 1e-3]);
+    assert_eq!(values(&file, 7, "x_force"), [-1.5; 2]);
+    assert_eq!(values(&file, 7, "group2_energy"), [-1.5; 2], "one node in two groups");
+    assert_eq!(file.history(None, "group2_etotal").unwrap().values, [-1.5; 2]);
+}
+
+#[test]
+fn prescribed_motions_of_rigid_bodies_and_pressures() {
+    let number = format!("{:>13}", "2.0000E+00");
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E-03"] {
+        for heading in [
+            "velocity boundary condition forces/rigid body moments",
+            "pressure boundary condition forces",
+        ] {
+            text += &format!(
+                "\n n o d a l   f o r c e/e n e r g y    o u t p u t  t={time:>14}\n\n {heading} \n\n"
+            );
+            text += &node_force("nd#", 7, false);
+            if heading.starts_with('v') {
+                text += &node_force("mat#", 3, false).trim_start().replace("\n", "\n             ");
+                text += &format!("xmoment={number}  ymoment={number} zmoment={number}\n");
+            }
+            text += &node_force("", 0, true);
+        }
+    }
+    let file = read("bndout", &text);
+    assert_eq!(file.problems, []);
+    assert_eq!(file.time.len(), 2);
+    assert_eq!(values(&file, 3, "ymoment"), [2.0; 2]);
+    assert_eq!(values(&file, 7, "pressure_x_force"), [-1.5; 2]);
+}
+
+/// Stresses of shells at two integration points; an element that erodes; a new one.
+#[test]
+fn eroded_elements_have_no_values() {
+    let six = "  1.0000E+00".repeat(6);
+    let mut text = String::new();
+    for (time, ids) in
+        [("0.00000E+00", vec![4, 5]), ("1.00000E-03", vec![5]), ("2.00000E-03", vec![5, 6])]
+    {
+        text += &format!(
+            "\n\n\n e l e m e n t   s t r e s s   c a l c u l a t i o n s   f o r   t i m e  s t e p{:9}   ( at time {time:>12} )\n\n element  materl\n ipt-shl  stress       sig-xx      sig-yy      sig-zz      sig-xy      sig-yz      sig-zx       plastic\n           state                                                                                 strain \n",
+            1
+        );
+        for id in ids {
+            text += &format!("{id:>8}-{:>7}\n", 1);
+            for point in 1..=2 {
+                text += &format!("{point:>4}-{:>3} elastic {six}{:>14}\n", 2, "2.0000E+00");
+            }
+        }
+    }
+    let file = read("elout", &text);
+    assert_eq!(codes(&file), [ProblemCode::AbsentEntity; 2], "{:?}", file.problems);
+    assert_eq!(values(&file, 5, "plastic_strain_ip2"), [2.0; 3]);
+    let gone = values(&file, 4, "sig_xx");
+    assert!(gone[0] == 1.0 && gone[1].is_nan() && gone[2].is_nan());
+    let new = values(&file, 6, "sig_xx_ip2");
+    assert!(new[0].is_nan() && new[1].is_nan() && new[2] == 1.0);
+}
+
+/// Entities that come and go without end must not fill the memory.
+#[test]
+fn absent_values_are_bounded() {
+    let mut text = String::new();
+    for k in 0..20_000 {
+        text += &format!(
+            "\n e l e m e n t   s t r a i n   c a l c u l a t i o n s   f o r   t i m e  s t e p{k:>9}   ( at time {k:>5}.0 )\n\n"
+        );
+        text += &format!("{k:>8}-      1\n      1  elastic{}\n", "  1.0000E+00".repeat(6));
+    }
+    let file = read("elout", &text);
+    let cells: usize = file.histories.iter().map(|h| h.values.len()).sum();
+    assert!(cells < 40_000_000, "{cells}");
+    assert!(codes(&file).contains(&ProblemCode::IncompleteState));
+}
+
+/// What a restart writes again replaces what the interrupted run had written.
+#[test]
+fn a_restart_replaces_the_states_it_writes_again() {
+    let state_at = |cycle: u32, time: &str, value: &str| {
+        state(cycle, time) + TRANSLATIONS + &row("7", value, 12)
+    };
+    let times = ["0.0000000E+00", "1.0000000E-01", "2.0000000E-01", "3.0000000E-01"];
+    let mut text = String::new();
+    for (k, time) in times.iter().enumerate() {
+        text += &state_at(k as u32, time, " 1.00000E+00");
+    }
+    for (k, time) in times.iter().enumerate().skip(2) {
+        text += &state_at(10 + k as u32, time, " 2.00000E+00");
+    }
+    text += &state_at(20, "4.0000000E-01", " 2.00000E+00");
+    let file = read("nodout", &text);
+    assert_eq!(&file.time[..], [0.0, 0.1, 0.2, 0.3, 0.4]);
+    assert_eq!(values(&file, 7, "x_displacement"), [1.0, 1.0, 2.0, 2.0, 2.0]);
+    assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
+    let message = file.problems[0].to_string();
+    assert!(
+        message.contains("from time 0.2 on: 2 states above, from time 0.2 to 0.3"),
+        "{message}"
+    );
+    assert!(file.problems[0].byte.is_some());
+}
+
+/// The first state is the damaged one: the others decide which entities there are.
+#[test]
+fn a_first_state_that_differs_is_left_out() {
+    let forces = |id: u32, time: &str| side("slave", id, time, FORCES);
+    let mut text = forces(9, "0.00000E+00") + &forces(3, "0.00000E+00");
+    for time in ["1.00000E+00", "2.00000E+00", "3.00000E+00"] {
+        text += &(forces(2, time) + &forces(3, time));
+    }
+    let file = read("rcforc", &text);
+    assert_eq!(&file.time[..], [1.0, 2.0, 3.0]);
+    let ids: Vec<i64> = file.entities.iter().map(|e| e.id.id).collect();
+    assert_eq!(ids, [2, 3]);
+    assert_eq!(codes(&file), [ProblemCode::IncompleteState]);
 }
