@@ -186,14 +186,27 @@ pub enum ScenarioError {
     Chain { path: PathBuf, source: ChainError },
 }
 
+/// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
+///
+/// # Errors
+/// [`ScenarioError`] as of [`load`].
+pub fn parse(path: &Path, text: &str) -> Result<Scenario, ScenarioError> {
+    Ok(checked(path, manifest::parse(path, text)?)?.0)
+}
+
+/// The scenario and the speed of what the first train meets.
+fn checked(path: &Path, scenario: Scenario) -> Result<(Scenario, f64), ScenarioError> {
+    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
+    let obstacle_speed = check(&scenario).map_err(invalid)?;
+    Ok((scenario, obstacle_speed))
+}
+
 /// Loads a scenario and everything it names.
 ///
 /// # Errors
 /// [`ScenarioError`] names the key, curve or file.
 pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
-    let scenario: Scenario = manifest::load(path)?;
-    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
-    let obstacle_speed = check(&scenario).map_err(invalid)?;
+    let (scenario, obstacle_speed) = checked(path, manifest::load(path)?)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let meeting = Meeting {
         folder: &folder,

@@ -136,7 +136,18 @@ pub struct LocatedRun<'a> {
 /// [`ManifestError`] with line and columns for what TOML or a single value breaks, and
 /// without for what only the whole shows.
 pub fn load(path: &Path) -> Result<Study, ManifestError> {
-    let manifest: Manifest = manifest::load(path)?;
+    checked(path, manifest::load(path)?)
+}
+
+/// Parses and checks the text of a study manifest; `path` is for messages.
+///
+/// # Errors
+/// [`ManifestError`] as of [`load`].
+pub fn parse(path: &Path, text: &str) -> Result<Study, ManifestError> {
+    checked(path, manifest::parse(path, text)?)
+}
+
+fn checked(path: &Path, manifest: Manifest) -> Result<Study, ManifestError> {
     check(&manifest).map_err(|message| ManifestError::Invalid { path: path.into(), message })?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok(Study { manifest, folder })

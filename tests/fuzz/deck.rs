@@ -1,0 +1,16 @@
+//! Fuzz target of the keyword deck reader: any bytes give a result.
+#![no_main]
+
+use std::io::{BufRead, Cursor};
+
+use crumple::solver::lsdyna::deck;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    // Included files hold the deck itself: cycles end.
+    let mut open =
+        |_: &str| Some(Box::new(Cursor::new(bytes.to_vec())) as Box<dyn BufRead>);
+    let mut source = bytes;
+    let deck = deck::read(&mut source, &mut open).unwrap();
+    deck.impact_speed();
+});
