@@ -27,6 +27,21 @@ fn run_python(script: &str, arguments: &[&str]) -> Option<Value> {
     Some(serde_json::from_slice(&output.stdout).unwrap())
 }
 
+/// Every value of every section that lasso-python reads, of every binout sample.
+#[test]
+fn lasso_reads_the_same_binout() {
+    let Some(files) = common::samples("binout") else { return };
+    let files: Vec<&str> = files
+        .iter()
+        .filter(|path| !path.display().to_string().contains("not_binout"))
+        .map(|path| path.to_str().unwrap())
+        .collect();
+    let arguments: Vec<&str> =
+        [env!("CARGO_BIN_EXE_crumple")].into_iter().chain(files).collect();
+    let Some(compared) = run_python("binout.py", &arguments) else { return };
+    assert_eq!(compared, 136_791, "values compared");
+}
+
 #[test]
 fn h5py_reads_what_db_show_prints() {
     let folder = tempfile::tempdir().unwrap();
