@@ -600,15 +600,23 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
             return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
         }
     };
-    Ok(Located { section, twin, ..hashed(name, path)? })
+    let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
+    Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
 }
 
 /// A file with its size and hash.
 fn hashed(name: &str, path: PathBuf) -> Result<Located, RunError> {
-    let io = |source| RunError::Io { path: path.clone(), source };
+    hashed_family(name, path.clone(), &[path])
+}
+
+/// A file with the size and hash of all its parts.
+fn hashed_family(name: &str, path: PathBuf, parts: &[PathBuf]) -> Result<Located, RunError> {
     let mut hasher = blake3::Hasher::new();
-    let file = File::open(&path).map_err(io)?;
-    hasher.update_reader(file).map_err(io)?;
+    for part in parts {
+        let io = |source| RunError::Io { path: part.clone(), source };
+        let file = File::open(part).map_err(io)?;
+        hasher.update_reader(file).map_err(io)?;
+    }
     Ok(Located {
         file: name.into(),
         size_bytes: hasher.count(),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use common::{crumple_fails, crumple_in, crumple_ok, fixture, samples, shared};
 use crumple::history::EntityId;
-use crumple::solver::{ReadError, Selection, SolverFile, read, read_sections};
+use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read, read_sections};
 
 fn section(path: &Path, name: &str) -> SolverFile {
     read(path, None, &Selection { section: Some(name.into()), ..Selection::all() }).unwrap()
@@ -178,6 +178,103 @@ fn binout_of(run: &Path) -> Vec<u8> {
         }
     }
     out.bytes
+}
+
+/// Processes of one run write sections of their own; a large file continues in another.
+#[test]
+fn a_family_is_one_tree() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, section: &str, id: i64, states: std::ops::Range<u32>, first: bool| {
+        let mut out = Written::new();
+        if first {
+            out.ids(section, &[id]);
+        }
+        for state in states {
+            out.cd(&format!("/{section}/d{state:06}"));
+            out.reals("time", &[f64::from(state)]);
+            out.reals("x_force", &[f64::from(state) * 10.0]);
+        }
+        fs::write(folder.path().join(name), out.bytes).unwrap();
+    };
+    file("binout0000", "nodout", 7, 1..4, true);
+    file("binout0000%001", "nodout", 7, 4..6, false);
+    file("binout0005", "rwforc/forces", 1, 1..4, true);
+    file("binout0005%001", "rwforc/forces", 1, 4..5, false);
+    file("binout0007", "nodout", 7, 5..8, false); // a restart: state 5 again
+    let path = folder.path().join("binout0000");
+    let nodout = section(&path, "nodout");
+    assert_eq!(&nodout.time[..], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    assert_eq!(nodout.histories[0].values[4..], [50.0, 60.0, 70.0]);
+    assert_eq!(&section(&path, "rwforc/forces").time[..], [1.0, 2.0, 3.0, 4.0]);
+    // Any other than the first is read alone, with its continuation.
+    let alone = folder.path().join("binout0005");
+    let sections = read_sections(&alone, None, &Selection::nothing()).unwrap();
+    assert_eq!(sections.len(), 1);
+    assert_eq!(sections[0].time.len(), 4);
+    fs::remove_file(folder.path().join("binout0000%001")).unwrap();
+    assert_eq!(&section(&path, "nodout").time[..], [1.0, 2.0, 3.0, 5.0, 6.0, 7.0]);
+}
+
+/// A record without sense: the walk goes on at the next directory, one state is lost.
+#[test]
+fn damage_in_the_middle_costs_one_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    let bytes = binout_of(&fixture("fe/lead-car-wall/25kmh"));
+    fs::write(&path, &bytes).unwrap();
+    let whole = section(&path, "nodout");
+    let state = b"/nodout/d000200";
+    let at = bytes.windows(state.len()).position(|w| w == state).unwrap();
+    let mut damaged = bytes;
+    damaged[at + state.len() + 40..at + state.len() + 90].fill(0);
+    fs::write(&path, &damaged).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.time.len(), 399);
+    let kept: Vec<f64> =
+        whole.time.iter().copied().enumerate().filter(|(k, _)| *k != 199).map(|(_, t)| t).collect();
+    assert_eq!(file.time[..], kept);
+    let messages: Vec<String> = file.problems.iter().map(ToString::to_string).collect();
+    assert!(messages[0].contains("damaged record"), "{messages:?}");
+    assert!(messages[0].contains("reading goes on at byte"), "{messages:?}");
+    assert!(
+        messages[1].contains("state d200 is left out: a record of it is damaged"),
+        "{messages:?}"
+    );
+}
+
+/// Elements that erode, with two integration points each.
+#[test]
+fn ids_that_change_between_states() {
+    let mut out = Written::new();
+    out.cd("/elout/shell/metadata");
+    let integers =
+        |values: &[i32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    for (state, ids) in [(1, vec![4, 5]), (2, vec![5]), (3, vec![6, 5])] {
+        out.cd(&format!("/elout/shell/d{state}"));
+        out.reals("time", &[f64::from(state)]);
+        out.data("ids", 3, &integers(&ids));
+        out.data("nip", 3, &integers(&vec![2; ids.len()]));
+        let values: Vec<f64> =
+            ids.iter().flat_map(|id| [f64::from(*id), f64::from(*id) + 0.5]).collect();
+        out.reals("sig_xx", &values);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    fs::write(&path, out.bytes).unwrap();
+    let file = section(&path, "elout/shell");
+    let of = |id: i64, component: &str| {
+        file.history(Some(EntityId::new(id)), component).unwrap().values.clone()
+    };
+    assert_eq!(of(5, "sig_xx"), [5.0; 3]);
+    assert_eq!(of(5, "sig_xx_ip2"), [5.5; 3]);
+    let gone = of(4, "sig_xx_ip2");
+    assert!(gone[0] == 4.5 && gone[1].is_nan() && gone[2].is_nan());
+    assert_eq!(of(6, "sig_xx")[2], 6.0);
+    assert!(
+        file.problems.iter().any(|p| p.code == ProblemCode::AbsentEntity),
+        "{:?}",
+        file.problems
+    );
 }
 
 /// A study of one bundled run, with the given files in its folder.

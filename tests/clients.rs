@@ -36,8 +36,7 @@ fn lasso_reads_the_same_binout() {
         .filter(|path| !path.display().to_string().contains("not_binout"))
         .map(|path| path.to_str().unwrap())
         .collect();
-    let arguments: Vec<&str> =
-        [env!("CARGO_BIN_EXE_crumple")].into_iter().chain(files).collect();
+    let arguments: Vec<&str> = [env!("CARGO_BIN_EXE_crumple")].into_iter().chain(files).collect();
     let Some(compared) = run_python("binout.py", &arguments) else { return };
     assert_eq!(compared, 136_791, "values compared");
 }

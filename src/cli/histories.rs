@@ -117,7 +117,7 @@ fn write_csv(out: &mut dyn Write, file: &SolverFile) -> io::Result<()> {
         write!(out, ",{}", history.label())?;
     }
     writeln!(out)?;
-    let mut digits = ryu::Buffer::new();
+    let mut digits = zmij::Buffer::new();
     for (state, time) in file.time.iter().enumerate() {
         out.write_all(digits.format(*time).as_bytes())?;
         for history in &file.histories {

@@ -375,8 +375,10 @@ fn open(
         None => detect(path, &*first)?,
     };
     let mut parts = vec![first];
-    for part in family(path, format) {
-        parts.push(source::open(&part, selection.access).map_err(io)?);
+    if matches!(format.reader, Reader::Binary { .. }) {
+        for part in family(path).into_iter().skip(1) {
+            parts.push(source::open(&part, selection.access).map_err(io)?);
+        }
     }
     Ok((format, parts))
 }
@@ -401,18 +403,46 @@ pub fn blocks(
     Ok(blocks)
 }
 
-/// Of a binary file its continuations `name%001`, `name%002`, … as far as they follow each
-/// other.
-fn family(path: &Path, format: &Format) -> Vec<PathBuf> {
-    let mut parts = Vec::new();
-    if matches!(format.reader, Reader::Binary { .. }) {
-        let continuation = |number: usize| {
-            let mut name = path.as_os_str().to_os_string();
-            name.push(format!("%{number:03}"));
-            PathBuf::from(name)
-        };
-        parts.extend((1..).map(continuation).take_while(|part| part.is_file()));
+/// The files that are read together with `path`, itself first: of a binary file its
+/// continuations `name%001`, `name%002`, … as far as they follow each other, and with
+/// `binout0000` the files `binout0001`, … that other processes of the run wrote.
+pub fn family(path: &Path) -> Vec<PathBuf> {
+    let mut parts = with_continuations(path);
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let Some(number) = process_number(&name) else { return parts };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut others: Vec<(u32, PathBuf)> = folder
+        .read_dir()
+        .into_iter()
+        .flatten()
+        .filter_map(Result::ok)
+        .filter_map(|e| Some((process_number(&e.file_name().to_string_lossy())?, e.path())))
+        .collect();
+    others.sort();
+    // Only the first of them stands for all, so that each can still be looked at alone.
+    if others.first().is_some_and(|(first, _)| *first == number) {
+        for (_, other) in others.iter().skip(1).filter(|(_, path)| path.is_file()) {
+            parts.extend(with_continuations(other));
+        }
     }
+    parts
+}
+
+/// The digits of `binout0000`.
+fn process_number(name: &str) -> Option<u32> {
+    let digits = name.strip_prefix("binout")?;
+    let is_number = digits.len() == 4 && digits.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| digits.parse().ok()).flatten()
+}
+
+fn with_continuations(path: &Path) -> Vec<PathBuf> {
+    let continuation = |number: usize| {
+        let mut name = path.as_os_str().to_os_string();
+        name.push(format!("%{number:03}"));
+        PathBuf::from(name)
+    };
+    let mut parts = vec![path.to_path_buf()];
+    parts.extend((1..).map(continuation).take_while(|part| part.is_file()));
     parts
 }
 

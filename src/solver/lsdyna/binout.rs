@@ -262,6 +262,21 @@ impl Reader<'_> {
     fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
         let metadata = self.metadata(section)?;
         let states = self.states(section, problems)?;
+        if let Some(ids) = &states.ids {
+            let mut states_with: HashMap<i64, usize> = HashMap::new();
+            for id in ids.iter().flatten() {
+                *states_with.entry(*id).or_default() += 1;
+            }
+            let partly = states_with.values().filter(|&&n| n < ids.len()).count();
+            if partly > 0 {
+                let message = format!(
+                    "{}: {partly} of {} entities are missing from some states (eroded or failed); their values there are NaN",
+                    section.name,
+                    states_with.len()
+                );
+                problems.add(ProblemCode::AbsentEntity, None, None, message);
+            }
+        }
         let lists = [&metadata.ids, &metadata.force_ids, &metadata.moment_ids];
         let named = lists.into_iter().flatten().chain(states.ids.iter().flatten()).flatten();
         let lost = named.filter(|id| is_lost(section, **id)).count();
