@@ -576,11 +576,12 @@ fn force_component(force: &ForceSource) -> &str {
 fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
     let text = folder.join(name);
     let names = file_names(folder)?;
+    let names_only = Selection { audit: false, ..Selection::nothing() };
     let mut binout = None;
     let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
     for part in names.iter().filter(is_binary) {
         let path = folder.join(part);
-        let sections = match solver::read_sections(&path, None, &Selection::nothing()) {
+        let sections = match solver::read_sections(&path, None, &names_only) {
             Ok(sections) => sections,
             // Only named like one; or broken, which matters where the text is not there.
             Err(ReadError::UnknownFormat { .. }) => continue,

@@ -242,6 +242,38 @@ fn damage_in_the_middle_costs_one_state() {
     );
 }
 
+/// "Widths must be taken from the header (older files can use 4)", and the byte order too.
+#[test]
+fn other_widths_and_the_other_byte_order() {
+    let mut bytes = vec![8, 4, 4, 1, 1, 0, 0, 0];
+    let mut record = |command: u8, payload: &[u8]| {
+        bytes.extend((payload.len() as u32 + 5).to_be_bytes());
+        bytes.push(command);
+        bytes.extend(payload);
+    };
+    let data = |name: &str, kind: u8, values: &[u8]| {
+        [&[kind, name.len() as u8], name.as_bytes(), values].concat()
+    };
+    record(2, b"/nodout/metadata");
+    record(3, &data("ids", 3, &7i32.to_be_bytes()));
+    for state in 1..=2 {
+        record(2, format!("../d{state:06}").as_bytes());
+        record(3, &data("time", 10, &f64::from(state).to_be_bytes()));
+        record(3, &data("x_displacement", 9, &1.5f32.to_be_bytes()));
+        record(3, &data("nip", 2, &(-3i16).to_be_bytes()));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    fs::write(&path, bytes).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.problems, []);
+    assert_eq!(&file.time[..], [1.0, 2.0]);
+    let of =
+        |component: &str| file.history(Some(EntityId::new(7)), component).unwrap().values.clone();
+    assert_eq!(of("x_displacement"), [1.5, 1.5]);
+    assert_eq!(of("nip"), [-3.0, -3.0]);
+}
+
 /// Elements that erode, with two integration points each.
 #[test]
 fn ids_that_change_between_states() {

@@ -96,10 +96,12 @@ fn only_the_database_names_hdf5() {
 }
 
 #[test]
-fn the_library_never_prints_and_holds_no_unsafe_code() {
+fn the_library_never_prints_and_holds_one_unsafe_block() {
     for path in files(&root().join("src"), "rs") {
         let text = fs::read_to_string(&path).unwrap();
-        assert!(!text.contains("unsafe "), "{}", path.display());
+        // The memory map, which a user asks for: its reason stands there.
+        let allowed = usize::from(path.ends_with("src/solver/source.rs"));
+        assert_eq!(text.matches("unsafe {").count(), allowed, "{}", path.display());
         if module(&path) != "cli" {
             for macro_name in ["print!(", "println!(", "eprint!(", "eprintln!(", "dbg!("] {
                 assert!(!text.contains(macro_name), "{} has {macro_name}", path.display());

@@ -31,6 +31,9 @@ pub struct Format {
     reader: Reader,
 }
 
+/// A file and what continues it.
+type Parts = Vec<Box<dyn Source>>;
+
 /// Reads a family of files; one result per section.
 type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
 
@@ -360,7 +363,7 @@ fn open(
     path: &Path,
     format: Option<&str>,
     selection: &Selection,
-) -> Result<(&'static Format, Vec<Box<dyn Source>>), ReadError> {
+) -> Result<(&'static Format, Parts), ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     if path.is_dir() {
         return Err(ReadError::UnknownFormat {

@@ -51,15 +51,16 @@ pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<
         tree.walk(number, &**part)?;
     }
     let wanted = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
-    let reader = Reader { parts, headers: &tree.headers, selection };
+    let headers = std::mem::take(&mut tree.headers);
+    let reader = Reader { parts, headers: &headers, selection };
     let mut files = Vec::new();
+    // Damaged records concern all sections: nobody knows what they held.
+    let common = std::mem::take(&mut tree.problems).into_list();
     for section in tree.sections.iter().filter(|s| wanted(&s.name)) {
-        files.push(reader.section(section, &mut tree.problems)?);
-    }
-    // The container's problems concern every section of it.
-    let problems = tree.problems.into_list();
-    for file in &mut files {
-        file.problems.clone_from(&problems);
+        let mut problems = Problems::default();
+        let mut file = reader.section(section, &mut problems)?;
+        file.problems = common.iter().cloned().chain(problems.into_list()).collect();
+        files.push(file);
     }
     Ok(files)
 }
@@ -128,28 +129,34 @@ impl Tree {
                 }
             }
             Event::Damage { at, resumed, message } => {
-                self.damage(here);
                 let rest = match resumed {
                     Some(byte) => format!("reading goes on at byte {byte}"),
                     None => "what follows is left out".into(),
                 };
                 let message = format!("damaged record: {message}; {rest}");
-                self.problems.add_at_byte(ProblemCode::BadRecord, at, message);
+                self.damage(here, ProblemCode::BadRecord, at, message);
             }
             Event::Cut { at } => {
-                self.damage(here);
                 let message = format!(
                     "the file ends within the record at byte {at}; the records before it are read"
                 );
-                self.problems.add_at_byte(ProblemCode::CutRecord, at, message);
+                self.damage(here, ProblemCode::CutRecord, at, message);
             }
         })
     }
 
-    fn damage(&mut self, here: Option<(usize, Option<usize>)>) {
+    /// Notes damage where the walk is.
+    fn damage(
+        &mut self,
+        here: Option<(usize, Option<usize>)>,
+        code: ProblemCode,
+        byte: u64,
+        message: String,
+    ) {
         if let Some((section, Some(state))) = here {
             self.sections[section].damaged.insert(state);
         }
+        self.problems.add_at_byte(code, byte, message);
     }
 
     /// The section and state a path names; `None` for what is not a result of a binout.
