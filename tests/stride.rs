@@ -117,7 +117,7 @@ fn watched(text: &str, selection: &Selection) -> (SolverFile, f64) {
     let source = Watched { bytes: text.as_bytes().to_vec(), pages };
     let file = read_from("nodout", &[Box::new(source)], selection).unwrap().remove(0);
     let all = (text.len() as u64).div_ceil(PAGE);
-    let touched = pages.lock().unwrap().len();
+    let touched = pages.get_mut().unwrap().len();
     (file, touched as f64 / all as f64)
 }
 
@@ -183,7 +183,7 @@ fn a_surprise_is_left_to_the_line_reader() {
         ("stars", |text, at| text.replace_range(at + 10..at + 22, "************")),
         ("another id", |text, at| text.replace_range(at..at + 5, " 9999")),
         ("a cut row", |text, at| text.replace_range(at + 60..at + 61, "")),
-        ("a longer row", |text, at| text.insert_str(at + 60, " ")),
+        ("a longer row", |text, at| text.insert(at + 60, ' ')),
         ("a missing row", |text, at| {
             let end = text[at..].find('\n').unwrap();
             text.replace_range(at - 4..at + end - 3, "");
