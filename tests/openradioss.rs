@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{crumple_ok, shared};
+use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
 
 fn section(path: &Path, name: &str) -> SolverFile {
@@ -141,4 +142,92 @@ fn damaged_files_never_panic() {
             assert!(file.histories.iter().all(|h| h.values.len() == file.time.len()));
         }
     }
+}
+
+/// A T01 written here: `code` tells the length of titles; one object per group, its values
+/// rise by its id in every state of 1 ms.
+fn written(code: i32, groups: &[(i32, i32, usize)], states: usize) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut record = |payload: &[u8]| {
+        let length = (payload.len() as i32).to_be_bytes();
+        out.extend([&length, payload, &length].concat());
+    };
+    let integers =
+        |values: &[i32]| values.iter().flat_map(|v| v.to_be_bytes()).collect::<Vec<u8>>();
+    let reals = |values: &[f32]| values.iter().flat_map(|v| v.to_be_bytes()).collect::<Vec<u8>>();
+    let title = vec![
+        b't';
+        match code {
+            ..3041 => 40,
+            3041..4021 => 80,
+            _ => 100,
+        }
+    ];
+    record(&[&integers(&[code])[..], &[b'r'; 80]].concat());
+    record(&[b'd'; 80]);
+    if code > 3050 {
+        record(&integers(&[1]));
+        record(&integers(&[0; 4]));
+    }
+    record(&integers(&[0, 0, 0, 0, groups.len() as i32, 0]));
+    for &(kind, id, variables) in groups {
+        record(&[&integers(&[1, kind, 0, 1, variables as i32])[..], &title].concat());
+        record(&[&integers(&[id])[..], &title].concat());
+        record(&integers(&(1..=variables as i32).collect::<Vec<_>>()));
+    }
+    for state in 0..states {
+        record(&reals(&[state as f32 / 1024.0]));
+        for &(_, id, variables) in groups {
+            record(&reals(&vec![(state as i32 * id) as f32; variables]));
+        }
+    }
+    out
+}
+
+/// Sections (type 104) and every length of titles: forces are the rate of the impulses.
+#[test]
+fn sections_and_titles_of_other_lengths() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    for code in [3040, 3041, 4021] {
+        fs::write(&path, written(code, &[(0, 9, 9), (104, 2, 6)], 5)).unwrap();
+        let sections = section(&path, "secforc");
+        assert_eq!(sections.problems, []);
+        let force = sections.history(Some(EntityId::new(2)), "x_force").unwrap();
+        // Normal and tangential impulse rise by 2 each in 1/1024 s.
+        assert_eq!(force.values, [4.0 * 1024.0; 5], "{code}");
+        assert!(sections.notes[0].contains("central difference"), "{:?}", sections.notes);
+        let nodes = section(&path, "nodout");
+        assert_eq!(
+            nodes.history(Some(EntityId::new(9)), "z_acceleration").unwrap().values[4],
+            36.0
+        );
+        assert!(nodes.notes.is_empty());
+    }
+}
+
+/// A damaged state is left out; those behind it are found by the length of a state.
+#[test]
+fn damage_in_the_middle_costs_one_state() {
+    let bytes = written(3040, &[(0, 9, 9)], 100);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    let stride = (4 + 8) + (36 + 8);
+    let at = bytes.len() - 50 * stride;
+    let mut damaged = bytes.clone();
+    damaged[at..at + 10].fill(0);
+    fs::write(&path, &damaged).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.time.len(), 99);
+    assert_eq!(
+        file.problems[0].to_string(),
+        format!("byte {at}: state 51 is cut or damaged; it is left out")
+    );
+    // Zeros among values can only be told from those around them.
+    let mut zeroed = bytes;
+    zeroed[at + 20..at + 40].fill(0);
+    fs::write(&path, &zeroed).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.time.len(), 100);
+    assert_eq!(file.problems[0].code, ProblemCode::SuspectZeros);
 }

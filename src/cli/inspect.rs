@@ -67,7 +67,7 @@ struct Document<'a> {
 
 /// One section of a file, or a deck.
 enum Read {
-    Section { file: SolverFile, titles_from: Option<(PathBuf, usize)> },
+    Section { file: Box<SolverFile>, titles_from: Option<(PathBuf, usize)> },
     Deck(Box<Deck>),
 }
 
@@ -94,7 +94,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
                         .as_ref()
                         .map(|(from, deck)| (from.clone(), decks::fill_titles(&mut file, deck)));
                     let titles_from = filled.filter(|(_, count)| *count > 0);
-                    read.push((path, Read::Section { file, titles_from }));
+                    read.push((path, Read::Section { file: Box::new(file), titles_from }));
                 }
             }
             Err(ReadError::Deck { .. }) => {

@@ -408,11 +408,8 @@ impl States {
     ) -> Option<(u64, usize)> {
         let (byte, first) = damaged?;
         let message = match next - first {
-            1 => format!("state {first} at byte {byte} is cut or damaged; it is left out"),
-            _ => format!(
-                "states {first} to {} from byte {byte} on are cut or damaged; they are left out",
-                next - 1
-            ),
+            1 => format!("state {first} is cut or damaged; it is left out"),
+            _ => format!("states {first} to {} are cut or damaged; they are left out", next - 1),
         };
         problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
         None
