@@ -137,8 +137,10 @@ fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) {
     out.add_group(group.finish());
 }
 
-/// States that are handed on together, so that writes are not too short.
+/// States that are handed on together, so that writes are not too short; of states with
+/// more values than this each alone.
 const TOGETHER: usize = 2;
+const MANY_VALUES: usize = 1 << 18;
 
 /// Writes a nodout state by state. `None` if it turns out to be damaged.
 fn stream(input: &Path, blocks: Blocks, output: &Path) -> Result<Option<SolverFile>, ConvertError> {
@@ -183,12 +185,13 @@ enum Trouble {
 fn fill(blocks: &Blocks, offsets: &[u64], file: &File) -> Result<bool, Trouble> {
     let states = blocks.file.time.len();
     let values = blocks.values();
+    let together = if values > MANY_VALUES { 1 } else { TOGETHER };
     let damaged = AtomicBool::new(false);
-    (0..states.div_ceil(TOGETHER)).into_par_iter().try_for_each_init(
-        || (blocks.window(), vec![0.0; values * TOGETHER], Vec::new()),
+    (0..states.div_ceil(together)).into_par_iter().try_for_each_init(
+        || (blocks.window(), vec![0.0; values * together], Vec::new()),
         |(window, read, bytes), group| {
-            let first = group * TOGETHER;
-            let count = TOGETHER.min(states - first);
+            let first = group * together;
+            let count = together.min(states - first);
             for (k, state) in read.chunks_exact_mut(values).take(count).enumerate() {
                 if damaged.load(Ordering::Relaxed) {
                     return Ok(());

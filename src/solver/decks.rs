@@ -46,6 +46,13 @@ pub fn read(path: &Path) -> Result<Deck, ReadError> {
     deck::read(&mut file, &mut open).map_err(io)
 }
 
+/// The files that a deck itself includes.
+fn includes(path: &Path) -> Vec<deck::Include> {
+    let Ok(file) = File::open(path) else { return Vec::new() };
+    let read = deck::read(&mut BufReader::new(file), &mut |_| None);
+    read.map(|deck| deck.includes).unwrap_or_default()
+}
+
 /// Looks for the main deck in a folder: the one that no other of the folder includes.
 pub fn find(folder: &Path) -> Search {
     let Ok(entries) = folder.read_dir() else { return Search::None };
@@ -59,8 +66,7 @@ pub fn find(folder: &Path) -> Search {
     if candidates.len() > 1 && candidates.len() <= MAX_DECKS {
         let included: Vec<String> = candidates
             .iter()
-            .filter_map(|path| read(path).ok())
-            .flat_map(|deck| deck.includes)
+            .flat_map(|path| includes(path))
             .map(|include| include.name.replace('\\', "/"))
             .collect();
         candidates.retain(|path| {

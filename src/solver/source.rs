@@ -33,10 +33,17 @@ pub enum Access {
     Map,
 }
 
-/// Opens a file. A pipe or device, which has no positions, is copied to a temporary file.
+/// Opens a file. A pipe, which has no positions, is copied to a temporary file.
+///
+/// # Errors
+/// Those of the operating system, and for a device, which may have no end.
 pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
     let mut file = File::open(path)?;
-    if !file.metadata()?.is_file() {
+    let kind = file.metadata()?.file_type();
+    if !kind.is_file() {
+        if !is_pipe(kind) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no file and no pipe"));
+        }
         let mut copy = tempfile::tempfile()?;
         io::copy(&mut file, &mut copy)?;
         file = copy;
@@ -45,6 +52,16 @@ pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
         Access::Plain => Box::new(file),
         Access::Map => Box::new(Mapped::new(&file)?),
     })
+}
+
+#[cfg(unix)]
+fn is_pipe(kind: std::fs::FileType) -> bool {
+    std::os::unix::fs::FileTypeExt::is_fifo(&kind)
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: std::fs::FileType) -> bool {
+    false
 }
 
 impl Source for File {

@@ -51,7 +51,8 @@ struct Table {
     channels: Vec<Channel>,
     /// Per row: whether the pending state has it.
     filled: Vec<bool>,
-    filled_rows: usize,
+    /// The rows that it has, so that a state costs what it has and not what others had.
+    filled_rows: Vec<usize>,
     next_row: usize,
 }
 
@@ -188,7 +189,7 @@ impl<'a> States<'a> {
             channel_of: Vec::new(),
             channels: Vec::new(),
             filled: Vec::new(),
-            filled_rows: 0,
+            filled_rows: Vec::new(),
             next_row: 0,
         });
         TableId(self.tables.len() - 1)
@@ -218,7 +219,7 @@ impl<'a> States<'a> {
 
     /// Whether the pending state already has rows in this table.
     pub fn has_rows(&self, table: TableId) -> bool {
-        self.tables[table.0].filled_rows > 0
+        !self.tables[table.0].filled_rows.is_empty()
     }
 
     /// Whether the pending state already has this entity's row.
@@ -233,6 +234,7 @@ impl<'a> States<'a> {
         self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
         if let Some(pending) = &self.pending
             && self.sealed
+            && !pending.damaged
             && pending.time.is_some()
             && self.missing(pending, true).is_none()
         {
@@ -281,7 +283,7 @@ impl<'a> States<'a> {
             self.damage(line, None, message);
             return;
         }
-        table.filled_rows += 1;
+        table.filled_rows.push(row);
         table.next_row = row + 1;
         for column in 0..table.components.len() {
             table.seen_columns[column] |= field(column).is_some();
@@ -384,13 +386,15 @@ impl<'a> States<'a> {
             }
         }
         for table in &mut self.tables {
-            table.filled.fill(false);
-            table.filled_rows = 0;
             table.next_row = 0;
-            // What a state that was left out had must not stand in the next one.
-            if table.varies {
-                for channel in &mut table.channels {
-                    (channel.pending, channel.pending_seen) = (f64::NAN, false);
+            let width = table.wanted_columns.len();
+            for row in table.filled_rows.drain(..) {
+                table.filled[row] = false;
+                // What a state that was left out had must not stand in the next one.
+                if let Some(first) = table.channel_of[row] {
+                    for channel in &mut table.channels[first..first + width] {
+                        (channel.pending, channel.pending_seen) = (f64::NAN, false);
+                    }
                 }
             }
         }
@@ -402,7 +406,7 @@ impl<'a> States<'a> {
     /// What a pending state lacks to be whole.
     fn missing(&self, pending: &Pending, at_end: bool) -> Option<String> {
         for table in &self.tables {
-            let (have, want) = (table.filled_rows, table.rows.len());
+            let (have, want) = (table.filled_rows.len(), table.rows.len());
             if table.varies {
                 // Rows come in order, so that a cut takes the last ones.
                 let cut = table.last_row.filter(|&last| at_end && !table.filled[last]);
@@ -429,7 +433,7 @@ impl<'a> States<'a> {
                 Some(format!("its labels end before \"{}\"", last.component))
             }
             _ if !self.may_be_empty
-                && self.tables.iter().all(|t| t.filled_rows == 0)
+                && self.tables.iter().all(|t| t.filled_rows.is_empty())
                 && pending.labels == 0 =>
             {
                 Some("it has no rows".into())
@@ -447,12 +451,12 @@ impl<'a> States<'a> {
         self.places.push(pending.place);
         for table in &mut self.tables {
             if table.varies {
-                table.last_row = table.filled.iter().rposition(|&filled| filled);
-                for (states, &filled) in table.states_with.iter_mut().zip(&table.filled) {
-                    *states += usize::from(filled);
+                table.last_row = table.filled_rows.iter().max().copied();
+                for &row in &table.filled_rows {
+                    table.states_with[row] += 1;
                 }
                 let rows = table.rows.len().max(1);
-                let absent = table.channels.len() * (rows - table.filled_rows) / rows;
+                let absent = table.channels.len() * (rows - table.filled_rows.len()) / rows;
                 self.absent_cells += absent;
                 self.present_cells += table.channels.len() - absent;
             }
@@ -691,6 +695,7 @@ impl Table {
         self.channels.clear();
         self.states_with.clear();
         self.filled.clear();
+        self.filled_rows.clear();
         self.seen_columns.fill(false);
     }
 

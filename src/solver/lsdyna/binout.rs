@@ -35,6 +35,10 @@ const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 const MAX_METADATA: u64 = 256 << 20;
 /// Components kept of one section; real ones have at most about forty.
 const MAX_COMPONENTS: usize = 2_000;
+/// Sections of one run, and records of all of them; more are damage, and would fill the
+/// memory.
+const MAX_SECTIONS: usize = 1_000;
+const MAX_RECORDS: usize = 20_000_000;
 /// Values of one entity for several integration points that are told apart.
 const MAX_POINTS: usize = 128;
 
@@ -78,6 +82,9 @@ struct Tree {
     headers: Vec<Option<Header>>,
     sections: Vec<Section>,
     index: HashMap<String, usize>,
+    records: usize,
+    /// Whether sections were left out.
+    is_full: bool,
     problems: Problems,
 }
 
@@ -124,7 +131,12 @@ impl Tree {
                 here = self.place(&path);
             }
             Event::Data { name, payload } => {
-                if let Some((section, state)) = here {
+                self.records += 1;
+                if self.records == MAX_RECORDS {
+                    let message = "there are too many records; those that follow are left out";
+                    self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
+                }
+                if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
                     self.sections[section].note(name, state, Place { part, payload });
                 }
             }
@@ -176,6 +188,15 @@ impl Tree {
         let name = section.join("/");
         let index = match self.index.get(&name) {
             Some(&index) => index,
+            None if self.sections.len() == MAX_SECTIONS => {
+                if !self.is_full {
+                    let message =
+                        format!("{name} and what follows is left out: there are too many sections");
+                    self.problems.add(ProblemCode::UnreadRows, None, None, message);
+                }
+                self.is_full = true;
+                return None;
+            }
             None => {
                 self.sections.push(Section { name: name.clone(), ..Section::default() });
                 self.index.insert(name, self.sections.len() - 1);

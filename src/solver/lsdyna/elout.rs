@@ -28,11 +28,11 @@ const LABEL: usize = 17;
 const WIDTH: usize = 12;
 const WIDE: usize = 14;
 /// Beams: resultants of 11 behind 11 columns; stresses of 15 behind 16.
-const RESULTANTS: [&str; 7] =
+static RESULTANTS: [&str; 7] =
     ["axial", "shear_s", "shear_t", "moment_s", "moment_t", "torsion", "pl_eps"];
 const RESULTANT_AT: usize = 11;
 const RESULTANT_WIDTH: usize = 11;
-const BEAM_STRESSES: [&str; 4] = ["sigma_11", "sigma_12", "sigma_31", "plastic_eps"];
+static BEAM_STRESSES: [&str; 4] = ["sigma_11", "sigma_12", "sigma_31", "plastic_eps"];
 const BEAM_STRESS_AT: usize = 16;
 const BEAM_STRESS_WIDTH: usize = 15;
 /// Combinations of quantity, point and surface in one file; more are damage.
@@ -64,9 +64,21 @@ enum Quantity {
     NodalStrain,
 }
 
+/// What tells one kind of row from another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    quantity: Quantity,
+    point: i64,
+    surface: &'static str,
+    /// "point" or "node" and its number, for details.
+    location: Option<(&'static str, i64)>,
+    /// Names of the numbers behind the tensor; of a beam of all numbers.
+    names: &'static [&'static str],
+}
+
 #[derive(Default)]
 struct Elout {
-    tables: Vec<(Vec<String>, TableId)>,
+    tables: Vec<(Key, TableId)>,
     quantity: Option<Quantity>,
     cycle: Option<Vec<u8>>,
     /// Names of the numbers behind the tensor, by the column lines.
@@ -186,14 +198,21 @@ impl Elout {
         is_column_line
     }
 
-    fn table(&mut self, names: Vec<String>, states: &mut States<'_>) -> Option<TableId> {
-        if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == names) {
+    /// The table of a kind of row; `names` gives its components when it is a new one.
+    fn table(
+        &mut self,
+        key: Key,
+        states: &mut States<'_>,
+        names: impl FnOnce() -> Vec<String>,
+    ) -> Option<TableId> {
+        if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == key) {
             return Some(*table);
         }
         (self.tables.len() < MAX_TABLES).then_some(())?;
-        let table =
-            states.varying_table("elements", &names.iter().map(String::as_str).collect::<Vec<_>>());
-        self.tables.push((names, table));
+        let names = names();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let table = states.varying_table("elements", &names);
+        self.tables.push((key, table));
         Some(table)
     }
 
@@ -207,13 +226,15 @@ impl Elout {
             self.at_points = false;
             return Some(());
         }
-        let entity = self.entity?;
+        let (entity, quantity) = (self.entity?, Quantity::Beam);
         if !self.at_points {
             let numbers = text.len().checked_sub(RESULTANT_AT)? / RESULTANT_WIDTH;
             let whole = text.len() == RESULTANT_AT + numbers * RESULTANT_WIDTH;
             (whole && (6..=7).contains(&numbers) && line.ended).then_some(())?;
-            let names = RESULTANTS[..numbers].iter().map(|n| n.to_string()).collect();
-            let table = self.table(names, states)?;
+            let names = &RESULTANTS[..numbers];
+            let key = Key { quantity, point: 0, surface: "", location: None, names };
+            let table =
+                self.table(key, states, || names.iter().map(|n| n.to_string()).collect())?;
             states.row(table, entity, line, |k| {
                 let from = RESULTANT_AT + k * RESULTANT_WIDTH;
                 Some((from + 1, from + RESULTANT_WIDTH))
@@ -223,8 +244,10 @@ impl Elout {
         let point = integer(text.get(..BEAM_STRESS_AT)?)?;
         let width = BEAM_STRESS_AT + BEAM_STRESSES.len() * BEAM_STRESS_WIDTH;
         (text.len() == width).then_some(())?;
-        let names = BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect();
-        let table = self.table(names, states)?;
+        let key = Key { quantity, point, surface: "", location: None, names: &BEAM_STRESSES };
+        let table = self.table(key, states, || {
+            BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect()
+        })?;
         states.row(table, entity, line, |k| {
             let from = BEAM_STRESS_AT + k * BEAM_STRESS_WIDTH;
             Some((from + 1, from + BEAM_STRESS_WIDTH))
@@ -256,11 +279,11 @@ impl Elout {
             Some((at, length)) => {
                 let number = integer(&text[at + length..])?;
                 let what = if text[at] == b'i' { "point" } else { "node" };
-                (text[..at].trim_ascii_end(), format!("_{what}{number}"))
+                (text[..at].trim_ascii_end(), Some((what, number)))
             }
-            None => (text, String::new()),
+            None => (text, None),
         };
-        let further: &[&str] = match quantity {
+        let further: &'static [&'static str] = match quantity {
             Quantity::Stress => self.further,
             Quantity::NodalStress => &["yield"],
             _ => &[],
@@ -275,14 +298,17 @@ impl Elout {
             _ => return None,
         };
         (numbers.len() == tensor_end + further.len() * wide && line.ended).then_some(())?;
-        let kind = match quantity {
-            Quantity::Stress | Quantity::NodalStress => "sig",
-            _ => "eps",
-        };
-        let tail = format!("{}{location}", suffix(point));
-        let tensor = TENSOR.iter().map(|axes| format!("{surface}{kind}_{axes}{tail}"));
-        let names = tensor.chain(further.iter().map(|name| format!("{surface}{name}{tail}")));
-        let table = self.table(names.collect(), states)?;
+        let key = Key { quantity, point, surface, location, names: further };
+        let table = self.table(key, states, || {
+            let kind = match quantity {
+                Quantity::Stress | Quantity::NodalStress => "sig",
+                _ => "eps",
+            };
+            let place = location.map_or(String::new(), |(what, number)| format!("_{what}{number}"));
+            let tail = format!("{}{place}", suffix(point));
+            let tensor = TENSOR.iter().map(|axes| format!("{surface}{kind}_{axes}{tail}"));
+            tensor.chain(further.iter().map(|name| format!("{surface}{name}{tail}"))).collect()
+        })?;
         states.row(table, entity, line, |k| {
             let (from, width) = match k.checked_sub(TENSOR.len()) {
                 None => (LABEL + k * WIDTH, WIDTH),

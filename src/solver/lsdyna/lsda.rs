@@ -252,7 +252,9 @@ fn resume(source: &dyn Source, header: Header, from: u64, size: u64) -> io::Resu
         let Some(bytes) = window.get(at, length, 0)? else { return Ok(None) };
         for found in memchr::memmem::find_iter(bytes, [CD, b'/'].as_slice()) {
             let Some(start) = (at + found as u64).checked_sub(width as u64) else { continue };
-            if start < from {
+            // Most candidates are told by the length before them, without a read.
+            let length = found.checked_sub(width).map(|k| header.unsigned(&bytes[k..k + width]));
+            if start < from || length.is_some_and(|n| n > (width + 1 + MAX_PATH) as u64) {
                 continue;
             }
             let Ok(Record { length, event: Some(Event::Directory(_)) }) =
