@@ -28,6 +28,8 @@ pub mod sleout;
 pub mod spcforc;
 pub mod swforc;
 
+use super::states::States;
+
 /// The time in `( at time … )` of a state's heading.
 fn at_time(line: &[u8]) -> Option<f64> {
     const AT: &[u8] = b"( at time";
@@ -36,5 +38,18 @@ fn at_time(line: &[u8]) -> Option<f64> {
     match line::real(&line[from..to]) {
         line::Field::Real(time) => Some(time),
         _ => None,
+    }
+}
+
+/// Begins the state whose line ends with its time, `rest`, in `width` columns.
+fn begin_at(rest: &[u8], width: usize, line: &line::Line<'_>, states: &mut States<'_>) {
+    match line::real(rest) {
+        line::Field::Real(time) if rest.trim_ascii_end().len() == width => {
+            states.begin(Some(time), line.into());
+        }
+        _ => {
+            states.begin(None, line.into());
+            states.damage(line, None, format!("expected a time of {width} columns"));
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::io;
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
@@ -47,15 +47,7 @@ impl Body for Spcforc {
             return;
         }
         if let Some(rest) = line.text.strip_prefix(STATE) {
-            match real(rest) {
-                Field::Real(time) if rest.trim_ascii_end().len() == TIME_WIDTH => {
-                    states.begin(Some(time), line.into());
-                }
-                _ => {
-                    states.begin(None, line.into());
-                    states.damage(line, None, "expected a time of 14 columns".into());
-                }
-            }
+            super::begin_at(rest, TIME_WIDTH, line, states);
         } else if self.values(line, states).is_none() {
             let found = shown(line.columns(1, 40));
             let message = format!(

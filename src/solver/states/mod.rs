@@ -5,13 +5,16 @@
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
-use std::collections::HashMap;
+mod restart;
+mod table;
+
 use std::sync::Arc;
 
 use super::Selection;
 use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Place, Problem, ProblemCode, Problems};
 use crate::history::{EntityId, History};
+use table::{Table, collect_tables};
 
 /// What a file's body hands over at its end.
 pub struct Collected {
@@ -29,41 +32,6 @@ const ABSENT_PER_PRESENT: usize = 20;
 
 /// Labels kept of a file of labels; real ones have about thirty.
 const MAX_LABELS: usize = 500;
-
-/// Rows of the same components.
-struct Table {
-    name: &'static str,
-    components: Vec<Arc<str>>,
-    /// Indices into `components` that are selected.
-    wanted_columns: Vec<usize>,
-    /// Whether any row of a kept state had the column.
-    seen_columns: Vec<bool>,
-    rows: Vec<EntityId>,
-    row_of: HashMap<EntityId, usize>,
-    /// Whether a state may lack rows, or have new ones: elements erode, welds fail.
-    varies: bool,
-    /// Last row of the state above; a state that is cut lacks it.
-    last_row: Option<usize>,
-    /// Per row: kept states that have it.
-    states_with: Vec<usize>,
-    /// Per row: its first channel in `channels`, or `None` if the entity is not selected.
-    channel_of: Vec<Option<usize>>,
-    channels: Vec<Channel>,
-    /// Per row: whether the pending state has it.
-    filled: Vec<bool>,
-    /// The rows that it has, so that a state costs what it has and not what others had.
-    filled_rows: Vec<usize>,
-    next_row: usize,
-}
-
-/// One kept history: values of whole states, and the pending state's value.
-struct Channel {
-    values: Vec<f64>,
-    pending: f64,
-    /// Kept states in which its row had this column.
-    seen: usize,
-    pending_seen: bool,
-}
 
 /// Global quantities, which appear by label rather than by row.
 struct Scalar {
@@ -176,22 +144,7 @@ impl<'a> States<'a> {
         let wanted_columns = (0..components.len())
             .filter(|&i| self.selection.wants_component(&components[i]))
             .collect();
-        self.tables.push(Table {
-            name,
-            seen_columns: vec![false; components.len()],
-            components,
-            wanted_columns,
-            rows: Vec::new(),
-            row_of: HashMap::new(),
-            varies: false,
-            last_row: None,
-            states_with: Vec::new(),
-            channel_of: Vec::new(),
-            channels: Vec::new(),
-            filled: Vec::new(),
-            filled_rows: Vec::new(),
-            next_row: 0,
-        });
+        self.tables.push(Table::new(name, components, wanted_columns));
         TableId(self.tables.len() - 1)
     }
 
@@ -547,176 +500,6 @@ impl<'a> States<'a> {
         }
         collected.problems = self.problems.into_list();
         collected
-    }
-}
-
-impl States<'_> {
-    /// Leaves out the states that a restart wrote again: of equal times the last one counts.
-    /// A single state whose time is before its neighbours' stays where the file has it.
-    fn resolve_restarts(&mut self) {
-        let time = &self.time;
-        let goes_back = |i: usize| time[i] < time[i - 1];
-        let repeats = |i: usize| self.distinct_times && time[i] == time[i - 1];
-        let mut kept: Vec<usize> = Vec::with_capacity(time.len());
-        for i in 0..time.len() {
-            let is_single = time.get(i + 1).is_none_or(|&next| i > 0 && next > time[i - 1]);
-            if i > 0 && goes_back(i) && is_single {
-                self.problems.add(
-                    ProblemCode::TimeGoesBack,
-                    self.places.get(i).copied(),
-                    None,
-                    format!(
-                        "time {:?} of state {} is before the time of the state above it",
-                        time[i],
-                        i + 1
-                    ),
-                );
-            } else if i > 0 && (goes_back(i) || repeats(i)) {
-                let again = kept.iter().rposition(|&k| time[k] < time[i]).map_or(0, |k| k + 1);
-                let left_out = kept.split_off(again);
-                if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
-                    self.problems.add(
-                        ProblemCode::RepeatedState,
-                        self.places.get(i).copied(),
-                        None,
-                        format!(
-                            "a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
-                            time[i],
-                            left_out.len(),
-                            time[first],
-                            time[last]
-                        ),
-                    );
-                }
-            }
-            kept.push(i);
-        }
-        if kept.len() == self.time.len() {
-            return;
-        }
-        let take = |values: &mut Vec<f64>| {
-            if !values.is_empty() {
-                *values = kept.iter().map(|&i| values[i]).collect();
-            }
-        };
-        take(&mut self.time);
-        for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
-            take(&mut channel.values);
-        }
-        for scalar in &mut self.scalars {
-            take(&mut scalar.values);
-        }
-    }
-}
-
-/// Histories entity by entity, each with the components of all tables in order.
-/// Columns that an entity's rows never have make no history of it.
-fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut Problems) {
-    let states = collected.time.len();
-    let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
-    for table in tables {
-        if table.rows.is_empty() {
-            continue;
-        }
-        let mut channels = table.channels.into_iter();
-        let partly = table.states_with.iter().filter(|&&n| table.varies && 0 < n && n < states);
-        let partly = partly.count();
-        if partly > 0 {
-            problems.add(
-                ProblemCode::AbsentEntity,
-                None,
-                None,
-                format!(
-                    "{partly} of {} {} are missing from some states (eroded or failed); their values there are NaN",
-                    table.rows.len(),
-                    table.name
-                ),
-            );
-        }
-        for (row, &entity) in table.rows.iter().enumerate() {
-            if table.varies && table.states_with[row] == 0 {
-                // Only states that were left out had it.
-                if table.channel_of[row].is_some() {
-                    channels.by_ref().take(table.wanted_columns.len()).for_each(drop);
-                }
-                continue;
-            }
-            let histories = of_entity.entry(entity).or_insert_with(|| {
-                collected.entities.push(entity);
-                Vec::new()
-            });
-            if table.channel_of[row].is_none() {
-                continue;
-            }
-            for (&column, channel) in table.wanted_columns.iter().zip(channels.by_ref()) {
-                if channel.seen == 0 {
-                    continue;
-                }
-                if channel.seen < states && !table.varies {
-                    problems.add(
-                        ProblemCode::AbsentComponent,
-                        None,
-                        None,
-                        format!(
-                            "{} of {entity} is missing from {} of {states} states; its values there are NaN",
-                            table.components[column],
-                            states - channel.seen
-                        ),
-                    );
-                }
-                histories.push(History {
-                    entity: Some(entity),
-                    component: table.components[column].clone(),
-                    time: collected.time.clone(),
-                    values: channel.values,
-                });
-            }
-        }
-        let seen = table.components.into_iter().zip(table.seen_columns);
-        collected.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
-    }
-    for entity in &collected.entities {
-        collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
-    }
-}
-
-impl Table {
-    fn find(&self, entity: EntityId) -> Option<usize> {
-        match self.rows.get(self.next_row) {
-            Some(&expected) if expected == entity => Some(self.next_row),
-            _ => self.row_of.get(&entity).copied(),
-        }
-    }
-
-    fn forget_rows(&mut self) {
-        self.rows.clear();
-        self.row_of.clear();
-        self.channel_of.clear();
-        self.channels.clear();
-        self.states_with.clear();
-        self.filled.clear();
-        self.filled_rows.clear();
-        self.seen_columns.fill(false);
-    }
-
-    /// Adds a row that the first `states` kept states do not have.
-    fn add_row(&mut self, entity: EntityId, selection: &Selection, states: usize) -> usize {
-        let row = self.rows.len();
-        self.rows.push(entity);
-        self.row_of.insert(entity, row);
-        self.filled.push(false);
-        let wanted = selection.wants(entity) && !self.wanted_columns.is_empty();
-        self.states_with.push(0);
-        self.channel_of.push(wanted.then_some(self.channels.len()));
-        if wanted {
-            self.channels.extend(self.wanted_columns.iter().map(|_| Channel {
-                values: vec![f64::NAN; states],
-                pending: f64::NAN,
-                seen: 0,
-                pending_seen: false,
-            }));
-        }
-        row
     }
 }
 

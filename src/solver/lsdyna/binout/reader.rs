@@ -1,11 +1,4 @@
-//! `binout`: LS-DYNA's binary histories, an LSDA container.
-//!
-//! First all records are noted with their places, then the values that are wanted are read.
-//! A file that continues as `name%001`, `name%002`, … and the files `binout0000`,
-//! `binout0001`, … of the processes of one run are one tree over several containers.
-//!
-//! Of a record that is there twice the later one counts: a restart wrote it again. Entities
-//! may differ between states (eroded elements): a state that lacks one has NaN there.
+//! Reads the values of a section from the places that were noted.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -14,237 +7,26 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::lsda::{self, Event, Header, Kind, Payload, change_directory};
-use crate::history::{EntityId, History, Side};
+use super::columns::{Columns, Pick, positions_of};
+use super::metadata::{Metadata, titles, trimmed};
+use super::{Component, Place, Section};
+use crate::history::{EntityId, History};
+use crate::solver::lsdyna::lsda::{Header, Kind};
 use crate::solver::problem::{ProblemCode, Problems};
 use crate::solver::source::{Source, fill_at};
 use crate::solver::zeros;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
-
-/// Sections by which a container is known to be a binout.
-const SECTIONS: [&str; 24] = [
-    "abstat", "bndout", "curvout", "dbsensor", "deforc", "disbout", "elout", "eloutdet", "glstat",
-    "jntforc", "matsum", "ncforc", "nodfor", "nodout", "rbdout", "rcforc", "rwforc", "secforc",
-    "sleout", "spcforc", "sphout", "swforc", "tprint", "trhist",
-];
 
 /// Components of a state that are no results.
 const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 
 /// Largest array of ids or titles that is read; real ones are far shorter.
 const MAX_METADATA: u64 = 256 << 20;
-/// Components kept of one section; real ones have at most about forty.
-const MAX_COMPONENTS: usize = 2_000;
-/// Sections of one run, and records of all of them; more are damage, and would fill the
-/// memory.
-const MAX_SECTIONS: usize = 1_000;
-const MAX_RECORDS: usize = 20_000_000;
 /// Values of one entity for several integration points that are told apart.
 const MAX_POINTS: usize = 128;
 
-/// Whether a file begins with the header of an LSDA container.
-pub fn recognises(head: &[u8]) -> bool {
-    Header::parse(head).is_some()
-}
-
-/// Reads the selected histories of every section, or of the one selected. Empty if no
-/// section is one of a binout.
-pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
-    let mut tree = Tree::default();
-    for (number, part) in parts.iter().enumerate() {
-        tree.walk(number, &**part)?;
-    }
-    let wanted = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
-    let headers = std::mem::take(&mut tree.headers);
-    let reader = Reader { parts, headers: &headers, selection };
-    let mut files = Vec::new();
-    // Damaged records concern all sections: nobody knows what they held.
-    let common = std::mem::take(&mut tree.problems).into_list();
-    for section in tree.sections.iter().filter(|s| wanted(&s.name)) {
-        let mut problems = Problems::default();
-        let mut file = reader.section(section, &mut problems)?;
-        file.problems = common.iter().cloned().chain(problems.into_list()).collect();
-        files.push(file);
-    }
-    Ok(files)
-}
-
-/// A data record of one of the containers.
-#[derive(Clone, Copy)]
-struct Place {
-    part: usize,
-    payload: Payload,
-}
-
-/// All sections of the family of containers.
-#[derive(Default)]
-struct Tree {
-    headers: Vec<Option<Header>>,
-    sections: Vec<Section>,
-    index: HashMap<String, usize>,
-    records: usize,
-    /// Whether sections were left out.
-    is_full: bool,
-    problems: Problems,
-}
-
-/// The records of one section.
-#[derive(Default)]
-struct Section {
-    name: String,
-    metadata: HashMap<String, Place>,
-    /// Directory numbers of the states, in order of appearance.
-    states: Vec<u64>,
-    state_index: HashMap<u64, usize>,
-    /// States that damage was found in.
-    damaged: HashSet<usize>,
-    /// Records that were there before, and the first state of which.
-    repeated: usize,
-    first_repeated: Option<u64>,
-    /// Components in order of appearance.
-    components: Vec<Component>,
-    component_index: HashMap<String, usize>,
-}
-
-/// The records of one component.
-struct Component {
-    name: Arc<str>,
-    /// By state.
-    records: HashMap<usize, Place>,
-}
-
-impl Tree {
-    /// Notes all records of one container.
-    fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
-        let header = lsda::header(source)?;
-        self.headers.push(header);
-        let Some(header) = header else {
-            let message = "this is no LSDA container, or its header is cut";
-            self.problems.add(ProblemCode::CutRecord, None, None, message.into());
-            return Ok(());
-        };
-        let mut path: Vec<String> = Vec::new();
-        let mut here = None;
-        lsda::walk(source, header, |event| match event {
-            Event::Directory(to) => {
-                change_directory(&mut path, to);
-                here = self.place(&path);
-            }
-            Event::Data { name, payload } => {
-                self.records += 1;
-                if self.records == MAX_RECORDS {
-                    let message = "there are too many records; those that follow are left out";
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
-                }
-                if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
-                    self.sections[section].note(name, state, Place { part, payload });
-                }
-            }
-            Event::Damage { at, resumed, message } => {
-                let rest = match resumed {
-                    Some(byte) => format!("reading goes on at byte {byte}"),
-                    None => "what follows is left out".into(),
-                };
-                let message = format!("damaged record: {message}; {rest}");
-                self.damage(here, ProblemCode::BadRecord, at, message);
-            }
-            Event::Cut { at } => {
-                let message = format!(
-                    "the file ends within the record at byte {at}; the records before it are read"
-                );
-                self.damage(here, ProblemCode::CutRecord, at, message);
-            }
-        })
-    }
-
-    /// Notes damage where the walk is.
-    fn damage(
-        &mut self,
-        here: Option<(usize, Option<usize>)>,
-        code: ProblemCode,
-        byte: u64,
-        message: String,
-    ) {
-        if let Some((section, Some(state))) = here {
-            self.sections[section].damaged.insert(state);
-        }
-        self.problems.add_at_byte(code, byte, message);
-    }
-
-    /// The section and state a path names; `None` for what is not a result of a binout.
-    /// States are `d` and digits, padded or not; directories below them hold no results.
-    fn place(&mut self, path: &[String]) -> Option<(usize, Option<usize>)> {
-        let (last, section) = path.split_last()?;
-        if !SECTIONS.contains(&section.first()?.as_str()) {
-            return None;
-        }
-        let number = match last.strip_prefix('d') {
-            Some(digits) if digits.bytes().all(|b| b.is_ascii_digit()) => {
-                Some(digits.parse().ok()?)
-            }
-            _ if last == "metadata" => None,
-            _ => return None,
-        };
-        let name = section.join("/");
-        let index = match self.index.get(&name) {
-            Some(&index) => index,
-            None if self.sections.len() == MAX_SECTIONS => {
-                if !self.is_full {
-                    let message =
-                        format!("{name} and what follows is left out: there are too many sections");
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message);
-                }
-                self.is_full = true;
-                return None;
-            }
-            None => {
-                self.sections.push(Section { name: name.clone(), ..Section::default() });
-                self.index.insert(name, self.sections.len() - 1);
-                self.sections.len() - 1
-            }
-        };
-        Some((index, number.map(|number| self.sections[index].state(number))))
-    }
-}
-
-impl Section {
-    /// Index of the state of that directory number.
-    fn state(&mut self, number: u64) -> usize {
-        *self.state_index.entry(number).or_insert_with(|| {
-            self.states.push(number);
-            self.states.len() - 1
-        })
-    }
-
-    fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
-        let Some(state) = state else {
-            self.metadata.insert(name.into(), place);
-            return;
-        };
-        let index = match self.component_index.get(name) {
-            Some(&index) => index,
-            None if self.components.len() < MAX_COMPONENTS => {
-                self.components.push(Component { name: name.into(), records: HashMap::new() });
-                self.component_index.insert(name.into(), self.components.len() - 1);
-                self.components.len() - 1
-            }
-            None => return,
-        };
-        let again = self.components[index].records.insert(state, place).is_some();
-        // Within one state a record may be there twice; behind later states it is a restart.
-        if again && state + 1 < self.states.len() {
-            self.repeated += 1;
-            self.first_repeated.get_or_insert(self.states[state]);
-        }
-    }
-
-    fn component(&self, name: &str) -> Option<&Component> {
-        self.component_index.get(name).map(|&index| &self.components[index])
-    }
-}
-
 /// Reads the noted records.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     parts: &'a [Box<dyn Source>],
     headers: &'a [Option<Header>],
     selection: &'a Selection,
@@ -260,6 +42,7 @@ struct States {
 }
 
 /// Whom the values of a component belong to.
+#[derive(Clone)]
 enum Owners {
     Global,
     /// One value per entity, in this order in every state.
@@ -268,7 +51,15 @@ enum Owners {
     OfState(Vec<EntityId>),
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    pub fn new(
+        parts: &'a [Box<dyn Source>],
+        headers: &'a [Option<Header>],
+        selection: &'a Selection,
+    ) -> Self {
+        Self { parts, headers, selection }
+    }
+
     fn bytes(&self, place: Place, from: u64, length: usize) -> io::Result<Vec<u8>> {
         let mut bytes = vec![0; length];
         let read = fill_at(&*self.parts[place.part], place.payload.at + from, &mut bytes)?;
@@ -287,7 +78,8 @@ impl Reader<'_> {
         Ok(kind.integers(header, &bytes))
     }
 
-    fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
+    /// What a section says of itself, and its selected histories.
+    pub fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
         let metadata = self.metadata(section)?;
         let states = self.states(section, problems)?;
         if let Some(ids) = &states.ids {
@@ -705,76 +497,13 @@ impl Reader<'_> {
     }
 }
 
-/// Where the kept entities' values are in a state's record.
-struct Pick {
-    /// `None` for an entity that the state lacks.
-    positions: Vec<Option<usize>>,
-    /// From the first to behind the last of them.
-    span: Range<usize>,
-    /// Whether they are neighbours in their order.
-    is_run: bool,
-}
-
-impl Pick {
-    fn new(positions: Vec<Option<usize>>) -> Self {
-        let known = || positions.iter().flatten().copied();
-        let span = match known().min().zip(known().max()) {
-            Some((first, last)) => first..last + 1,
-            None => 0..0,
-        };
-        let is_run = positions.iter().copied().eq(span.clone().map(Some));
-        Self { positions, span, is_run }
-    }
-}
-
-/// Rows of states turned into columns, several rows at a time: a value alone would cost a
-/// cache line.
-struct Columns {
-    columns: Vec<Vec<f64>>,
-    rows: Vec<f64>,
-    pending: usize,
-}
-
-/// Rows turned at once: the values of a cache line and more.
-const ROWS: usize = 16;
-
-impl Columns {
-    fn new(columns: usize, states: usize) -> Self {
-        Self {
-            columns: (0..columns).map(|_| Vec::with_capacity(states)).collect(),
-            rows: vec![f64::NAN; columns * ROWS],
-            pending: 0,
+impl Owners {
+    fn entities(&self) -> &[EntityId] {
+        match self {
+            Self::Global => &[],
+            Self::Fixed(ids) | Self::OfState(ids) => ids,
         }
     }
-
-    /// The next state's row, to be filled.
-    fn row(&mut self) -> &mut [f64] {
-        if self.pending == ROWS {
-            self.turn();
-        }
-        let width = self.columns.len();
-        self.pending += 1;
-        &mut self.rows[(self.pending - 1) * width..self.pending * width]
-    }
-
-    fn turn(&mut self) {
-        let (width, pending) = (self.columns.len(), self.pending);
-        for (k, column) in self.columns.iter_mut().enumerate() {
-            column.extend((0..pending).map(|row| self.rows[row * width + k]));
-        }
-        self.pending = 0;
-    }
-
-    fn finish(mut self) -> Vec<Vec<f64>> {
-        self.turn();
-        self.columns
-    }
-}
-
-/// For every kept entity its position among a state's ids.
-fn positions_of(kept: &[(usize, Option<EntityId>)], ids: &[i64]) -> Vec<Option<usize>> {
-    let of: HashMap<i64, usize> = ids.iter().enumerate().map(|(k, &id)| (id, k)).collect();
-    kept.iter().map(|(_, entity)| entity.and_then(|e| of.get(&e.id).copied())).collect()
 }
 
 /// Whether an id can only be one that was overwritten with zeros: LS-DYNA counts from 1, but
@@ -791,84 +520,4 @@ fn is_not_result(name: &str) -> bool {
 /// nothing where there is one entity.
 fn is_total(name: &str) -> bool {
     name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")
-}
-
-impl Place {
-    /// Number of values.
-    fn width(&self) -> usize {
-        let size = self.payload.kind.size().unwrap_or(1) as u64;
-        usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)
-    }
-}
-
-impl Component {
-    fn is_real(&self) -> bool {
-        self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
-    }
-}
-
-impl Clone for Owners {
-    fn clone(&self) -> Self {
-        match self {
-            Self::Global => Self::Global,
-            Self::Fixed(ids) => Self::Fixed(ids.clone()),
-            Self::OfState(ids) => Self::OfState(ids.clone()),
-        }
-    }
-}
-
-impl Owners {
-    fn entities(&self) -> &[EntityId] {
-        match self {
-            Self::Global => &[],
-            Self::Fixed(ids) | Self::OfState(ids) => ids,
-        }
-    }
-}
-
-/// What a section says of itself.
-struct Metadata {
-    title: Option<String>,
-    version: Option<String>,
-    revision: Option<String>,
-    titles: HashMap<i64, String>,
-    ids: Option<Vec<i64>>,
-    side: Option<Vec<i64>>,
-    force_ids: Option<Vec<i64>>,
-    moment_ids: Option<Vec<i64>>,
-}
-
-impl Metadata {
-    /// The entities that the values of a component belong to, by their number.
-    fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
-        let fits = |ids: &Option<Vec<i64>>| ids.clone().filter(|ids| ids.len() == width);
-        let ids = fits(&self.ids).or_else(|| match component {
-            c if c.ends_with("_force") => fits(&self.force_ids),
-            c if c.ends_with("_moment") => fits(&self.moment_ids),
-            _ => None,
-        })?;
-        // Rows of two-sided contacts repeat their id.
-        let sides = fits(&self.side);
-        let side =
-            |k: usize| sides.as_ref().map(|s| if s[k] == 0 { Side::SurfA } else { Side::SurfB });
-        Some(ids.into_iter().enumerate().map(|(k, id)| EntityId { id, side: side(k) }).collect())
-    }
-}
-
-/// A text without its padding.
-fn trimmed(bytes: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
-    (!text.is_empty()).then(|| text.to_string())
-}
-
-/// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
-fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
-    let (Some(ids), Some(legend)) = (ids, legend) else { return HashMap::new() };
-    let width = legend.len() / ids.len().max(1);
-    if width == 0 {
-        return HashMap::new();
-    }
-    let titled = ids.iter().zip(legend.chunks(width));
-    titled.filter_map(|(&id, bytes)| Some((id, trimmed(bytes)?))).collect()
 }

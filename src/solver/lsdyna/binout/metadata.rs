@@ -1,0 +1,52 @@
+//! What a section says of itself: title, version, ids, sides, titles of entities.
+
+use std::collections::HashMap;
+
+use crate::history::{EntityId, Side};
+
+/// What a section says of itself.
+pub struct Metadata {
+    pub title: Option<String>,
+    pub version: Option<String>,
+    pub revision: Option<String>,
+    pub titles: HashMap<i64, String>,
+    pub ids: Option<Vec<i64>>,
+    pub side: Option<Vec<i64>>,
+    pub force_ids: Option<Vec<i64>>,
+    pub moment_ids: Option<Vec<i64>>,
+}
+
+impl Metadata {
+    /// The entities that the values of a component belong to, by their number.
+    pub fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
+        let fits = |ids: &Option<Vec<i64>>| ids.clone().filter(|ids| ids.len() == width);
+        let ids = fits(&self.ids).or_else(|| match component {
+            c if c.ends_with("_force") => fits(&self.force_ids),
+            c if c.ends_with("_moment") => fits(&self.moment_ids),
+            _ => None,
+        })?;
+        // Rows of two-sided contacts repeat their id.
+        let sides = fits(&self.side);
+        let side =
+            |k: usize| sides.as_ref().map(|s| if s[k] == 0 { Side::SurfA } else { Side::SurfB });
+        Some(ids.into_iter().enumerate().map(|(k, id)| EntityId { id, side: side(k) }).collect())
+    }
+}
+
+/// A text without its padding.
+pub fn trimmed(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    (!text.is_empty()).then(|| text.to_string())
+}
+
+/// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
+pub fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
+    let (Some(ids), Some(legend)) = (ids, legend) else { return HashMap::new() };
+    let width = legend.len() / ids.len().max(1);
+    if width == 0 {
+        return HashMap::new();
+    }
+    let titled = ids.iter().zip(legend.chunks(width));
+    titled.filter_map(|(&id, bytes)| Some((id, trimmed(bytes)?))).collect()
+}

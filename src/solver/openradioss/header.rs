@@ -1,0 +1,217 @@
+//! Records of a T01, and its header: what there are histories of.
+
+use std::io::{self, BufRead, Read};
+
+use super::{INTERFACE, NODES, RIGID_WALL, SECTION};
+use crate::solver::source::Stream;
+
+/// A record of the header is at most this long; a state's may be as long as the file.
+const MAX_HEADER_RECORD: usize = 1 << 20;
+/// Objects or variables of one group; bounds what a damaged count can ask for.
+const MAX_COUNT: i32 = 50_000_000;
+
+/// Records: 4-byte length, that many bytes, the same length again, all big-endian.
+pub struct Records<'a> {
+    input: Stream<'a>,
+}
+
+impl<'a> Records<'a> {
+    pub fn new(input: Stream<'a>) -> Self {
+        Self { input }
+    }
+
+    /// Position of the next byte.
+    pub fn position(&self) -> u64 {
+        self.input.position()
+    }
+
+    /// Goes on at `position`; false if there is nothing.
+    pub fn go_to(&mut self, position: u64) -> io::Result<bool> {
+        self.input.go_to(position);
+        Ok(!self.input.fill_buf()?.is_empty())
+    }
+
+    fn length(&mut self) -> io::Result<Option<usize>> {
+        let mut word = [0; 4];
+        match self.input.read_exact(&mut word) {
+            Ok(()) => Ok(usize::try_from(i32::from_be_bytes(word)).ok()),
+            Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// The next record, or `None` where there is none, or none that is whole.
+    pub fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
+        let Some(length) = self.length()? else { return Ok(None) };
+        let mut bytes = Vec::new();
+        self.input.by_ref().take(length as u64).read_to_end(&mut bytes)?;
+        if bytes.len() < length || self.length()? != Some(length) {
+            return Ok(None);
+        }
+        Ok(Some(bytes))
+    }
+
+    fn header(&mut self) -> io::Result<Option<Vec<u8>>> {
+        Ok(self.next()?.filter(|r| r.len() <= MAX_HEADER_RECORD))
+    }
+}
+
+/// Bytes of the length before and behind each record.
+pub const FRAME: u64 = 4;
+
+/// A group of histories.
+pub struct Group {
+    pub kind: i32,
+    pub objects: Vec<(i64, Option<String>)>,
+    pub codes: Vec<i32>,
+}
+
+pub struct Header {
+    pub title: Option<String>,
+    pub solver: Option<String>,
+    pub globals: usize,
+    pub part_values: usize,
+    pub subset_values: usize,
+    pub groups: Vec<Group>,
+}
+
+fn integers(record: &[u8]) -> Vec<i32> {
+    record.chunks_exact(4).map(|w| i32::from_be_bytes([w[0], w[1], w[2], w[3]])).collect()
+}
+
+fn text(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    (!text.is_empty()).then(|| text.to_string())
+}
+
+/// A count that a sane file can have.
+fn count(value: Option<&i32>) -> Option<usize> {
+    value.filter(|v| (0..=MAX_COUNT).contains(*v)).map(|&v| v as usize)
+}
+
+impl Header {
+    /// `None` if the header is cut or makes no sense.
+    pub fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
+        let Some(first) = records.header()? else { return Ok(None) };
+        let Some(&code) = integers(first.get(..4).unwrap_or_default()).first() else {
+            return Ok(None);
+        };
+        let title_length = match code {
+            ..3041 => 40,
+            3041..4021 => 80,
+            _ => 100,
+        };
+        let Some(solver) = records.header()? else { return Ok(None) };
+        if code > 3050 {
+            let Some(extra) = records.header()? else { return Ok(None) };
+            for _ in 0..count(integers(&extra).first()).unwrap_or(0) {
+                if records.header()?.is_none() {
+                    return Ok(None);
+                }
+            }
+        }
+        let Some(counts) = records.header()? else { return Ok(None) };
+        let counts = integers(&counts);
+        let sizes: Option<Vec<usize>> = (0..6).map(|i| count(counts.get(i))).collect();
+        let Some([parts, materials, properties, subsets, groups, globals]) =
+            sizes.and_then(|s| <[usize; 6]>::try_from(s).ok())
+        else {
+            return Ok(None);
+        };
+        if globals > 0 && records.header()?.is_none() {
+            return Ok(None);
+        }
+        let mut part_values = 0;
+        for _ in 0..parts {
+            // Id, title, four integers: the last is the number of history variables.
+            let Some(part) = records.header()? else { return Ok(None) };
+            let tail = integers(part.get(4 + title_length..).unwrap_or_default());
+            let Some(variables) = count(tail.get(3)) else { return Ok(None) };
+            part_values += variables;
+            if variables > 0 && records.header()?.is_none() {
+                return Ok(None);
+            }
+        }
+        for _ in 0..materials + properties {
+            if records.header()?.is_none() {
+                return Ok(None);
+            }
+        }
+        let mut subset_values = 0;
+        for _ in 0..subsets {
+            // Id, parent, number of child subsets, of parts, of variables, title.
+            let Some(subset) = records.header()? else { return Ok(None) };
+            let head = integers(subset.get(..20).unwrap_or_default());
+            for k in 2..5 {
+                let Some(number) = count(head.get(k)) else { return Ok(None) };
+                if k == 4 {
+                    subset_values += number;
+                }
+                if number > 0 && records.next()?.is_none() {
+                    return Ok(None);
+                }
+            }
+        }
+        let mut read = Vec::new();
+        for _ in 0..groups {
+            let Some(group) = Group::read(records)? else { return Ok(None) };
+            read.push(group);
+        }
+        Ok(Some(Self {
+            title: text(first.get(4..).unwrap_or_default()),
+            solver: text(&solver),
+            globals,
+            part_values,
+            subset_values,
+            groups: read,
+        }))
+    }
+}
+
+impl Group {
+    pub fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
+        // Id, type, one integer, number of objects, number of variables, title.
+        let Some(head) = records.header()? else { return Ok(None) };
+        let head = integers(head.get(..20).unwrap_or_default());
+        let (Some(&kind), Some(objects), Some(variables)) =
+            (head.get(1), count(head.get(3)), count(head.get(4)))
+        else {
+            return Ok(None);
+        };
+        let mut named = Vec::new();
+        for _ in 0..objects {
+            let Some(object) = records.header()? else { return Ok(None) };
+            let Some(&id) = integers(object.get(..4).unwrap_or_default()).first() else {
+                return Ok(None);
+            };
+            named.push((i64::from(id), text(&object[4..])));
+        }
+        let codes = match variables {
+            0 => Vec::new(),
+            _ => match records.next()? {
+                Some(codes) => integers(&codes),
+                None => return Ok(None),
+            },
+        };
+        match codes.len() == variables {
+            true => Ok(Some(Self { kind, objects: named, codes })),
+            false => Ok(None),
+        }
+    }
+
+    pub fn section(&self) -> Option<&'static str> {
+        match self.kind {
+            NODES => Some("nodout"),
+            INTERFACE => Some("rcforc"),
+            RIGID_WALL => Some("rwforc"),
+            SECTION => Some("secforc"),
+            _ => None,
+        }
+    }
+
+    /// Position of a variable's code among an object's values.
+    pub fn position(&self, code: usize) -> Option<usize> {
+        self.codes.iter().position(|&c| usize::try_from(c) == Ok(code))
+    }
+}

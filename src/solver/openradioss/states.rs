@@ -1,0 +1,300 @@
+//! The states of a T01: kept values, damage, and the histories made of them.
+
+use std::collections::HashSet;
+use std::io;
+use std::sync::Arc;
+
+use super::header::{FRAME, Header, Records};
+use super::{
+    FORCE_COMPONENTS, GLOBAL_COMPONENTS, IMPULSES, NODE_COMPONENTS, empty, entities, histories,
+    history, magnitude,
+};
+use crate::history::{EntityId, Side};
+use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::{Entity, Selection, SolverFile};
+
+/// One value per state of one object's variable.
+struct Channel {
+    offset: usize,
+    values: Vec<f64>,
+}
+
+/// The states, of selected values only.
+pub struct States {
+    time: Vec<f64>,
+    globals: Vec<Channel>,
+    /// Channels per group, in order of the offsets asked for.
+    groups: Vec<Vec<Channel>>,
+    /// Lengths of a state's records in bytes: time, globals, parts, subsets, groups.
+    lengths: Vec<usize>,
+    first_group: usize,
+    /// Kept values that are no finite numbers.
+    not_finite: usize,
+}
+
+impl States {
+    pub fn new(header: &Header, selection: &Selection) -> Self {
+        let wants_section = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
+        let channel = |offset| Channel { offset, values: Vec::new() };
+        let globals = GLOBAL_COMPONENTS
+            .iter()
+            .enumerate()
+            .take(header.globals)
+            .filter(|(_, name)| wants_section("glstat") && selection.wants_component(name))
+            .map(|(k, _)| channel(k))
+            .collect();
+        let groups = header
+            .groups
+            .iter()
+            .map(|group| {
+                let Some(section) = group.section().filter(|s| wants_section(s)) else {
+                    return Vec::new();
+                };
+                let codes: Vec<usize> = match section {
+                    "nodout" => (1..=NODE_COMPONENTS.len())
+                        .filter(|&code| selection.wants_component(NODE_COMPONENTS[code - 1]))
+                        .collect(),
+                    _ if magnitude(section)
+                        .iter()
+                        .chain(&FORCE_COMPONENTS)
+                        .any(|c| selection.wants_component(c)) =>
+                    {
+                        (1..=IMPULSES).collect()
+                    }
+                    _ => Vec::new(),
+                };
+                let positions: Vec<usize> =
+                    codes.iter().filter_map(|&code| group.position(code)).collect();
+                let wanted = |id: i64| {
+                    [None, Some(Side::SurfA), Some(Side::SurfB)]
+                        .into_iter()
+                        .any(|side| selection.wants(EntityId { id, side }))
+                };
+                let objects = group.objects.iter().enumerate().filter(|(_, o)| wanted(o.0));
+                objects
+                    .flat_map(|(k, _)| {
+                        positions.iter().map(move |p| channel(k * group.codes.len() + p))
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut lengths = vec![4];
+        lengths.extend([header.globals].iter().filter(|&&n| n > 0).map(|n| 4 * n));
+        lengths.extend([header.part_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
+        lengths.extend([header.subset_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
+        let first_group = lengths.len();
+        lengths.extend(header.groups.iter().map(|g| 4 * g.objects.len() * g.codes.len()));
+        Self { time: Vec::new(), globals, groups, lengths, first_group, not_finite: 0 }
+    }
+
+    /// Bytes of one state.
+    fn stride(&self) -> u64 {
+        self.lengths.iter().map(|&n| n as u64 + 2 * FRAME).sum()
+    }
+
+    /// Reads states until the end. One that is damaged is left out and said; as all have the
+    /// same length, the next one is found behind it.
+    pub fn read(&mut self, records: &mut Records<'_>, problems: &mut Problems) -> io::Result<()> {
+        let mut start = records.position();
+        let mut number = 0;
+        let mut above: [Option<Vec<Vec<u8>>>; 2] = [None, None];
+        let mut damaged: Option<(u64, usize)> = None;
+        loop {
+            if !records.go_to(start)? {
+                break;
+            }
+            number += 1;
+            let mut state = Vec::with_capacity(self.lengths.len());
+            for &length in &self.lengths {
+                match records.next()? {
+                    Some(record) if record.len() == length => state.push(record),
+                    _ => break,
+                }
+            }
+            if state.len() == self.lengths.len() {
+                damaged = self.say(damaged, number, problems);
+                self.look_for_zeros(&above, Some(&state), problems);
+                self.store(&state, problems);
+                let [_, last] = above;
+                above = [last, Some(state)];
+            } else if damaged.is_none() {
+                damaged = Some((start, number));
+            }
+            start += self.stride();
+        }
+        self.say(damaged, number + 1, problems);
+        self.look_for_zeros(&above, None, problems);
+        if self.not_finite > 0 {
+            let message = format!(
+                "{} values are no finite numbers; they are returned as such",
+                self.not_finite
+            );
+            problems.add(ProblemCode::NotFinite, None, None, message);
+        }
+        Ok(())
+    }
+
+    /// Says which states are left out: from the damaged one up to the one before `next`.
+    fn say(
+        &self,
+        damaged: Option<(u64, usize)>,
+        next: usize,
+        problems: &mut Problems,
+    ) -> Option<(u64, usize)> {
+        let (byte, first) = damaged?;
+        let message = match next - first {
+            1 => format!("state {first} is cut or damaged; it is left out"),
+            _ => format!("states {first} to {} are cut or damaged; they are left out", next - 1),
+        };
+        problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
+        None
+    }
+
+    /// Names the last state above if values of it are zero that are not in the states around
+    /// it: T01 has no check sums, and neither a motion nor an impulse does that.
+    fn look_for_zeros(
+        &self,
+        above: &[Option<Vec<Vec<u8>>>; 2],
+        below: Option<&Vec<Vec<u8>>>,
+        problems: &mut Problems,
+    ) {
+        let [Some(before), Some(state)] = above else { return };
+        let is_zero = |word: &[u8]| word[0] & 0x7f == 0 && word[1..] == [0, 0, 0];
+        let mut count = 0;
+        for (k, record) in state.iter().enumerate().skip(1) {
+            let words = record.chunks_exact(4).zip(before[k].chunks_exact(4)).enumerate();
+            count += words
+                .filter(|(i, (now, before))| {
+                    let after = below.is_none_or(|b| !is_zero(&b[k][4 * i..4 * i + 4]));
+                    is_zero(now) && !is_zero(before) && after
+                })
+                .count();
+        }
+        if count > 0 {
+            let message = format!(
+                "{count} values of the state at time {:?} are zero but not so in the states around it: was the file overwritten there?",
+                self.time.last().copied().unwrap_or(f64::NAN)
+            );
+            problems.add(ProblemCode::SuspectZeros, None, None, message);
+        }
+    }
+
+    fn store(&mut self, state: &[Vec<u8>], problems: &mut Problems) {
+        let real = |record: &[u8], offset: usize| {
+            let at = 4 * offset;
+            let word = record.get(at..at + 4).and_then(|w| <[u8; 4]>::try_from(w).ok());
+            word.map_or(f64::NAN, |w| f64::from(f32::from_be_bytes(w)))
+        };
+        let time = real(&state[0], 0);
+        if self.time.last().is_some_and(|&last| time < last) || !time.is_finite() {
+            problems.add(
+                ProblemCode::TimeGoesBack,
+                None,
+                None,
+                format!(
+                    "time {time:?} of state {} does not follow the one above it",
+                    self.time.len() + 1
+                ),
+            );
+        }
+        self.time.push(time);
+        let mut keep = |channel: &mut Channel, record: &[u8]| {
+            let value = real(record, channel.offset);
+            self.not_finite += usize::from(!value.is_finite());
+            channel.values.push(value);
+        };
+        for channel in &mut self.globals {
+            keep(channel, &state[1]);
+        }
+        for (channels, record) in self.groups.iter_mut().zip(&state[self.first_group..]) {
+            for channel in channels {
+                keep(channel, record);
+            }
+        }
+    }
+
+    pub fn finish(
+        self,
+        header: &Header,
+        selection: &Selection,
+        problems: Problems,
+    ) -> Vec<SolverFile> {
+        let time: Arc<[f64]> = self.time.into();
+        let problems = problems.into_list();
+        let mut files: Vec<SolverFile> = Vec::new();
+        let mut seen: HashSet<(&str, EntityId)> = HashSet::new();
+        for (group, channels) in header.groups.iter().zip(self.groups) {
+            let Some(section) = group.section() else { continue };
+            let file = match files.iter_mut().find(|f| f.section == section) {
+                Some(file) => file,
+                None => {
+                    files.push(empty(section));
+                    let last = files.len() - 1;
+                    &mut files[last]
+                }
+            };
+            let mut channels = channels.into_iter().peekable();
+            for (k, (id, title)) in group.objects.iter().enumerate() {
+                let range = k * group.codes.len()..(k + 1) * group.codes.len();
+                let mut own: Vec<(usize, Vec<f64>)> = Vec::new();
+                while let Some(c) = channels.next_if(|c| range.contains(&c.offset)) {
+                    let code = group.codes[c.offset - range.start];
+                    own.push((usize::try_from(code).unwrap_or(0), c.values));
+                }
+                for entity in entities(section, *id) {
+                    if seen.insert((section, entity)) {
+                        file.entities.push(Entity { id: entity, title: title.clone() });
+                        let wants = selection.wants(entity);
+                        let made = if wants {
+                            histories(section, entity, &own, &time)
+                        } else {
+                            Vec::new()
+                        };
+                        let kept =
+                            made.into_iter().filter(|h| selection.wants_component(&h.component));
+                        file.histories.extend(kept);
+                    }
+                }
+            }
+            let has: Vec<Arc<str>> = match section {
+                "nodout" => (1..=NODE_COMPONENTS.len())
+                    .filter(|&code| group.position(code).is_some())
+                    .map(|code| NODE_COMPONENTS[code - 1].into())
+                    .collect(),
+                _ if (1..=IMPULSES).all(|code| group.position(code).is_some()) => {
+                    magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
+                }
+                _ => Vec::new(),
+            };
+            for component in has {
+                if !file.components.contains(&component) {
+                    file.components.push(component);
+                }
+            }
+        }
+        if header.globals > 0 {
+            let mut file = empty("glstat");
+            file.components =
+                GLOBAL_COMPONENTS.iter().take(header.globals).map(|&c| c.into()).collect();
+            file.histories = self
+                .globals
+                .into_iter()
+                .map(|c| history(None, GLOBAL_COMPONENTS[c.offset], c.values, &time))
+                .collect();
+            files.push(file);
+        }
+        files.retain(|f| selection.section.as_ref().is_none_or(|s| *s == f.section));
+        for file in &mut files {
+            file.time = time.clone();
+            file.solver = Some("OpenRadioss".into());
+            file.version.clone_from(&header.solver);
+            file.title.clone_from(&header.title);
+            file.problems.clone_from(&problems);
+            if file.time.is_empty() {
+                file.components.clear();
+                file.histories.clear();
+            }
+        }
+        files
+    }
+}

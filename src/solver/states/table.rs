@@ -1,0 +1,174 @@
+//! Rows of the same components, and the histories that become of them.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::Collected;
+use crate::history::{EntityId, History};
+use crate::solver::Selection;
+use crate::solver::problem::{ProblemCode, Problems};
+
+/// Rows of the same components.
+pub struct Table {
+    pub name: &'static str,
+    pub components: Vec<Arc<str>>,
+    /// Indices into `components` that are selected.
+    pub wanted_columns: Vec<usize>,
+    /// Whether any row of a kept state had the column.
+    pub seen_columns: Vec<bool>,
+    pub rows: Vec<EntityId>,
+    pub row_of: HashMap<EntityId, usize>,
+    /// Whether a state may lack rows, or have new ones: elements erode, welds fail.
+    pub varies: bool,
+    /// Last row of the state above; a state that is cut lacks it.
+    pub last_row: Option<usize>,
+    /// Per row: kept states that have it.
+    pub states_with: Vec<usize>,
+    /// Per row: its first channel in `channels`, or `None` if the entity is not selected.
+    pub channel_of: Vec<Option<usize>>,
+    pub channels: Vec<Channel>,
+    /// Per row: whether the pending state has it.
+    pub filled: Vec<bool>,
+    /// The rows that it has, so that a state costs what it has and not what others had.
+    pub filled_rows: Vec<usize>,
+    pub next_row: usize,
+}
+
+/// One kept history: values of whole states, and the pending state's value.
+pub struct Channel {
+    pub values: Vec<f64>,
+    pub pending: f64,
+    /// Kept states in which its row had this column.
+    pub seen: usize,
+    pub pending_seen: bool,
+}
+
+impl Table {
+    pub fn new(name: &'static str, components: Vec<Arc<str>>, wanted_columns: Vec<usize>) -> Self {
+        Self {
+            name,
+            seen_columns: vec![false; components.len()],
+            components,
+            wanted_columns,
+            rows: Vec::new(),
+            row_of: HashMap::new(),
+            varies: false,
+            last_row: None,
+            states_with: Vec::new(),
+            channel_of: Vec::new(),
+            channels: Vec::new(),
+            filled: Vec::new(),
+            filled_rows: Vec::new(),
+            next_row: 0,
+        }
+    }
+
+    pub fn find(&self, entity: EntityId) -> Option<usize> {
+        match self.rows.get(self.next_row) {
+            Some(&expected) if expected == entity => Some(self.next_row),
+            _ => self.row_of.get(&entity).copied(),
+        }
+    }
+
+    pub fn forget_rows(&mut self) {
+        self.rows.clear();
+        self.row_of.clear();
+        self.channel_of.clear();
+        self.channels.clear();
+        self.states_with.clear();
+        self.filled.clear();
+        self.filled_rows.clear();
+        self.seen_columns.fill(false);
+    }
+
+    /// Adds a row that the first `states` kept states do not have.
+    pub fn add_row(&mut self, entity: EntityId, selection: &Selection, states: usize) -> usize {
+        let row = self.rows.len();
+        self.rows.push(entity);
+        self.row_of.insert(entity, row);
+        self.filled.push(false);
+        let wanted = selection.wants(entity) && !self.wanted_columns.is_empty();
+        self.states_with.push(0);
+        self.channel_of.push(wanted.then_some(self.channels.len()));
+        if wanted {
+            self.channels.extend(self.wanted_columns.iter().map(|_| Channel {
+                values: vec![f64::NAN; states],
+                pending: f64::NAN,
+                seen: 0,
+                pending_seen: false,
+            }));
+        }
+        row
+    }
+}
+
+/// Histories entity by entity, each with the components of all tables in order.
+/// Columns that an entity's rows never have make no history of it.
+pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut Problems) {
+    let states = collected.time.len();
+    let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
+    for table in tables {
+        if table.rows.is_empty() {
+            continue;
+        }
+        let mut channels = table.channels.into_iter();
+        let partly = table.states_with.iter().filter(|&&n| table.varies && 0 < n && n < states);
+        let partly = partly.count();
+        if partly > 0 {
+            problems.add(
+                ProblemCode::AbsentEntity,
+                None,
+                None,
+                format!(
+                    "{partly} of {} {} are missing from some states (eroded or failed); their values there are NaN",
+                    table.rows.len(),
+                    table.name
+                ),
+            );
+        }
+        for (row, &entity) in table.rows.iter().enumerate() {
+            if table.varies && table.states_with[row] == 0 {
+                // Only states that were left out had it.
+                if table.channel_of[row].is_some() {
+                    channels.by_ref().take(table.wanted_columns.len()).for_each(drop);
+                }
+                continue;
+            }
+            let histories = of_entity.entry(entity).or_insert_with(|| {
+                collected.entities.push(entity);
+                Vec::new()
+            });
+            if table.channel_of[row].is_none() {
+                continue;
+            }
+            for (&column, channel) in table.wanted_columns.iter().zip(channels.by_ref()) {
+                if channel.seen == 0 {
+                    continue;
+                }
+                if channel.seen < states && !table.varies {
+                    problems.add(
+                        ProblemCode::AbsentComponent,
+                        None,
+                        None,
+                        format!(
+                            "{} of {entity} is missing from {} of {states} states; its values there are NaN",
+                            table.components[column],
+                            states - channel.seen
+                        ),
+                    );
+                }
+                histories.push(History {
+                    entity: Some(entity),
+                    component: table.components[column].clone(),
+                    time: collected.time.clone(),
+                    values: channel.values,
+                });
+            }
+        }
+        let seen = table.components.into_iter().zip(table.seen_columns);
+        collected.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
+    }
+    for entity in &collected.entities {
+        collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
+    }
+}
