@@ -8,6 +8,7 @@ pub mod decks;
 pub mod lsdyna;
 pub mod openradioss;
 mod problem;
+mod restart;
 pub mod source;
 mod states;
 mod zeros;

@@ -44,6 +44,7 @@ struct Scalar {
 
 struct Pending {
     time: Option<f64>,
+    cycle: Option<i64>,
     place: Place,
     damaged: bool,
     /// Whether it has a row that the first whole state does not have.
@@ -65,15 +66,14 @@ pub struct States<'a> {
     skip: usize,
     /// States left out because their rows are not those of the first whole state.
     disagreeing: usize,
-    /// Whether times have enough digits to tell neighbouring states apart.
-    distinct_times: bool,
     /// Whether a state without rows is whole.
     may_be_empty: bool,
-    /// Values kept that the file has, and that it does not have (NaN).
+    /// Values that the kept states have and lack, selected or not.
     present_cells: usize,
     absent_cells: usize,
-    /// Places of the kept states' beginnings.
+    /// Places of the kept states' beginnings, and their cycles where the file has them.
     places: Vec<Place>,
+    cycles: Vec<Option<i64>>,
     pub problems: Problems,
 }
 
@@ -92,11 +92,11 @@ impl<'a> States<'a> {
             sealed: false,
             skip: 0,
             disagreeing: 0,
-            distinct_times: false,
             may_be_empty: false,
             present_cells: 0,
             absent_cells: 0,
             places: Vec::new(),
+            cycles: Vec::new(),
             problems: Problems::default(),
         }
     }
@@ -104,11 +104,6 @@ impl<'a> States<'a> {
     /// Leaves out the first `count` whole states.
     pub fn skip(&mut self, count: usize) {
         self.skip = count;
-    }
-
-    /// Says that equal times are the same state, written again.
-    pub fn times_are_distinct(&mut self) {
-        self.distinct_times = true;
     }
 
     /// Says that a state without rows is whole.
@@ -151,7 +146,8 @@ impl<'a> States<'a> {
     /// Ends the pending state and starts one at `time` (`None`: not yet known).
     pub fn begin(&mut self, time: Option<f64>, place: Place) {
         self.close(false);
-        self.pending = Some(Pending { time, place, damaged: false, disagrees: false, labels: 0 });
+        self.pending =
+            Some(Pending { time, cycle: None, place, damaged: false, disagrees: false, labels: 0 });
     }
 
     /// Time of the pending state.
@@ -161,6 +157,13 @@ impl<'a> States<'a> {
 
     pub fn is_pending(&self) -> bool {
         self.pending.is_some()
+    }
+
+    /// Gives the pending state its cycle.
+    pub fn set_cycle(&mut self, cycle: i64) {
+        if let Some(pending) = &mut self.pending {
+            pending.cycle = Some(cycle);
+        }
     }
 
     /// Gives the pending state its time.
@@ -402,16 +405,16 @@ impl<'a> States<'a> {
         self.sealed = true;
         self.time.push(time);
         self.places.push(pending.place);
+        self.cycles.push(pending.cycle);
         for table in &mut self.tables {
             if table.varies {
                 table.last_row = table.filled_rows.iter().max().copied();
                 for &row in &table.filled_rows {
                     table.states_with[row] += 1;
                 }
-                let rows = table.rows.len().max(1);
-                let absent = table.channels.len() * (rows - table.filled_rows.len()) / rows;
-                self.absent_cells += absent;
-                self.present_cells += table.channels.len() - absent;
+                let (rows, filled) = (table.rows.len(), table.filled_rows.len());
+                self.absent_cells += (rows - filled) * table.components.len();
+                self.present_cells += filled * table.components.len();
             }
             for channel in &mut table.channels {
                 channel.values.push(channel.pending);
@@ -445,11 +448,12 @@ impl<'a> States<'a> {
         &self.tables[table.0].wanted_columns
     }
 
-    /// Adds whole states that were read at once. Per state: its time, the place of its
-    /// beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
-    pub fn extend(&mut self, states: &[(f64, Place)], values: &[Vec<f64>]) {
-        for &(time, place) in states {
+    /// Adds whole states that were read at once. Per state: its cycle and time, the place of
+    /// its beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
+    pub fn extend(&mut self, states: &[((i64, f64), Place)], values: &[Vec<f64>]) {
+        for &((cycle, time), place) in states {
             self.time.push(time);
+            self.cycles.push(Some(cycle));
             self.places.push(place);
         }
         let channels = self.tables.iter_mut().flat_map(|t| &mut t.channels);

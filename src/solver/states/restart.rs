@@ -1,49 +1,17 @@
-//! States that a restart wrote again.
+//! Leaves out the states that a restart wrote again.
 
 use super::States;
-use crate::solver::problem::ProblemCode;
+use crate::solver::restart;
 
 impl States<'_> {
-    /// Leaves out the states that a restart wrote again: of equal times the last one counts.
-    /// A single state whose time is before its neighbours' stays where the file has it.
     pub(super) fn resolve_restarts(&mut self) {
-        let time = &self.time;
-        let goes_back = |i: usize| time[i] < time[i - 1];
-        let repeats = |i: usize| self.distinct_times && time[i] == time[i - 1];
-        let mut kept: Vec<usize> = Vec::with_capacity(time.len());
-        for i in 0..time.len() {
-            let is_single = time.get(i + 1).is_none_or(|&next| i > 0 && next > time[i - 1]);
-            if i > 0 && goes_back(i) && is_single {
-                self.problems.add(
-                    ProblemCode::TimeGoesBack,
-                    self.places.get(i).copied(),
-                    None,
-                    format!(
-                        "time {:?} of state {} is before the time of the state above it",
-                        time[i],
-                        i + 1
-                    ),
-                );
-            } else if i > 0 && (goes_back(i) || repeats(i)) {
-                let again = kept.iter().rposition(|&k| time[k] < time[i]).map_or(0, |k| k + 1);
-                let left_out = kept.split_off(again);
-                if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
-                    self.problems.add(
-                        ProblemCode::RepeatedState,
-                        self.places.get(i).copied(),
-                        None,
-                        format!(
-                            "a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
-                            time[i],
-                            left_out.len(),
-                            time[first],
-                            time[last]
-                        ),
-                    );
-                }
-            }
-            kept.push(i);
-        }
+        let cycles = &self.cycles;
+        // Times have few digits: only a cycle that does not rise tells the same state.
+        let repeats =
+            |i: usize| cycles[i].zip(cycles[i - 1]).is_some_and(|(now, above)| now <= above);
+        let places = &self.places;
+        let place = |i: usize| places.get(i).copied();
+        let kept = restart::resolve(&self.time, repeats, place, "", &mut self.problems);
         if kept.len() == self.time.len() {
             return;
         }

@@ -108,8 +108,8 @@ impl Blocks {
     /// Reads one state into `out`, column by column; false if it is damaged.
     pub fn read(&self, window: &mut Window<'_>, state: usize, out: &mut [f64]) -> io::Result<bool> {
         let at = self.start + state as u64 * self.stride.period();
-        let time = self.stride.state(window, at, &self.wanted, false, out)?;
-        Ok(time == Some(self.file.time[state]))
+        let found = self.stride.state(window, at, &self.wanted, false, out)?;
+        Ok(found.map(|(_, time)| time) == Some(self.file.time[state]))
     }
 }
 
@@ -127,7 +127,8 @@ fn times(
             || Window::new(source),
             |window, k| {
                 let at = start + k as u64 * stride.period();
-                stride.state(window, at, &nothing, false, &mut [])
+                let found = stride.state(window, at, &nothing, false, &mut [])?;
+                Ok(found.map(|(_, time)| time))
             },
         )
         .collect()

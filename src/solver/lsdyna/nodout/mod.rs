@@ -153,8 +153,7 @@ impl Body for Nodout {
 
 impl Nodout {
     /// Notes the place of the announced state if it is not the pending one's other block.
-    fn note_start(&mut self, states: &mut States<'_>) {
-        states.times_are_distinct();
+    fn note_start(&mut self, states: &States<'_>) {
         if let Some((cycle, time, place)) = self.announced
             && (states.pending_time() != Some(time) || self.cycle != Some(cycle))
         {
@@ -183,6 +182,7 @@ impl Nodout {
         let Some((cycle, time, place)) = self.announced.take() else { return false };
         if states.pending_time() != Some(time) || self.cycle != Some(cycle) {
             states.begin(Some(time), place);
+            states.set_cycle(cycle);
             self.cycle = Some(cycle);
         }
         true
@@ -208,11 +208,12 @@ impl Nodout {
             states.damage(line, None, "expected columns from x-disp or from x-rot".into());
             return None;
         };
-        let (_, time, place) = self.announced?;
+        let (cycle, time, place) = self.announced?;
         self.continue_announced(states);
         if states.has_rows(block.table) {
             // A second block of the same kind: a state of its own, at the same time.
             states.begin(Some(time), place);
+            states.set_cycle(cycle);
         }
         Some(block)
     }

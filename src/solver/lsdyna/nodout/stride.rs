@@ -35,6 +35,8 @@ pub struct Stride {
     lines: u64,
     /// Blank lines behind the last row.
     tail: Vec<u8>,
+    /// What the states keep of each block.
+    wanted: Vec<Wanted>,
 }
 
 /// Rows of equal width, and what stands above them.
@@ -130,8 +132,14 @@ impl Stride {
                 });
             }
         }
-        let stride =
-            Self { blocks, period: to.byte - from.byte, lines: to.line - from.line, tail: head };
+        let mut stride = Self {
+            blocks,
+            period: to.byte - from.byte,
+            lines: to.line - from.line,
+            tail: head,
+            wanted: Vec::new(),
+        };
+        stride.wanted = stride.wanted(states);
         Ok(stride.fits(states, tables).then_some(stride))
     }
 
@@ -153,7 +161,7 @@ impl Stride {
         start: Place,
         states: &mut States<'_>,
     ) -> io::Result<Option<Place>> {
-        let wanted = self.wanted(states);
+        let wanted = &self.wanted;
         let audit = states.is_audit();
         let values = wanted.iter().map(Wanted::values).sum::<usize>();
         let largest = (BATCH_VALUES / values.max(1)).clamp(2, MAX_BATCH);
@@ -162,21 +170,26 @@ impl Stride {
         let mut place = start;
         loop {
             let there = self.count(source.size()?, place.byte).min(batch);
-            let read: Vec<Option<(f64, Vec<f64>)>> = (0..there)
+            let read: Vec<Option<((i64, f64), Vec<f64>)>> = (0..there)
                 .into_par_iter()
                 .map_init(
                     || Window::new(source),
                     |window, k| {
-                        let mut out = vec![0.0; values];
                         let at = place.byte + k as u64 * self.period;
-                        let time = self.state(window, at, &wanted, audit, &mut out)?;
-                        Ok(time.map(|time| (time, out)))
+                        // Most surprises show in the first lines: before there is a cost.
+                        if !self.begins(window, at)? {
+                            return Ok(None);
+                        }
+                        let mut out = vec![0.0; values];
+                        let found = self.state(window, at, wanted, audit, &mut out)?;
+                        Ok(found.map(|found| (found, out)))
                     },
                 )
                 .collect::<io::Result<_>>()?;
-            let whole: Vec<(f64, Vec<f64>)> = read.into_iter().map_while(|state| state).collect();
+            let whole: Vec<((i64, f64), Vec<f64>)> =
+                read.into_iter().map_while(|state| state).collect();
             let count = whole.len();
-            let (times, values): (Vec<f64>, Vec<Vec<f64>>) = whole.into_iter().unzip();
+            let (times, values): (Vec<(i64, f64)>, Vec<Vec<f64>>) = whole.into_iter().unzip();
             let places = (0..).map(|k| self.place(place, k));
             states.extend(&times.into_iter().zip(places).collect::<Vec<_>>(), &values);
             place = self.place(place, count);
@@ -254,7 +267,14 @@ impl Stride {
         self.blocks[block].table
     }
 
-    /// Reads the state at byte `at` into `out`; its time, or `None` at any surprise.
+    /// Whether the first block's head stands at byte `at`.
+    fn begins(&self, window: &mut Window<'_>, at: u64) -> io::Result<bool> {
+        let Some(block) = self.blocks.first() else { return Ok(false) };
+        let head = window.get(at, block.head.len(), block.width)?;
+        Ok(head.is_some_and(|head| block.verify_head(head).is_some()))
+    }
+
+    /// Reads the state at byte `at` into `out`; its cycle and time, or `None` at any surprise.
     /// `audit`: parse the fields that are not wanted as well.
     pub fn state(
         &self,
@@ -263,7 +283,7 @@ impl Stride {
         wanted: &[Wanted],
         audit: bool,
         out: &mut [f64],
-    ) -> io::Result<Option<f64>> {
+    ) -> io::Result<Option<(i64, f64)>> {
         let mut found = None;
         for (block, wanted) in self.blocks.iter().zip(wanted) {
             let dense = audit || wanted.reads_most(block);
@@ -286,14 +306,13 @@ impl Stride {
             }
         }
         let tail_at = at + self.period - self.tail.len() as u64;
-        let time = found.map(|(_, time)| time);
         if let Some(tail) = window.get(tail_at, self.tail.len(), 0)? {
-            return Ok(time.filter(|_| tail == self.tail));
+            return Ok(found.filter(|_| tail == self.tail));
         }
         // At the end of the file the blank lines may be missing.
         for length in (0..self.tail.len()).rev() {
             if let Some(tail) = window.get(tail_at, length, 0)? {
-                return Ok(time.filter(|_| *tail == self.tail[..length]));
+                return Ok(found.filter(|_| *tail == self.tail[..length]));
             }
         }
         Ok(None)
