@@ -85,8 +85,16 @@ impl fmt::Display for Problem {
 /// Where a problem is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
+    /// Counted from 1; 0 in a binary file.
     pub line: u64,
     pub byte: u64,
+}
+
+impl Place {
+    /// A place in a binary file, which has no lines.
+    pub fn at_byte(byte: u64) -> Self {
+        Self { line: 0, byte }
+    }
 }
 
 impl From<&Line<'_>> for Place {
@@ -116,7 +124,7 @@ impl Problems {
         }
         self.kept.push(Problem {
             code,
-            line: place.map(|p| p.line),
+            line: place.map(|p| p.line).filter(|&line| line > 0),
             byte: place.map(|p| p.byte),
             columns,
             message,
@@ -125,12 +133,7 @@ impl Problems {
 
     /// A problem of a binary file, which has no lines.
     pub fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
-        self.add(code, None, None, message);
-        if self.dropped == 0
-            && let Some(last) = self.kept.last_mut()
-        {
-            last.byte = Some(byte);
-        }
+        self.add(code, Some(Place::at_byte(byte)), None, message);
     }
 
     /// Adds the problems of another list behind these.

@@ -10,7 +10,8 @@ use super::{
     history, magnitude,
 };
 use crate::history::{EntityId, Side};
-use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::problem::{Place, ProblemCode, Problems};
+use crate::solver::restart;
 use crate::solver::{Entity, Selection, SolverFile};
 
 /// One value per state of one object's variable.
@@ -28,6 +29,8 @@ pub struct States {
     /// Lengths of a state's records in bytes: time, globals, parts, subsets, groups.
     lengths: Vec<usize>,
     first_group: usize,
+    /// Where each kept state begins.
+    starts: Vec<u64>,
     /// Kept values that are no finite numbers.
     not_finite: usize,
 }
@@ -84,7 +87,15 @@ impl States {
         lengths.extend([header.subset_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
         let first_group = lengths.len();
         lengths.extend(header.groups.iter().map(|g| 4 * g.objects.len() * g.codes.len()));
-        Self { time: Vec::new(), globals, groups, lengths, first_group, not_finite: 0 }
+        Self {
+            time: Vec::new(),
+            globals,
+            groups,
+            lengths,
+            first_group,
+            starts: Vec::new(),
+            not_finite: 0,
+        }
     }
 
     /// Bytes of one state.
@@ -114,7 +125,7 @@ impl States {
             if state.len() == self.lengths.len() {
                 damaged = self.say(damaged, number, problems);
                 self.look_for_zeros(&above, Some(&state), problems);
-                self.store(&state, problems);
+                self.store(&state, start, problems);
                 let [_, last] = above;
                 above = [last, Some(state)];
             } else if damaged.is_none() {
@@ -175,28 +186,24 @@ impl States {
                 "{count} values of the state at time {:?} are zero but not so in the states around it: was the file overwritten there?",
                 self.time.last().copied().unwrap_or(f64::NAN)
             );
-            problems.add(ProblemCode::SuspectZeros, None, None, message);
+            let place = self.starts.last().copied().map(Place::at_byte);
+            problems.add(ProblemCode::SuspectZeros, place, None, message);
         }
     }
 
-    fn store(&mut self, state: &[Vec<u8>], problems: &mut Problems) {
+    fn store(&mut self, state: &[Vec<u8>], start: u64, problems: &mut Problems) {
         let real = |record: &[u8], offset: usize| {
             let at = 4 * offset;
             let word = record.get(at..at + 4).and_then(|w| <[u8; 4]>::try_from(w).ok());
             word.map_or(f64::NAN, |w| f64::from(f32::from_be_bytes(w)))
         };
         let time = real(&state[0], 0);
-        if self.time.last().is_some_and(|&last| time < last) || !time.is_finite() {
-            problems.add(
-                ProblemCode::TimeGoesBack,
-                None,
-                None,
-                format!(
-                    "time {time:?} of state {} does not follow the one above it",
-                    self.time.len() + 1
-                ),
-            );
+        if !time.is_finite() {
+            let message = format!("the state is left out: its time is {time:?}");
+            problems.add_at_byte(ProblemCode::IncompleteState, start, message);
+            return;
         }
+        self.starts.push(start);
         self.time.push(time);
         let mut keep = |channel: &mut Channel, record: &[u8]| {
             let value = real(record, channel.offset);
@@ -213,16 +220,49 @@ impl States {
         }
     }
 
+    /// Leaves out what a restart wrote again; forces cannot be told across it.
+    fn resolve_restarts(&mut self, problems: &mut Problems) {
+        let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
+        let mut kept = restart::resolve(&self.time, |_| true, place, "", problems);
+        // Nor can a state whose time is out of order be differentiated.
+        let mut last = f64::NEG_INFINITY;
+        kept.retain(|&i| {
+            let rises = self.time[i] > last;
+            last = last.max(self.time[i]);
+            rises
+        });
+        if kept.len() == self.time.len() {
+            return;
+        }
+        let take = |values: &mut Vec<f64>| {
+            if !values.is_empty() {
+                *values = kept.iter().map(|&i| values[i]).collect();
+            }
+        };
+        take(&mut self.time);
+        self.globals.iter_mut().chain(self.groups.iter_mut().flatten()).for_each(|channel| {
+            take(&mut channel.values);
+        });
+    }
+
     pub fn finish(
-        self,
+        mut self,
         header: &Header,
         selection: &Selection,
-        problems: Problems,
+        mut problems: Problems,
     ) -> Vec<SolverFile> {
+        self.resolve_restarts(&mut problems);
+        let has_impulses = header.groups.iter().any(|g| g.section().is_some_and(|s| s != "nodout"));
+        if self.time.len() == 1 && has_impulses {
+            let message = "one state has no rate of impulses: there are no forces";
+            problems.add(ProblemCode::AbsentComponent, None, None, message.into());
+        }
         let time: Arc<[f64]> = self.time.into();
         let problems = problems.into_list();
         let mut files: Vec<SolverFile> = Vec::new();
         let mut seen: HashSet<(&str, EntityId)> = HashSet::new();
+        // The variables of one object may be spread over several groups.
+        let mut made: HashSet<(&str, EntityId, Arc<str>)> = HashSet::new();
         for (group, channels) in header.groups.iter().zip(self.groups) {
             let Some(section) = group.section() else { continue };
             let file = match files.iter_mut().find(|f| f.section == section) {
@@ -244,15 +284,13 @@ impl States {
                 for entity in entities(section, *id) {
                     if seen.insert((section, entity)) {
                         file.entities.push(Entity { id: entity, title: title.clone() });
-                        let wants = selection.wants(entity);
-                        let made = if wants {
-                            histories(section, entity, &own, &time)
-                        } else {
-                            Vec::new()
-                        };
-                        let kept =
-                            made.into_iter().filter(|h| selection.wants_component(&h.component));
-                        file.histories.extend(kept);
+                    }
+                    if selection.wants(entity) {
+                        let new = histories(section, entity, &own, &time).into_iter().filter(|h| {
+                            selection.wants_component(&h.component)
+                                && made.insert((section, entity, h.component.clone()))
+                        });
+                        file.histories.extend(new);
                     }
                 }
             }
@@ -261,7 +299,9 @@ impl States {
                     .filter(|&code| group.position(code).is_some())
                     .map(|code| NODE_COMPONENTS[code - 1].into())
                     .collect(),
-                _ if (1..=IMPULSES).all(|code| group.position(code).is_some()) => {
+                _ if time.len() > 1
+                    && (1..=IMPULSES).all(|code| group.position(code).is_some()) =>
+                {
                     magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
                 }
                 _ => Vec::new(),

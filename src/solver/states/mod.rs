@@ -27,8 +27,8 @@ pub struct Collected {
 
 /// Values that states may lack, beyond so many times the values they have: more are no
 /// erosion but damage, and would fill the memory.
-const ABSENT_CELLS: usize = 10_000_000;
-const ABSENT_PER_PRESENT: usize = 20;
+pub const ABSENT_CELLS: usize = 10_000_000;
+pub const ABSENT_PER_PRESENT: usize = 20;
 
 /// Labels kept of a file of labels; real ones have about thirty.
 const MAX_LABELS: usize = 500;

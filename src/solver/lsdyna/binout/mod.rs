@@ -28,6 +28,8 @@ const SECTIONS: [&str; 24] = [
     "sleout", "spcforc", "sphout", "swforc", "tprint", "trhist",
 ];
 
+/// Metadata that tells whose values there are.
+const LISTS: [&str; 4] = ["ids", "side", "force_ids", "moment_ids"];
 /// Components kept of one section; real ones have at most about forty.
 const MAX_COMPONENTS: usize = 2_000;
 /// Sections of one run, and records of all of them; more are damage, and would fill the
@@ -85,6 +87,8 @@ struct Tree {
 struct Section {
     name: String,
     metadata: HashMap<String, Place>,
+    /// Lists of ids and sides, each for the states written behind it.
+    lists: Vec<(&'static str, Place)>,
     /// Directory numbers of the states, in order of appearance.
     states: Vec<u64>,
     state_index: HashMap<u64, usize>,
@@ -93,6 +97,8 @@ struct Section {
     /// Records that were there before, and the first state of which.
     repeated: usize,
     first_repeated: Option<u64>,
+    /// Records of components beyond those that are kept.
+    left_out: usize,
     /// Components in order of appearance.
     components: Vec<Component>,
     component_index: HashMap<String, usize>,
@@ -210,6 +216,9 @@ impl Section {
 
     fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
         let Some(state) = state else {
+            if let Some(list) = LISTS.into_iter().find(|list| *list == name) {
+                self.lists.push((list, place));
+            }
             self.metadata.insert(name.into(), place);
             return;
         };
@@ -220,7 +229,10 @@ impl Section {
                 self.component_index.insert(name.into(), self.components.len() - 1);
                 self.components.len() - 1
             }
-            None => return,
+            None => {
+                self.left_out += 1;
+                return;
+            }
         };
         let again = self.components[index].records.insert(state, place).is_some();
         // Within one state a record may be there twice; behind later states it is a restart.
@@ -236,6 +248,11 @@ impl Section {
 }
 
 impl Place {
+    /// Order of writing.
+    fn order(&self) -> (usize, u64) {
+        (self.part, self.payload.at)
+    }
+
     /// Number of values.
     fn width(&self) -> usize {
         let size = self.payload.kind.size().unwrap_or(1) as u64;

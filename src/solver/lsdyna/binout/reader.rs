@@ -9,11 +9,13 @@ use rayon::prelude::*;
 
 use super::columns::{Columns, Pick, positions_of};
 use super::metadata::{Metadata, titles, trimmed};
-use super::{Component, Place, Section};
+use super::{Component, LISTS, Place, Section};
 use crate::history::{EntityId, History};
 use crate::solver::lsdyna::lsda::{Header, Kind};
-use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::problem::{Place as FilePlace, ProblemCode, Problems};
+use crate::solver::restart;
 use crate::solver::source::{Source, fill_at};
+use crate::solver::states::{ABSENT_CELLS, ABSENT_PER_PRESENT};
 use crate::solver::zeros;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
@@ -82,6 +84,13 @@ impl<'a> Reader<'a> {
     pub fn section(&self, section: &Section, problems: &mut Problems) -> io::Result<SolverFile> {
         let metadata = self.metadata(section)?;
         let states = self.states(section, problems)?;
+        if section.left_out > 0 {
+            let message = format!(
+                "{}: there are too many components; {} records of further ones are left out",
+                section.name, section.left_out
+            );
+            problems.add(ProblemCode::UnreadRows, None, None, message);
+        }
         if let Some(ids) = &states.ids {
             let mut states_with: HashMap<i64, usize> = HashMap::new();
             for id in ids.iter().flatten() {
@@ -227,12 +236,14 @@ impl<'a> Reader<'a> {
         order.sort_by_key(|&i| section.states[i]);
         if section.repeated > 0 {
             let message = format!(
-                "{}: a restart writes {} records again, the first of state d{}; the last ones are kept",
+                "{}: {} records are there again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
                 section.name,
                 section.repeated,
                 section.first_repeated.unwrap_or_default()
             );
-            problems.add(ProblemCode::RepeatedState, None, None, message);
+            let state = section.first_repeated.and_then(|n| section.state_index.get(&n));
+            let place = state.and_then(|&state| place_of(section, state));
+            problems.add(ProblemCode::RepeatedState, place, None, message);
         } else if !section.states.is_sorted() {
             let message = format!(
                 "{}: states are not in order of their numbers; they are returned in it",
@@ -271,13 +282,6 @@ impl<'a> Reader<'a> {
             };
             match (why, value) {
                 (None, Some(value)) => {
-                    if time.last().is_some_and(|&last| value < last) {
-                        let message = format!(
-                            "{}: time {value:?} of state d{} is before the time of the state above it",
-                            section.name, section.states[state]
-                        );
-                        problems.add(ProblemCode::TimeGoesBack, None, None, message);
-                    }
                     whole.push(state);
                     time.push(value);
                 }
@@ -288,12 +292,19 @@ impl<'a> Reader<'a> {
                         section.states[state],
                         why.unwrap_or_default()
                     );
-                    problems.add(ProblemCode::IncompleteState, None, None, message);
+                    let place = place_of(section, state);
+                    problems.add(ProblemCode::IncompleteState, place, None, message);
                 }
             }
         }
+        let of = format!("{}: ", section.name);
+        let place = |i: usize| place_of(section, whole[i]);
+        let kept = restart::resolve(&time, |_| true, place, &of, problems);
+        time = kept.iter().map(|&i| time[i]).collect();
+        whole = kept.iter().map(|&i| whole[i]).collect();
+        self.leave_out_other_lists(section, &mut whole, &mut time, problems)?;
         let ids = match section.component("ids") {
-            None => None,
+            None => self.ids_by_order(section, &whole)?,
             Some(component) => {
                 let of = |state: &usize| match component.records.get(state) {
                     Some(&place) => self.integers(place),
@@ -302,7 +313,83 @@ impl<'a> Reader<'a> {
                 Some(whole.iter().map(of).collect::<io::Result<_>>()?)
             }
         };
+        let twice = |ids: &Vec<i64>| ids.len() - ids.iter().collect::<HashSet<_>>().len();
+        let twice = ids.iter().flatten().map(twice).max().unwrap_or(0);
+        if twice > 0 {
+            let message = format!(
+                "{}: {twice} ids are there twice in one state; the last value of each is returned",
+                section.name
+            );
+            problems.add(ProblemCode::RepeatedLabel, None, None, message);
+        }
         Ok(States { whole, time: time.into(), ids })
+    }
+
+    /// The ids in force when each state was written, if they changed; sections whose rows
+    /// are told by more than an id are not asked.
+    fn ids_by_order(
+        &self,
+        section: &Section,
+        whole: &[usize],
+    ) -> io::Result<Option<Vec<Vec<i64>>>> {
+        let places: Vec<Place> =
+            section.lists.iter().filter(|(name, _)| *name == "ids").map(|(_, p)| *p).collect();
+        let lists: Vec<Vec<i64>> =
+            places.iter().map(|&place| self.integers(place)).collect::<io::Result<_>>()?;
+        let more = section.lists.iter().any(|(name, _)| *name != "ids");
+        if more || lists.windows(2).all(|w| w[0] == w[1]) {
+            return Ok(None);
+        }
+        let of = |state: &usize| {
+            let time = section.component("time").and_then(|t| t.records.get(state));
+            let before = |p: &Place| time.is_some_and(|t| p.order() < t.order());
+            let last = places.iter().rposition(before).unwrap_or(0);
+            lists[last].clone()
+        };
+        Ok(Some(whole.iter().map(of).collect()))
+    }
+
+    /// Leaves out states that were written before a list of sides or of several kinds of ids
+    /// changed: their rows cannot be told by one id.
+    fn leave_out_other_lists(
+        &self,
+        section: &Section,
+        whole: &mut Vec<usize>,
+        time: &mut Vec<f64>,
+        problems: &mut Problems,
+    ) -> io::Result<()> {
+        let is_plain = section.lists.iter().all(|(name, _)| *name == "ids");
+        let mut last_change = None;
+        for name in LISTS.into_iter().filter(|_| !is_plain) {
+            let mut above: Option<Vec<i64>> = None;
+            for (_, place) in section.lists.iter().filter(|(n, _)| *n == name) {
+                let list = self.integers(*place)?;
+                if above.as_ref().is_some_and(|above| *above != list) {
+                    last_change = last_change.max(Some(place.order()));
+                }
+                above = Some(list);
+            }
+        }
+        let Some(change) = last_change else { return Ok(()) };
+        let times = section.component("time");
+        let is_behind = |state: usize| {
+            times.and_then(|t| t.records.get(&state)).is_some_and(|t| t.order() > change)
+        };
+        let keep: Vec<bool> = whole.iter().map(|&state| is_behind(state)).collect();
+        let lost = keep.iter().filter(|k| !**k).count();
+        let mut flags = keep.iter();
+        whole.retain(|_| flags.next().copied().unwrap_or(true));
+        let mut flags = keep.iter();
+        time.retain(|_| flags.next().copied().unwrap_or(true));
+        if lost > 0 {
+            let message = format!(
+                "{}: the ids change; {lost} states that were written before are left out",
+                section.name
+            );
+            let place = Some(FilePlace::at_byte(change.1));
+            problems.add(ProblemCode::UnexpectedEntity, place, None, message);
+        }
+        Ok(())
     }
 
     /// Whom a component's values belong to, and how many values each has; `None` (said)
@@ -398,6 +485,19 @@ impl<'a> Reader<'a> {
                     .collect()
             }
         };
+        let records = states.whole.iter().filter_map(|state| component.records.get(state));
+        let present: usize = records.map(Place::width).sum();
+        let cells = kept.len().saturating_mul(states.whole.len());
+        if cells > ABSENT_CELLS.saturating_add(present.saturating_mul(ABSENT_PER_PRESENT)) {
+            let message = format!(
+                "{}: {name} is left out: its {present} values would be spread over {cells} of {} entities and {} states",
+                section.name,
+                kept.len(),
+                states.whole.len()
+            );
+            problems.add(ProblemCode::UnreadRows, None, None, message);
+            return Ok((Vec::new(), problems));
+        }
         let mut columns = Columns::new(kept.len(), states.whole.len());
         let (mut absent, mut not_finite) = (0, 0);
         let (mut bytes, mut row) = (Vec::new(), Vec::new());
@@ -504,6 +604,14 @@ impl Owners {
             Self::Fixed(ids) | Self::OfState(ids) => ids,
         }
     }
+}
+
+/// Where a state is in its file.
+fn place_of(section: &Section, state: usize) -> Option<FilePlace> {
+    let records = || section.components.iter().filter_map(|c| c.records.get(&state));
+    let time = section.component("time").and_then(|t| t.records.get(&state));
+    let place = time.or_else(|| records().min_by_key(|p| p.order()))?;
+    Some(FilePlace::at_byte(place.payload.at))
 }
 
 /// Whether an id can only be one that was overwritten with zeros: LS-DYNA counts from 1, but
