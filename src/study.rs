@@ -118,13 +118,16 @@ struct Located {
     blake3: String,
 }
 
+/// The deck of a run, if there is one to use, and notes about its choice.
+type FoundDeck = (Option<(Located, Deck)>, Vec<String>);
+
 /// A run whose files are found and hashed but not read.
 pub struct LocatedRun<'a> {
     study: &'a Study,
     entry: &'a RunEntry,
     files: Vec<Located>,
     /// The run's keyword deck, and what is to be said of the search for it.
-    deck: Option<Located>,
+    deck: Option<(Located, Deck)>,
     deck_notes: Vec<String>,
     recipe: String,
     pub fingerprint: String,
@@ -255,7 +258,7 @@ impl Study {
         let mut hash = blake3::Hasher::new();
         hash.update(&EXTRACTION_VERSION.to_le_bytes());
         hash.update(recipe.as_bytes());
-        for file in files.iter().chain(&deck) {
+        for file in files.iter().chain(deck.iter().map(|(located, _)| located)) {
             hash.update(file.blake3.as_bytes());
         }
         let fingerprint = hash.finalize().to_hex().to_string();
@@ -263,11 +266,7 @@ impl Study {
     }
 
     /// The deck that the manifest names, or the only one of the run's folder.
-    fn locate_deck(
-        &self,
-        entry: &RunEntry,
-        folder: &Path,
-    ) -> Result<(Option<Located>, Vec<String>), RunError> {
+    fn locate_deck(&self, entry: &RunEntry, folder: &Path) -> Result<FoundDeck, RunError> {
         let mut notes = Vec::new();
         let path = match &entry.deck {
             Some(name) => Some(self.folder.join(name)),
@@ -283,8 +282,11 @@ impl Study {
                 }
             },
         };
-        let located = path.map(|path| hashed("deck", path)).transpose()?;
-        Ok((located, notes))
+        let Some(path) = path else { return Ok((None, notes)) };
+        let (deck, included) = decks::read_with_includes(&path)?;
+        // Size and hash are those of the deck with all that it includes.
+        let parts: Vec<PathBuf> = [path.clone()].into_iter().chain(included).collect();
+        Ok((Some((hashed_family("deck", path, &parts)?, deck)), notes))
     }
 
     /// Everything of the manifest that decides the case's numbers.
@@ -335,12 +337,15 @@ impl LocatedRun<'_> {
         let recipe = &study.manifest.recipe;
         let mut notes = self.deck_notes.clone();
         let mut warnings = Vec::new();
-        let deck = match &self.deck {
-            Some(located) => Some((located, decks::read(&located.path)?)),
-            None => None,
-        };
-        let units = self.units(deck.as_ref(), &mut notes, &mut warnings)?;
-        let declared_speed = self.speed(deck.as_ref(), units, &mut notes, &mut warnings);
+        let deck = self.deck.as_ref();
+        let units = self.units(deck, &mut notes, &mut warnings)?;
+        let declared_speed = self.speed(deck, units, &mut notes, &mut warnings);
+        let is_used = head.units.is_none() || declared_speed.is_some_and(|s| s.by == "deck");
+        if let Some((located, deck)) = deck.filter(|_| is_used) {
+            // What could not be read of it may have changed what was taken from it.
+            let name = shown_name(&located.path);
+            warnings.extend(deck.problems.iter().map(|p| format!("deck {name}: {p}")));
+        }
         let motion_file = self.file(&recipe.deflection.file);
         let motion = read_motion(motion_file, &recipe.deflection)?;
         let force_file = self.file(force_file(&recipe.force));
@@ -444,7 +449,7 @@ impl LocatedRun<'_> {
     /// The manifest's units, or those that the deck states.
     fn units(
         &self,
-        deck: Option<&(&Located, Deck)>,
+        deck: Option<&(Located, Deck)>,
         notes: &mut Vec<String>,
         warnings: &mut Vec<String>,
     ) -> Result<UnitSystem, RunError> {
@@ -483,7 +488,7 @@ impl LocatedRun<'_> {
     /// The manifest's speed, or the deck's; for half a model the closing speed.
     fn speed(
         &self,
-        deck: Option<&(&Located, Deck)>,
+        deck: Option<&(Located, Deck)>,
         units: UnitSystem,
         notes: &mut Vec<String>,
         warnings: &mut Vec<String>,
@@ -577,7 +582,7 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
     let text = folder.join(name);
     let names = file_names(folder)?;
     let names_only = Selection { audit: false, ..Selection::nothing() };
-    let mut binout = None;
+    let (mut binout, mut damaged) = (None, None);
     let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
     for part in names.iter().filter(is_binary) {
         let path = folder.join(part);
@@ -588,6 +593,13 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
             Err(_) if text.is_file() => continue,
             Err(error) => return Err(error.into()),
         };
+        let states: usize = sections.iter().map(|s| s.time.len()).sum();
+        if let Some(problem) = sections.iter().find_map(|s| s.problems.first())
+            && states == 0
+            && damaged.is_none()
+        {
+            damaged = Some(format!("{part} is damaged ({problem})"));
+        }
         if let Some(section) = sections.iter().find(|s| is_section_of(&s.section, name)) {
             binout = Some((path, section.section.clone()));
             break;
@@ -597,17 +609,15 @@ fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
         (true, twin) => (text, None, twin),
         (false, Some((path, section))) => (path, Some(section), None),
         (false, None) => {
-            let found = if names.is_empty() { "no files".into() } else { names.join(", ") };
+            let mut found = if names.is_empty() { "no files".into() } else { names.join(", ") };
+            if let Some(damaged) = damaged {
+                found = format!("{found}; {damaged}");
+            }
             return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
         }
     };
     let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
     Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
-}
-
-/// A file with its size and hash.
-fn hashed(name: &str, path: PathBuf) -> Result<Located, RunError> {
-    hashed_family(name, path.clone(), &[path])
 }
 
 /// A file with the size and hash of all its parts.
@@ -688,12 +698,23 @@ fn compare_twin(
             return;
         }
     };
-    let differs = read.histories.iter().any(|a| {
-        let Some(b) = twin.history(a.entity, &a.component) else { return true };
-        let largest = a.values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        a.values.len() != b.values.len()
-            || a.values.iter().zip(&b.values).any(|(a, b)| (a - b).abs() > SAME_VALUE * largest)
-    });
+    // A number that is not there must not be there in the other either.
+    let differ = |a: f64, b: f64, largest: f64| {
+        let unlike = (a - b).abs() > SAME_VALUE * largest;
+        unlike || a.is_finite() != b.is_finite()
+    };
+    let largest = |values: &[f64]| {
+        values.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()))
+    };
+    let differing = |a: &[f64], b: &[f64]| {
+        let largest = largest(a);
+        a.len() != b.len() || a.iter().zip(b).any(|(a, b)| differ(*a, *b, largest))
+    };
+    let differs = differing(&read.time, &twin.time)
+        || read.histories.iter().any(|a| {
+            let Some(b) = twin.history(a.entity, &a.component) else { return true };
+            differing(&a.values, &b.values)
+        });
     if differs {
         warnings.push(format!(
             "{} and section {section} of {} differ; the text file was used",

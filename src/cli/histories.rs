@@ -51,7 +51,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     };
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     if let Some(output) = output {
-        keep_input(&args.file, output)?;
+        solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
     }
     let target = output.map(Target::of).transpose()?;
     // JSON on standard output beside a file needs the values themselves.

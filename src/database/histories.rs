@@ -41,8 +41,11 @@ pub fn convert_histories(
     selection: &Selection,
     output: &Path,
 ) -> Result<SolverFile, ConvertError> {
-    let is_device = output.metadata().is_ok_and(|meta| !meta.is_file());
+    // Neither can be opened twice, nor be written at any place.
+    let is_file = |path: &Path| path.metadata().is_ok_and(|meta| meta.is_file());
+    let is_device = output.exists() && !is_file(output);
     if !is_device
+        && is_file(input)
         && let Some(blocks) = solver::blocks(input, format, selection)?
         && let Some(file) = stream(input, blocks, output)?
     {

@@ -1,5 +1,6 @@
 //! The deck of a run: found beside its files, read with its includes, held against them.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -29,21 +30,32 @@ pub enum Search {
 /// # Errors
 /// [`ReadError::Io`] if the deck itself cannot be read.
 pub fn read(path: &Path) -> Result<Deck, ReadError> {
+    Ok(read_with_includes(path)?.0)
+}
+
+/// The same, with the included files that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
+    let mut included = Vec::new();
     let mut open = |name: &str| -> Option<Box<dyn BufRead>> {
         // Names are often written on Windows.
         let path = folder.join(name.replace('\\', "/"));
         // A pipe would block.
         let is_file = fs::metadata(&path).is_ok_and(|meta| meta.is_file());
-        let file = is_file.then(|| File::open(path).ok())??;
+        let file = is_file.then(|| File::open(&path).ok())??;
+        included.push(path);
         Some(Box::new(BufReader::new(file)))
     };
     if !fs::metadata(path).map_err(io)?.is_file() {
         return Err(io(std::io::Error::other("this is no file")));
     }
     let mut file = BufReader::new(File::open(path).map_err(io)?);
-    deck::read(&mut file, &mut open).map_err(io)
+    let deck = deck::read(&mut file, &mut open).map_err(io)?;
+    Ok((deck, included))
 }
 
 /// The files that a deck itself includes.
@@ -117,10 +129,11 @@ pub fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
         "rwforc" => interfaces(&deck.rigid_walls),
         _ => return 0,
     };
+    let titles: HashMap<i64, String> =
+        titles.into_iter().rev().filter_map(|(id, title)| Some((id, title?))).collect();
     let mut filled = 0;
     for Entity { id, title } in file.entities.iter_mut().filter(|e| e.title.is_none()) {
-        let found = titles.iter().find(|(known, _)| *known == id.id);
-        if let Some((_, Some(found))) = found {
+        if let Some(found) = titles.get(&id.id) {
             *title = Some(found.clone());
             filled += 1;
         }

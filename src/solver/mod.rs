@@ -98,6 +98,10 @@ impl Format {
         }
     }
 
+    fn is_binary(&self) -> bool {
+        matches!(self.reader, Reader::Binary { .. })
+    }
+
     fn recognises(&self, head: &[u8]) -> bool {
         match self.reader {
             Reader::Text { .. } => false,
@@ -326,7 +330,13 @@ pub fn read(
         None => Err(ReadError::NoSuchSection {
             path: path.into(),
             section: selection.section.clone().unwrap_or_default(),
-            known: listed(&read_sections(path, format, &Selection::nothing())?),
+            known: if path.is_file() {
+                let names =
+                    Selection { audit: false, access: selection.access, ..Selection::nothing() };
+                listed(&read_sections(path, format, &names)?)
+            } else {
+                "others".into()
+            },
         }),
     }
 }
@@ -347,14 +357,35 @@ pub fn read_sections(
 ) -> Result<Vec<SolverFile>, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let (format, parts) = open(path, format, selection)?;
-    let sections = format.read(&parts, selection).map_err(io)?;
-    let is_text = matches!(format.reader, Reader::Text { .. });
-    if is_text || !sections.is_empty() || selection.section.is_some() {
+    let mut sections = format.read(&parts, selection).map_err(io)?;
+    let mut head = [0; 16];
+    let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
+    let is_container = lsdyna::binout::recognises(&head[..count]);
+    if let Some(missing) = missing_continuation(path).filter(|_| format.is_binary()) {
+        let message =
+            format!("{missing} is not there, so that what continues behind it is not read");
+        let problem = Problem {
+            code: ProblemCode::CutRecord,
+            line: None,
+            byte: None,
+            columns: None,
+            message,
+        };
+        sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
+    }
+    if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
         return Ok(sections);
     }
     Err(ReadError::UnknownFormat {
         path: path.into(),
-        looks_like: "this is an LSDA container, but it has no section of a binout".into(),
+        looks_like: match format.name {
+            "binout" if is_container => {
+                "this is an LSDA container, but it has no section of a binout"
+            }
+            "binout" => "this is no LSDA container",
+            _ => "it has no history that is read",
+        }
+        .into(),
         known: format_names(),
     })
 }
@@ -379,7 +410,7 @@ fn open(
         None => detect(path, &*first)?,
     };
     let mut parts = vec![first];
-    if matches!(format.reader, Reader::Binary { .. }) {
+    if format.is_binary() {
         for part in family(path).into_iter().skip(1) {
             parts.push(source::open(&part, selection.access).map_err(io)?);
         }
@@ -440,14 +471,31 @@ fn process_number(name: &str) -> Option<u32> {
 }
 
 fn with_continuations(path: &Path) -> Vec<PathBuf> {
-    let continuation = |number: usize| {
-        let mut name = path.as_os_str().to_os_string();
-        name.push(format!("%{number:03}"));
-        PathBuf::from(name)
-    };
     let mut parts = vec![path.to_path_buf()];
-    parts.extend((1..).map(continuation).take_while(|part| part.is_file()));
+    parts.extend((1..).map(|n| continuation(path, n)).take_while(|part| part.is_file()));
     parts
+}
+
+fn continuation(path: &Path, number: usize) -> PathBuf {
+    let mut name = path.as_os_str().to_os_string();
+    name.push(format!("%{number:03}"));
+    PathBuf::from(name)
+}
+
+/// Continuations looked for behind one that is missing.
+const LOOKED_AHEAD: usize = 20;
+
+/// The first continuation that is missing although later ones are there, of any of the files.
+fn missing_continuation(path: &Path) -> Option<String> {
+    let first = |path: &Path| (1..).find(|&n| !continuation(path, n).is_file()).unwrap_or(1);
+    let is_continuation = |part: &Path| part.to_string_lossy().contains('%');
+    family(path).iter().filter(|part| !is_continuation(part)).find_map(|part| {
+        let missing = first(part);
+        let later = missing + 1..=missing + LOOKED_AHEAD;
+        let missing = continuation(part, missing);
+        let name = missing.file_name()?.to_string_lossy().into_owned();
+        later.into_iter().any(|n| continuation(part, n).is_file()).then_some(name)
+    })
 }
 
 /// Reads the selected histories of every section from sources: a file and, of a binary

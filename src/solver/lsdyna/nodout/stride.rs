@@ -27,6 +27,9 @@ const PAGE: usize = 4096;
 const BATCH_VALUES: usize = 1 << 20;
 const MAX_BATCH: usize = 256;
 
+/// Cycle and time of a state, and the values wanted of it.
+type ReadState = ((i64, f64), Vec<f64>);
+
 /// The layout of one state.
 pub struct Stride {
     blocks: Vec<Block>,
@@ -170,7 +173,7 @@ impl Stride {
         let mut place = start;
         loop {
             let there = self.count(source.size()?, place.byte).min(batch);
-            let read: Vec<Option<((i64, f64), Vec<f64>)>> = (0..there)
+            let read: Vec<Option<ReadState>> = (0..there)
                 .into_par_iter()
                 .map_init(
                     || Window::new(source),
@@ -186,8 +189,7 @@ impl Stride {
                     },
                 )
                 .collect::<io::Result<_>>()?;
-            let whole: Vec<((i64, f64), Vec<f64>)> =
-                read.into_iter().map_while(|state| state).collect();
+            let whole: Vec<ReadState> = read.into_iter().map_while(|state| state).collect();
             let count = whole.len();
             let (times, values): (Vec<(i64, f64)>, Vec<Vec<f64>>) = whole.into_iter().unzip();
             let places = (0..).map(|k| self.place(place, k));
