@@ -309,6 +309,29 @@ fn ids_that_change_between_states() {
     );
 }
 
+/// Ids hold for the states written after them, whatever the states' names.
+#[test]
+fn ids_hold_until_others_are_written() {
+    let mut out = Written::new();
+    for (ids, states) in [([7, 8], 1..3), ([8, 7], 3..5)] {
+        out.ids("nodout", &ids);
+        for state in states {
+            out.cd(&format!("/nodout/d{state:06}"));
+            out.reals("time", &[f64::from(state)]);
+            out.reals("x_displacement", &ids.map(|id| id as f64));
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    fs::write(&path, out.bytes).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.time.len(), 4);
+    for id in [7, 8] {
+        let history = file.history(Some(EntityId::new(id)), "x_displacement").unwrap();
+        assert_eq!(history.values, [id as f64; 4]);
+    }
+}
+
 /// A study of one bundled run, with the given files in its folder.
 fn study(folder: &Path, files: &[(&str, Vec<u8>)]) -> PathBuf {
     let text = fs::read_to_string(fixture("fe/lead-car-wall/study.toml")).unwrap();

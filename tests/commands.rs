@@ -79,6 +79,46 @@ fn build_is_incremental_by_content() {
     assert_eq!(report["removed"], serde_json::json!(["72kmh"]));
 }
 
+/// What a deck includes decides a curve as the deck itself does.
+#[test]
+fn an_included_file_is_part_of_the_deck() {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
+    let run = folder.path().join("study/36kmh");
+    std::fs::write(run.join("main.k"), "*KEYWORD\n*INCLUDE\nmore.k\n*END\n").unwrap();
+    let include = |comment: &str| {
+        std::fs::write(run.join("more.k"), format!("*KEYWORD\n$ {comment}\n*END\n")).unwrap();
+        let report =
+            crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]);
+        json(&report)["runs"][1]["outcome"].clone()
+    };
+    assert_eq!(include("one"), "built");
+    assert_eq!(include("one"), "unchanged");
+    assert_eq!(include("two"), "built");
+}
+
+/// A history that comes through a pipe can be read only once.
+#[cfg(unix)]
+#[test]
+fn histories_from_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("nodout");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    let source = fixture("fe/lead-car-wall/36kmh/nodout");
+    for output in ["out.csv", "out.h5"] {
+        let (pipe, source) = (pipe.clone(), source.clone());
+        let writer = std::thread::spawn(move || {
+            std::fs::write(pipe, std::fs::read(source).unwrap()).unwrap();
+        });
+        crumple_ok(folder.path(), &["histories", "nodout", "-o", output]);
+        writer.join().unwrap();
+    }
+    crumple_ok(folder.path(), &["histories", source.to_str().unwrap(), "-o", "file.csv"]);
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(read("out.csv") == read("file.csv"));
+}
+
 fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in from.read_dir().unwrap() {

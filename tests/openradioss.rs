@@ -231,3 +231,17 @@ fn damage_in_the_middle_costs_one_state() {
     assert_eq!(file.time.len(), 100);
     assert_eq!(file.problems[0].code, ProblemCode::SuspectZeros);
 }
+
+/// A run with several groups of one kind has one section of them all.
+#[test]
+fn groups_of_one_kind_are_joined() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    fs::write(&path, written(3040, &[(0, 9, 9), (104, 2, 6), (0, 5, 9)], 5)).unwrap();
+    let nodes = section(&path, "nodout");
+    assert_eq!(nodes.problems, []);
+    for id in [9, 5] {
+        let values = &nodes.history(Some(EntityId::new(id)), "x_displacement").unwrap().values;
+        assert_eq!(values[4], 4.0 * id as f64);
+    }
+}

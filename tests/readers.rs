@@ -160,6 +160,41 @@ fn equal_printed_times_are_two_states() {
     assert_eq!(file.problems, []);
 }
 
+/// Two states may print one time, but their cycles differ.
+#[test]
+fn a_state_with_the_same_time_and_a_later_cycle_is_another() {
+    let one =
+        |cycle: u32| state(cycle, "1.0000000E-01") + TRANSLATIONS + &row("7", "1.50000E+00", 12);
+    let file = read("nodout", &(one(10) + &one(11) + &one(12)));
+    assert_eq!(file.time.len(), 3);
+    assert_eq!(file.problems, []);
+    let again = read("nodout", &(one(10) + &one(11) + &one(11)));
+    assert_eq!(&again.time[..], [0.1; 2]);
+    assert_eq!(codes(&again), [ProblemCode::RepeatedState]);
+}
+
+/// A node in two sets of constraints has two rows in a state.
+#[test]
+fn constraints_of_a_node_in_two_sets() {
+    let one = |time: &str| {
+        let row = |node: u32, force: &str, set: u32| {
+            format!(" node={node:6} local x,y,z forces ={}  setid={set:8}\n", force.repeat(3))
+        };
+        format!(" single point constraint forces\n\n output at time ={time:>14}\n")
+            + &row(1, "    1.0000E+00", 10)
+            + &row(2, "    2.0000E+00", 10)
+            + &row(1, "    3.0000E+00", 20)
+            + &format!("             force resultants   ={}\n", "    6.0000E+00".repeat(3))
+    };
+    let file = read("spcforc", &(one("0.00000E+00") + &one("1.00000E-01")));
+    assert_eq!(file.problems, []);
+    assert_eq!(file.time.len(), 2);
+    assert_eq!(values(&file, 1, "x_force"), [1.0; 2]);
+    assert_eq!(values(&file, 1, "x_force_2"), [3.0; 2]);
+    assert_eq!(values(&file, 2, "x_force"), [2.0; 2]);
+    assert!(file.history(Some(EntityId::new(2)), "x_force_2").is_none());
+}
+
 #[test]
 fn old_files_without_moments_and_mixed_tied_contacts() {
     let old = read("rcforc", &side("slave", 2, "0.00000E+00", FORCES));
@@ -515,4 +550,24 @@ fn a_first_state_that_differs_is_left_out() {
     let ids: Vec<i64> = file.entities.iter().map(|e| e.id.id).collect();
     assert_eq!(ids, [2, 3]);
     assert_eq!(codes(&file), [ProblemCode::IncompleteState]);
+}
+
+/// More interfaces than an attribute can name, and a name that would be a path.
+#[test]
+fn histories_of_many_interfaces_as_hdf5() {
+    let state: String = (1..=8001).map(|id| side("slave", id, "1.00000E+00", FORCES)).collect();
+    let mut file = read("rcforc", &state);
+    assert_eq!(file.problems, []);
+    let mut odd = file.histories[0].clone();
+    odd.component = "a/b".into();
+    file.histories.push(odd);
+    let bytes = crumple::database::histories_to_hdf5(&file).unwrap();
+    let hdf5 = hdf5_pure::File::from_bytes(bytes).unwrap();
+    assert_eq!(hdf5.dataset("x_force").unwrap().shape().unwrap(), [1, 8001]);
+    let ids = hdf5.dataset("ids/x_force").unwrap().read_i64().unwrap();
+    assert!(ids.iter().copied().eq(1..=8001));
+    let sides = hdf5.dataset("sides/x_force").unwrap().read_string().unwrap();
+    assert!(sides.len() == 8001 && sides.iter().all(|side| side == Side::SurfA.name()));
+    let odd = hdf5.dataset("a_b").unwrap().attrs().unwrap();
+    assert!(matches!(&odd["component"], hdf5_pure::AttrValue::String(name) if name == "a/b"));
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crumple::solver::lsdyna::deck::{Deck, Interface, Named};
+use crumple::solver::lsdyna::deck::{Deck, Interface, Named, Value};
 use serde::Serialize;
 
 /// A deck's metadata, or only where titles were taken from.
@@ -29,7 +29,45 @@ pub struct DeckReport<'a> {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parts: Vec<Entry<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    parameters: Vec<Parameter<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     includes: Vec<Include<'a>>,
+}
+
+#[derive(Serialize)]
+struct Parameter<'a> {
+    name: &'a str,
+    /// None if the deck does not say it plainly.
+    value: Option<Plain<'a>>,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Plain<'a> {
+    Real(f64),
+    Integer(i64),
+    Text(&'a str),
+}
+
+impl<'a> Parameter<'a> {
+    fn of(name: &'a str, value: &'a Value) -> Self {
+        let value = match value {
+            Value::Real(value) => Some(Plain::Real(*value)),
+            Value::Integer(value) => Some(Plain::Integer(*value)),
+            Value::Text(value) => Some(Plain::Text(value)),
+            Value::Unknown => None,
+        };
+        Self { name, value }
+    }
+
+    fn shown(&self) -> String {
+        match self.value {
+            Some(Plain::Real(value)) => format!("{value:?}"),
+            Some(Plain::Integer(value)) => value.to_string(),
+            Some(Plain::Text(value)) => format!("\"{value}\""),
+            None => "(not known)".into(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -75,6 +113,7 @@ impl<'a> DeckReport<'a> {
             contacts: interfaces(&deck.contacts),
             rigid_walls: interfaces(&deck.rigid_walls),
             parts: named(&deck.parts),
+            parameters: deck.parameters.iter().map(|(n, v)| Parameter::of(n, v)).collect(),
             includes: deck
                 .includes
                 .iter()
@@ -114,6 +153,13 @@ impl<'a> DeckReport<'a> {
         list(out, "contacts", &self.contacts)?;
         list(out, "walls", &self.rigid_walls)?;
         list(out, "parts", &self.parts)?;
+        if !self.parameters.is_empty() {
+            writeln!(out, "  parameters  {}", self.parameters.len())?;
+        }
+        for parameter in self.parameters.iter().take(SHOWN) {
+            writeln!(out, "    {} = {}", parameter.name, parameter.shown())?;
+        }
+        rest(out, self.parameters.len())?;
         for include in &self.includes {
             let missing = if include.found { "" } else { "  (not found)" };
             writeln!(out, "  include     {}{missing}", include.name)?;
@@ -134,8 +180,13 @@ fn list(out: &mut dyn Write, what: &str, entries: &[Entry<'_>]) -> io::Result<()
         let id = entry.id.map_or("(no id)".to_string(), |id| id.to_string());
         writeln!(out, "    {id}{}", entry.title.map_or(String::new(), |t| format!("  {t}")))?;
     }
-    if entries.len() > SHOWN {
-        writeln!(out, "    … and {} more (--json lists all)", entries.len() - SHOWN)?;
+    rest(out, entries.len())
+}
+
+/// Says how many of so many entries were not printed.
+fn rest(out: &mut dyn Write, entries: usize) -> io::Result<()> {
+    match entries.checked_sub(SHOWN) {
+        Some(more @ 1..) => writeln!(out, "    … and {more} more (--json lists all)"),
+        _ => Ok(()),
     }
-    Ok(())
 }

@@ -112,11 +112,12 @@ impl Target {
 /// A `time` column and one column per history, with enough digits to read back the same
 /// numbers.
 fn write_csv(out: &mut dyn Write, file: &SolverFile) -> io::Result<()> {
-    write!(out, "time")?;
-    for history in &file.histories {
-        write!(out, ",{}", history.label())?;
-    }
-    writeln!(out)?;
+    // Names may hold commas and quotes, numbers cannot.
+    let names = file.histories.iter().map(History::label);
+    let mut header = csv::Writer::from_writer(&mut *out);
+    header.write_record(std::iter::once("time".to_string()).chain(names))?;
+    header.flush()?;
+    drop(header);
     let mut digits = zmij::Buffer::new();
     for (state, time) in file.time.iter().enumerate() {
         out.write_all(digits.format(*time).as_bytes())?;

@@ -1,5 +1,6 @@
 //! Histories as HDF5: one dataset per component, states by entities.
 
+use std::collections::HashSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 use super::DatabaseError;
 use super::skeleton::{Skeleton, write_all_at};
 use crate::file::{WriteError, write_at, write_whole};
-use crate::history::{EntityId, History};
+use crate::history::{EntityId, History, Side};
 use crate::solver::{self, Blocks, ReadError, Selection, SolverFile};
 
 /// Why a solver's file could not be converted.
@@ -61,7 +62,8 @@ pub fn convert_histories(
 /// `/time` holds one time per state; `/<component>` has the shape states × entities (or
 /// states, for a global quantity) and the attribute `ids`, for interfaces also `sides`.
 /// Of more than 8 000 entities, which no attribute holds, the ids are the dataset
-/// `/ids/<component>`.
+/// `/ids/<component>` and the sides `/sides/<component>`. A component whose name cannot be a
+/// dataset's has `_` in it, and its own name in the attribute `component`.
 pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
     let mut out = builder(file);
     let mut components: Vec<&Arc<str>> = Vec::new();
@@ -71,10 +73,15 @@ pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
         }
     }
     let mut long = Vec::new();
+    let mut names = Names::default();
     for component in components {
         let channels: Vec<&History> =
             file.histories.iter().filter(|h| h.component == *component).collect();
-        let dataset = out.create_dataset(component);
+        let name = names.of(component);
+        let dataset = out.create_dataset(&name);
+        if *name != **component {
+            dataset.set_attr("component", AttrValue::String(component.to_string()));
+        }
         let entities: Vec<EntityId> = channels.iter().filter_map(|h| h.entity).collect();
         if entities.is_empty() {
             dataset.with_f64_data(&channels[0].values);
@@ -86,10 +93,10 @@ pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
         }
         dataset.with_f64_data(&rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
         if !describe(dataset, &entities) {
-            long.push((component.to_string(), entities));
+            long.push((name, entities));
         }
     }
-    long_ids(&mut out, &long);
+    long_ids(&mut out, &long)?;
     out.finish().map_err(encode)
 }
 
@@ -107,7 +114,7 @@ fn builder(file: &SolverFile) -> FileBuilder {
             out.set_attr(name, AttrValue::String(value.clone()));
         }
     }
-    out.create_dataset("time").with_f64_data(&file.time);
+    out.create_dataset(TIME).with_f64_data(&file.time);
     out
 }
 
@@ -120,24 +127,63 @@ fn describe(dataset: &mut DatasetBuilder, entities: &[EntityId]) -> bool {
         return false;
     }
     dataset.set_attr("ids", AttrValue::I64Array(entities.iter().map(|e| e.id).collect()));
-    let sides: Vec<String> =
-        entities.iter().filter_map(|e| e.side).map(|s| s.name().to_string()).collect();
-    if sides.len() == entities.len() {
+    if let Some(sides) = sides(entities) {
+        let sides = sides.into_iter().map(String::from).collect();
         dataset.set_attr("sides", AttrValue::StringArray(sides));
     }
     true
 }
 
-fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) {
+/// Names of the sides, if all entities have one.
+fn sides(entities: &[EntityId]) -> Option<Vec<&'static str>> {
+    entities.iter().map(|e| e.side.map(Side::name)).collect()
+}
+
+/// Writes the entities that no attribute holds.
+fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) -> Result<(), DatabaseError> {
     if long.is_empty() {
-        return;
+        return Ok(());
     }
-    let mut group = out.create_group("ids");
-    for (component, entities) in long {
+    let mut group = out.create_group(IDS);
+    for (name, entities) in long {
         let ids: Vec<i64> = entities.iter().map(|e| e.id).collect();
-        group.create_dataset(component).with_i64_data(&ids);
+        group.create_dataset(name).with_i64_data(&ids);
     }
     out.add_group(group.finish());
+    let with_sides: Vec<_> =
+        long.iter().filter_map(|(name, entities)| Some((name, sides(entities)?))).collect();
+    if with_sides.is_empty() {
+        return Ok(());
+    }
+    let mut group = out.create_group(SIDES);
+    for (name, sides) in with_sides {
+        let encode = |error| DatabaseError::Encode { detail: format!("{error}") };
+        group.create_dataset(name).with_ascii_strings(&sides).map_err(encode)?;
+    }
+    out.add_group(group.finish());
+    Ok(())
+}
+
+const TIME: &str = "time";
+const IDS: &str = "ids";
+const SIDES: &str = "sides";
+
+/// Gives components names that datasets can have, each another.
+#[derive(Default)]
+struct Names {
+    taken: HashSet<String>,
+}
+
+impl Names {
+    /// A dataset's name has no `/`, which would be a path, and is no name of this layout.
+    fn of(&mut self, component: &str) -> String {
+        let mut name = component.replace(['/', '\0'], "_");
+        while matches!(&*name, "" | "." | TIME | IDS | SIDES) || self.taken.contains(&name) {
+            name.push('_');
+        }
+        self.taken.insert(name.clone());
+        name
+    }
 }
 
 /// States that are handed on together, so that writes are not too short; of states with
@@ -158,7 +204,7 @@ fn stream(input: &Path, blocks: Blocks, output: &Path) -> Result<Option<SolverFi
             long.push((column.component.clone(), column.entities.clone()));
         }
     }
-    long_ids(&mut out, &long);
+    long_ids(&mut out, &long)?;
     let failed_read = |source| ReadError::Io { path: PathBuf::from(input), source };
     let mut read_error = None;
     let written = write_at(output, |file| {

@@ -6,11 +6,12 @@ use super::problem::{Place, ProblemCode, Problems};
 /// last writing. A single state whose time is before its neighbours' stays where the file has
 /// it, and is named.
 ///
-/// `repeats`: whether a state with the time of the one above it is that state again.
+/// `is_same`: whether a state is written again by another of its time below it; `None` if the
+/// file does not tell.
 /// `place`: where a state begins.
 pub fn resolve(
     time: &[f64],
-    repeats: impl Fn(usize) -> bool,
+    is_same: impl Fn(usize, usize) -> Option<bool>,
     place: impl Fn(usize) -> Option<Place>,
     of: &str,
     problems: &mut Problems,
@@ -18,7 +19,7 @@ pub fn resolve(
     let mut kept: Vec<usize> = Vec::with_capacity(time.len());
     for i in 0..time.len() {
         let goes_back = i > 0 && time[i] < time[i - 1];
-        let again = i > 0 && time[i] == time[i - 1] && repeats(i);
+        let again = i > 0 && time[i] == time[i - 1] && is_same(i - 1, i) == Some(true);
         let is_single = time.get(i + 1).is_none_or(|&next| i > 0 && next > time[i - 1]);
         if goes_back && is_single {
             let message = format!(
@@ -28,7 +29,12 @@ pub fn resolve(
             );
             problems.add(ProblemCode::TimeGoesBack, place(i), None, message);
         } else if goes_back || again {
-            let from = kept.iter().rposition(|&k| time[k] < time[i]).map_or(0, |k| k + 1);
+            // Where time goes back, a restart may count its cycles anew.
+            let stays = |k: usize| {
+                let is_other = || again && is_same(k, i) == Some(false);
+                time[k] < time[i] || time[k] == time[i] && is_other()
+            };
+            let from = kept.iter().rposition(|&k| stays(k)).map_or(0, |k| k + 1);
             let left_out = kept.split_off(from);
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
                 let message = format!(

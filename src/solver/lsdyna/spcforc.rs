@@ -1,5 +1,6 @@
 //! `spcforc`: forces and moments of single point constraints, and their resultant.
 
+use std::collections::HashMap;
 use std::io;
 
 use super::ascii::{self, Body};
@@ -21,6 +22,8 @@ const RESULTANT: &[u8] = b"force resultants   =";
 const WIDTH: usize = 14;
 const SET_ID: &[u8] = b"  setid=";
 const SET_ID_WIDTH: usize = 8;
+/// Sets of constraints that a node may be in.
+const MAX_SETS: usize = 20;
 
 pub fn signature(line: &[u8]) -> bool {
     line.trim_ascii() == HEADING || line.starts_with(STATE)
@@ -30,9 +33,16 @@ pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile
     ascii::read("spcforc", source, selection, Spcforc::default)
 }
 
+/// Forces and moments.
+const COMPONENTS: [[&str; 3]; 2] =
+    [["x_force", "y_force", "z_force"], ["x_moment", "y_moment", "z_moment"]];
+
 #[derive(Default)]
 struct Spcforc {
-    tables: Option<[TableId; 2]>,
+    /// Tables of the nodes' first forces and moments, of their second …
+    tables: Vec<[TableId; 2]>,
+    /// Rows of each node in the pending state: one for each set of constraints it is in.
+    rows: HashMap<i64, [usize; 2]>,
     /// Whether rows end with the id of a set: then a row without it is cut.
     has_set_ids: bool,
 }
@@ -47,6 +57,7 @@ impl Body for Spcforc {
             return;
         }
         if let Some(rest) = line.text.strip_prefix(STATE) {
+            self.rows.clear();
             super::begin_at(rest, TIME_WIDTH, line, states);
         } else if self.values(line, states).is_none() {
             let found = shown(line.columns(1, 40));
@@ -64,20 +75,14 @@ impl Body for Spcforc {
 impl Spcforc {
     fn values(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
-        let [forces, moments] = *self.tables.get_or_insert_with(|| {
-            [
-                states.table("nodes' forces", &["x_force", "y_force", "z_force"]),
-                states.table("nodes' moments", &["x_moment", "y_moment", "z_moment"]),
-            ]
-        });
-        let labels = [(FORCES, Some(forces)), (MOMENTS, Some(moments)), (RESULTANT, None)];
-        let (at, label, table) = labels.into_iter().find_map(|(label, table)| {
-            memchr::memmem::find(text, label).map(|at| (at, label, table))
+        let labels = [(FORCES, Some(0)), (MOMENTS, Some(1)), (RESULTANT, None)];
+        let (at, label, kind) = labels.into_iter().find_map(|(label, kind)| {
+            memchr::memmem::find(text, label).map(|at| (at, label, kind))
         })?;
         let from = at + label.len();
         let end = from + 3 * WIDTH;
         let field = |k: usize| (from + k * WIDTH + 1, from + (k + 1) * WIDTH);
-        let Some(table) = table else {
+        let Some(kind) = kind else {
             let is_alone = text[..at].trim_ascii().is_empty();
             (text.len() == end && is_alone).then_some(())?;
             for (k, name) in ["x_resultant", "y_resultant", "z_resultant"].iter().enumerate() {
@@ -96,7 +101,31 @@ impl Spcforc {
         }
         // The width of the node's field is 6 or 8 by release.
         let id = integer(text[..at].strip_prefix(NODE)?)?;
+        let count = &mut self.rows.entry(id).or_default()[kind];
+        *count += 1;
+        let row = *count;
+        let table = self.table(row, kind, states)?;
         states.row(table, EntityId::new(id), line, |k| Some(field(k)));
         Some(())
+    }
+
+    /// The table of the nodes' `row`-th forces or moments. `None` if there are too many.
+    fn table(&mut self, row: usize, kind: usize, states: &mut States<'_>) -> Option<TableId> {
+        if row > MAX_SETS {
+            return None;
+        }
+        while self.tables.len() < row {
+            // A node's second x force is its `x_force_2`.
+            let suffix = match self.tables.len() {
+                0 => String::new(),
+                others => format!("_{}", others + 1),
+            };
+            let [forces, moments] = COMPONENTS.map(|names| names.map(|n| format!("{n}{suffix}")));
+            self.tables.push([
+                states.table("nodes' forces", &forces.each_ref().map(String::as_str)),
+                states.table("nodes' moments", &moments.each_ref().map(String::as_str)),
+            ]);
+        }
+        Some(self.tables[row - 1][kind])
     }
 }

@@ -7,11 +7,10 @@ impl States<'_> {
     pub(super) fn resolve_restarts(&mut self) {
         let cycles = &self.cycles;
         // Times have few digits: only a cycle that does not rise tells the same state.
-        let repeats =
-            |i: usize| cycles[i].zip(cycles[i - 1]).is_some_and(|(now, above)| now <= above);
+        let is_same = |above: usize, below: usize| Some(cycles[below]? <= cycles[above]?);
         let places = &self.places;
         let place = |i: usize| places.get(i).copied();
-        let kept = restart::resolve(&self.time, repeats, place, "", &mut self.problems);
+        let kept = restart::resolve(&self.time, is_same, place, "", &mut self.problems);
         if kept.len() == self.time.len() {
             return;
         }

@@ -299,7 +299,7 @@ impl<'a> Reader<'a> {
         }
         let of = format!("{}: ", section.name);
         let place = |i: usize| place_of(section, whole[i]);
-        let kept = restart::resolve(&time, |_| true, place, &of, problems);
+        let kept = restart::resolve(&time, |_, _| Some(true), place, &of, problems);
         time = kept.iter().map(|&i| time[i]).collect();
         whole = kept.iter().map(|&i| whole[i]).collect();
         self.leave_out_other_lists(section, &mut whole, &mut time, problems)?;
