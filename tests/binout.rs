@@ -332,6 +332,36 @@ fn ids_hold_until_others_are_written() {
     }
 }
 
+/// A node in two sets of constraints has two rows in a state.
+#[test]
+fn constraints_of_a_node_in_two_sets() {
+    let mut out = Written::new();
+    out.ids("spcforc", &[1, 2, 1]);
+    for state in 1..=2 {
+        out.cd(&format!("/spcforc/d{state:06}"));
+        out.reals("time", &[f64::from(state)]);
+        out.reals("x_force", &[1.0, 2.0, 3.0]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    fs::write(&path, out.bytes).unwrap();
+    let file = section(&path, "spcforc");
+    assert_eq!(file.problems, []);
+    let of = |id: i64, component: &str| {
+        file.history(Some(EntityId::new(id)), component).map(|h| h.values.clone())
+    };
+    assert_eq!(of(1, "x_force"), Some(vec![1.0; 2]));
+    assert_eq!(of(1, "x_force_2"), Some(vec![3.0; 2]));
+    assert_eq!(of(2, "x_force"), Some(vec![2.0; 2]));
+    assert_eq!(of(2, "x_force_2"), None);
+    let selection = Selection {
+        components: Some(vec!["x_force_2".into()]),
+        section: Some("spcforc".into()),
+        ..Selection::all()
+    };
+    assert_eq!(read(&path, None, &selection).unwrap().histories.len(), 1);
+}
+
 /// A study of one bundled run, with the given files in its folder.
 fn study(folder: &Path, files: &[(&str, Vec<u8>)]) -> PathBuf {
     let text = fs::read_to_string(fixture("fe/lead-car-wall/study.toml")).unwrap();

@@ -43,6 +43,9 @@ struct States {
     ids: Option<Vec<Vec<i64>>>,
 }
 
+/// Rows of one entity whose names are listed.
+const MAX_ROWS: usize = 20;
+
 /// Whom the values of a component belong to.
 #[derive(Clone)]
 enum Owners {
@@ -136,9 +139,14 @@ impl<'a> Reader<'a> {
                     0 => component.name.clone(),
                     _ => format!("{}_ip{}", component.name, point + 1).into(),
                 };
-                components.push(name.clone());
+                let rows = rows_of_one(owners.entities()).into_iter().zip(owners.entities());
+                let rows = rows.filter(|(_, id)| !is_lost(section, id.id)).map(|(row, _)| row);
+                let rows = rows.max().unwrap_or(1).min(MAX_ROWS);
+                let names: Vec<Arc<str>> = (1..=rows).map(|row| row_name(&name, row)).collect();
                 let audited = self.selection.audit && component.is_real();
-                if audited || self.selection.wants_component(&name) {
+                let is_wanted = names.iter().any(|name| self.selection.wants_component(name));
+                components.extend(names);
+                if audited || is_wanted {
                     wanted.push((component, name, owners.clone(), (points > 1).then_some(point)));
                 }
             }
@@ -562,9 +570,10 @@ impl<'a> Reader<'a> {
             );
             problems.add(ProblemCode::NotFinite, None, None, message);
         }
-        let history = |((_, entity), values): ((usize, Option<EntityId>), Vec<f64>)| History {
+        let rows = rows_of_one(owners.entities());
+        let history = |((k, entity), values): ((usize, Option<EntityId>), Vec<f64>)| History {
             entity,
-            component: name.clone(),
+            component: rows.get(k).map_or_else(|| name.clone(), |&row| row_name(name, row)),
             time: states.time.clone(),
             values,
         };
@@ -628,4 +637,27 @@ fn is_not_result(name: &str) -> bool {
 /// nothing where there is one entity.
 fn is_total(name: &str) -> bool {
     name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")
+}
+
+/// For each row of a state, the how-manieth of its entity it is: a node in two sets of
+/// constraints has two. Empty if every entity has one.
+fn rows_of_one(entities: &[EntityId]) -> Vec<usize> {
+    if entities.windows(2).all(|pair| pair[0].id < pair[1].id) {
+        return Vec::new();
+    }
+    let mut seen: HashMap<EntityId, usize> = HashMap::new();
+    let rows: Vec<usize> = entities
+        .iter()
+        .map(|&entity| {
+            let count = seen.entry(entity).or_default();
+            *count += 1;
+            *count
+        })
+        .collect();
+    if seen.len() == entities.len() { Vec::new() } else { rows }
+}
+
+/// The name of the values of an entity's `row`-th row, as in the text files.
+fn row_name(component: &Arc<str>, row: usize) -> Arc<str> {
+    if row > 1 { format!("{component}_{row}").into() } else { component.clone() }
 }
