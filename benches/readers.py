@@ -6,6 +6,7 @@ shared and noisy: compare ratios, not times.
 """
 
 import ctypes
+import json
 import mmap
 import os
 import subprocess
@@ -40,7 +41,8 @@ class Run:
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
             raise RuntimeError(f"{arguments} failed")
-        self.wall = time.perf_counter() - start
+        # Of a reading that is only a part of its process there is none.
+        self.wall = None if cpu else time.perf_counter() - start
         self.cpu = usage.ru_utime + usage.ru_stime if cpu is None else cpu(self.output)
         self.memory = usage.ru_maxrss / 1024
 
@@ -57,6 +59,21 @@ def crumple(program, *arguments, output=None):
         return Run(program, *arguments)
 
     return run
+
+
+def library():
+    """Reads a file into memory with crumple, in a process of its own."""
+    built = subprocess.run(
+        ["cargo", "bench", "--locked", "--bench", "readers", "--no-run", "--message-format", "json"],
+        check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    messages = [json.loads(line) for line in built.stdout.splitlines() if line.startswith("{")]
+    program = next(m["executable"] for m in messages
+                   if m.get("executable") and m["target"]["name"] == "readers")
+
+    def smallest(output):
+        return min(float(line.split()[0]) for line in output.splitlines())
+
+    return lambda *arguments: lambda: Run(program, *arguments, cpu=smallest)
 
 
 def pages(path, arguments):
@@ -88,10 +105,12 @@ def best(runs):
 
 
 def table(title, reference, results):
-    print(f"\n{title}\n{'':42} {'CPU':>9} {'ratio':>8} {'wall':>9} {'memory':>9}")
+    """Peak memory is that of the whole process, with the mapped pages of the file."""
+    print(f"\n{title}\n{'':42} {'CPU':>9} {'ratio':>8} {'memory':>9} {'wall':>9}")
     for name, run in results.items():
         ratio = run.cpu / results[reference].cpu
-        print(f"{name:42} {run.cpu:7.3f} s {ratio:7.2f}x {run.wall:7.3f} s {run.memory:5.0f} MiB")
+        wall = f"{run.wall:7.3f} s" if run.wall is not None else f"{'-':>9}"
+        print(f"{name:42} {run.cpu:7.3f} s {ratio:7.2f}x {run.memory:5.0f} MiB {wall}")
 
 
 def main(folder, program):
@@ -122,23 +141,12 @@ def main(folder, program):
     pandas = python(
         "import pandas as pd",
         f"pd.read_fwf({small!r}, colspecs={wide!r}, header=None, skiprows=2)", repeat=1)
-    bench = subprocess.run(
-        ["cargo", "bench", "--locked", "--bench", "readers", "--", os.path.abspath(small)],
-        check=True, capture_output=True, text=True)
-    ours = min(float(line.split()[0]) for line in bench.stdout.splitlines() if line[:1].isdigit())
-
-    def in_memory(seconds):
-        return lambda: Run("true", cpu=lambda _: seconds)
-
+    read = library()
     table("nodout, 5 000 nodes x 40 states, 31 MB, into memory", "crumple", best({
-        "crumple": in_memory(ours), "polars: slices of lines": polars, "pandas.read_fwf": pandas}))
+        "crumple": read(small), "polars: slices of lines": polars, "pandas.read_fwf": pandas}))
 
-    bench = subprocess.run(
-        ["cargo", "bench", "--locked", "--bench", "readers", "--", os.path.abspath(binout), "nodout"],
-        check=True, capture_output=True, text=True)
-    ours = min(float(line.split()[0]) for line in bench.stdout.splitlines() if line[:1].isdigit())
     table("binout, the same values in single precision, 96 MB, 12 channels into memory", "dynars", best({
-        "crumple": in_memory(ours),
+        "crumple": read(binout, "nodout"),
         "dynars": python("from dynars import Binout",
                          f"b = Binout({binout!r}); r = [b.read('nodout', n) for n in {COMPONENTS!r}]; del b, r", 5),
         "lasso-python": python("from lasso.dyna import Binout",
