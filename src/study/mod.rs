@@ -1,7 +1,8 @@
 //! Study manifest: which runs there are, and how each becomes a case.
 
+mod located;
+
 use std::collections::HashSet;
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
 use crate::unit::{ImpactSpeedText, MassText, SpeedKind, UnitSystem, km_per_h};
+use located::{Located, compare_twin, hashed_family, locate_file, shown_name};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
 const EXTRACTION_VERSION: u32 = 2;
@@ -102,20 +104,6 @@ pub enum RunError {
         "the manifest gives no units and {why}: add units = \"mm-t-s\" (or what they are) to [study]"
     )]
     NoUnits { why: String },
-}
-
-/// A source file of a run before it is read.
-#[derive(Clone, Debug, PartialEq)]
-struct Located {
-    /// As written in the recipe.
-    file: String,
-    path: PathBuf,
-    /// Section of a binary file; `None` for a text file.
-    section: Option<String>,
-    /// A binary file beside the text file that has the same section.
-    twin: Option<(PathBuf, String)>,
-    size_bytes: u64,
-    blake3: String,
 }
 
 /// The deck of a run, if there is one to use, and notes about its choice.
@@ -576,159 +564,8 @@ fn force_component(force: &ForceSource) -> &str {
     }
 }
 
-/// Finds the file a recipe names: the text file of that name, or the section of a binout
-/// or of an OpenRadioss T01.
-fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
-    let text = folder.join(name);
-    let names = file_names(folder)?;
-    let names_only = Selection { audit: false, ..Selection::nothing() };
-    let (mut binout, mut damaged) = (None, None);
-    let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
-    for part in names.iter().filter(is_binary) {
-        let path = folder.join(part);
-        let sections = match solver::read_sections(&path, None, &names_only) {
-            Ok(sections) => sections,
-            // Only named like one; or broken, which matters where the text is not there.
-            Err(ReadError::UnknownFormat { .. }) => continue,
-            Err(_) if text.is_file() => continue,
-            Err(error) => return Err(error.into()),
-        };
-        let states: usize = sections.iter().map(|s| s.time.len()).sum();
-        if let Some(problem) = sections.iter().find_map(|s| s.problems.first())
-            && states == 0
-            && damaged.is_none()
-        {
-            damaged = Some(format!("{part} is damaged ({problem})"));
-        }
-        if let Some(section) = sections.iter().find(|s| is_section_of(&s.section, name)) {
-            binout = Some((path, section.section.clone()));
-            break;
-        }
-    }
-    let (path, section, twin) = match (text.is_file(), binout) {
-        (true, twin) => (text, None, twin),
-        (false, Some((path, section))) => (path, Some(section), None),
-        (false, None) => {
-            let mut found = if names.is_empty() { "no files".into() } else { names.join(", ") };
-            if let Some(damaged) = damaged {
-                found = format!("{found}; {damaged}");
-            }
-            return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
-        }
-    };
-    let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
-    Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
-}
-
-/// A file with the size and hash of all its parts.
-fn hashed_family(name: &str, path: PathBuf, parts: &[PathBuf]) -> Result<Located, RunError> {
-    let mut hasher = blake3::Hasher::new();
-    for part in parts {
-        let io = |source| RunError::Io { path: part.clone(), source };
-        let file = File::open(part).map_err(io)?;
-        hasher.update_reader(file).map_err(io)?;
-    }
-    Ok(Located {
-        file: name.into(),
-        size_bytes: hasher.count(),
-        blake3: hasher.finalize().to_hex().to_string(),
-        path,
-        section: None,
-        twin: None,
-    })
-}
-
 /// Declared speeds may differ by this share before a warning is due.
 const SAME_SPEED: f64 = 0.01;
-
-fn shown_name(path: &Path) -> String {
-    path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned())
-}
-
-/// Whether a binout's section holds what the text file of that name holds.
-fn is_section_of(section: &str, name: &str) -> bool {
-    section == name || section.strip_prefix(name).is_some_and(|rest| rest == "/forces")
-}
-
-/// Names in a run's folder, in order.
-fn file_names(folder: &Path) -> Result<Vec<String>, RunError> {
-    let entries =
-        folder.read_dir().map_err(|source| RunError::Io { path: folder.into(), source })?;
-    let mut names: Vec<String> = entries
-        .filter_map(Result::ok)
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .take(1_000)
-        .collect();
-    names.sort();
-    Ok(names)
-}
-
-/// Text and binary of one run agree up to the text's digits.
-const SAME_VALUE: f64 = 1e-5;
-
-/// Says which of text file and binout was read, and whether they differ.
-fn compare_twin(
-    file: &Located,
-    read: &SolverFile,
-    notes: &mut Vec<String>,
-    warnings: &mut Vec<String>,
-) {
-    if let Some(section) = &file.section {
-        notes.push(format!(
-            "{}: read from section {section} of {}",
-            file.file,
-            shown_name(&file.path)
-        ));
-    }
-    let Some((path, section)) = &file.twin else { return };
-    let ids = read.histories.iter().filter_map(|h| h.entity);
-    let selection = Selection {
-        ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
-        components: Some(read.histories.iter().map(|h| h.component.to_string()).collect()),
-        section: Some(section.clone()),
-        ..Selection::all()
-    };
-    let twin = match solver::read(path, None, &selection) {
-        Ok(twin) => twin,
-        Err(error) => {
-            warnings.push(format!(
-                "{}: the binary file beside it cannot be compared: {error}",
-                file.file
-            ));
-            return;
-        }
-    };
-    // A number that is not there must not be there in the other either.
-    let differ = |a: f64, b: f64, largest: f64| {
-        let unlike = (a - b).abs() > SAME_VALUE * largest;
-        unlike || a.is_finite() != b.is_finite()
-    };
-    let largest = |values: &[f64]| {
-        values.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()))
-    };
-    let differing = |a: &[f64], b: &[f64]| {
-        let largest = largest(a);
-        a.len() != b.len() || a.iter().zip(b).any(|(a, b)| differ(*a, *b, largest))
-    };
-    let differs = differing(&read.time, &twin.time)
-        || read.histories.iter().any(|a| {
-            let Some(b) = twin.history(a.entity, &a.component) else { return true };
-            differing(&a.values, &b.values)
-        });
-    if differs {
-        warnings.push(format!(
-            "{} and section {section} of {} differ; the text file was used",
-            file.file,
-            shown_name(path)
-        ));
-    } else {
-        notes.push(format!(
-            "{}: section {section} of {} agrees with it",
-            file.file,
-            shown_name(path)
-        ));
-    }
-}
 
 /// Displacements and, where the file has them, velocities of the recipe's nodes.
 fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {
