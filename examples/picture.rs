@@ -1,5 +1,5 @@
-//! Draws the picture of the README: the FE curves of the bundled runs and the forest's
-//! curve at a speed between them, as SVG on standard output.
+//! Draws the picture of the README: the FE curves of the bundled runs, and the predicted
+//! curve with its band at a speed between them, as SVG on standard output.
 //!
 //!     cargo run --example picture > examples/picture.svg
 
@@ -8,10 +8,9 @@ use std::path::Path;
 
 use crumple::build::build;
 use crumple::dataset::TrainingSet;
-use crumple::surrogate::forest::ForestOptions;
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{Model, Options, Query, predict};
+use crumple::surrogate::{Query, predict};
 use crumple::unit::km_per_h;
+use crumple::validate::{Choice, train};
 
 const GROUP: &str = "lead-car-wall";
 const SPEED_M_PER_S: f64 = 50.0 / 3.6;
@@ -26,10 +25,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(GROUP);
     let report = build(&study.join("study.toml"), &folder.path().join("curves.h5"), |_| {})?;
-    let set = TrainingSet::new(GROUP, report.database.cases(GROUP))?;
-    let model = Model::fit_only(&set, Options::Forest(ForestOptions::default()))?;
-    let rule = MaxCrushRule::Monotone;
-    let curve = predict(&model, &Query { speed_m_per_s: SPEED_M_PER_S, mass_kg: None, rule })?;
+    let cases = report.database.cases(GROUP);
+    let set = TrainingSet::new(GROUP, cases)?;
+    let model = train(GROUP, cases, Choice::Auto { seed: 0 })?;
+    let curve = predict(&model, &Query::at(SPEED_M_PER_S))?;
 
     let [left, top, width, height] = AREA;
     let (right, bottom) = (left + width, top + height);
@@ -51,27 +50,34 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!(
         r#"<text x="16" y="180" transform="rotate(-90 16 180)" text-anchor="middle">force [MN]</text>"#
     );
+    if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
+        let there = curve.deflection_m.iter().zip(high);
+        let back = curve.deflection_m.iter().zip(low).rev();
+        let outline: Vec<String> = there.chain(back).map(|(&d, &f)| point(d, f)).collect();
+        println!(r##"<path d="M{}Z" fill="#d94801" fill-opacity="0.15"/>"##, outline.join("L"));
+    }
     for (k, case) in set.cases.iter().enumerate() {
         let envelope = &case.envelope;
         line(envelope.deflection_m(), envelope.force_n(), COLOURS[k % COLOURS.len()], 1.5);
         legend(k, COLOURS[k % COLOURS.len()], &format!("FE at {}", km_per_h(case.speed_m_per_s)));
     }
     line(&curve.deflection_m, &curve.force_n, "#d94801", 2.5);
-    legend(set.cases.len(), "#d94801", &format!("forest at {}", km_per_h(SPEED_M_PER_S)));
+    legend(set.cases.len(), "#d94801", &format!("{} at {}", curve.model, km_per_h(SPEED_M_PER_S)));
     println!("</svg>");
     Ok(())
 }
 
-fn line(deflection_m: &[f64], force_n: &[f64], colour: &str, thickness: f64) {
+/// Place of a point of a curve in the picture.
+fn point(deflection_m: f64, force_n: f64) -> String {
     let [left, top, width, height] = AREA;
-    let points: Vec<String> = deflection_m
-        .iter()
-        .zip(force_n)
-        .map(|(d, f)| {
-            let (x, y) = (left + width * d / END_M, top + height * (1.0 - f / 1e6 / END_MN));
-            format!("{x:.1},{y:.1}")
-        })
-        .collect();
+    let x = left + width * deflection_m / END_M;
+    let y = top + height * (1.0 - force_n / 1e6 / END_MN).max(0.0);
+    format!("{x:.1},{y:.1}")
+}
+
+fn line(deflection_m: &[f64], force_n: &[f64], colour: &str, thickness: f64) {
+    let points: Vec<String> =
+        deflection_m.iter().zip(force_n).map(|(&d, &f)| point(d, f)).collect();
     println!(
         r#"<polyline fill="none" stroke="{colour}" stroke-width="{thickness}" points="{}"/>"#,
         points.join(" ")

@@ -5,23 +5,16 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::curve::rating::l1_ratio;
-use crate::curve::resample::interpolate;
 use crate::curve::{Case, Envelope, EnvelopeError};
-use crate::dataset::{DatasetError, TrainingSet, nearest};
-use crate::history::derivative;
-use crate::multibody::integrator::DEFAULT_STEP_S;
-use crate::multibody::{
-    Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
-    Unloading, simulate,
-};
+use crate::dataset::{DatasetError, TrainingCase, TrainingSet, nearest};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
-use crate::surrogate::{Model, ModelError, Options, Query, leave_one_out, predict};
+use crate::surrogate::{Model, ModelError, Options, Query, predict};
 use crate::unit::{SpeedKind, km_per_h};
+use crate::validate::motion::{Driver, MotionError, Reference};
+use crate::validate::{self, Choice, ValidateError};
 
-/// The comparison ends this long after FE's largest deflection, so that rebound counts.
-const AFTER_MAX_CRUSH_S: f64 = 0.030;
 /// A speed names a case if it is within this share of the case's.
 const SAME_SPEED: f64 = 1e-3;
 
@@ -47,13 +40,17 @@ pub struct Comparison {
 /// One method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// `fe` (FE's own curve: the floor of a one-mass model), `fdrm`, `ddtcm`.
+    /// `fe` and `fe_body` (FE's own curves, of the recipe's force and of the body's: the floors
+    /// of a one-mass model), `fdrm`, `ddtcm`, `best` (the model that validation chooses).
     pub method: &'static str,
     /// What its curve was made from.
     pub curve: String,
     pub velocity_l1: f64,
+    /// Accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
-    /// Force of the curve along FE's crush.
+    /// Accelerations as central differences, not filtered.
+    pub acceleration_unfiltered_l1: f64,
+    /// Force of the method's curve along FE's crush, of the same kind of force.
     pub force_l1: f64,
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
@@ -78,13 +75,11 @@ pub enum CompareError {
     #[error(transparent)]
     Predict(#[from] PredictError),
     #[error(transparent)]
-    Chain(#[from] ChainError),
+    Validate(#[from] ValidateError),
     #[error(transparent)]
-    Simulation(#[from] SimulationError),
+    Motion(#[from] MotionError),
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    #[error("case \"{case}\": {message}")]
-    Record { case: String, message: String },
 }
 
 /// Compares the methods at `speed_m_per_s`, with that speed's case left out of training.
@@ -114,39 +109,53 @@ pub fn compare(
     if set.cases.len() < 3 {
         return Err(CompareError::TooFew { cases: set.cases.len() });
     }
-    let name = &set.cases[index].name;
-    let case = cases.iter().find(|c| c.name == *name).ok_or(DatasetError::Empty)?;
-    let reference = Reference::of(case)?;
-    let rest = leave_one_out::without(&set, index);
-    let speed = case.speed.m_per_s;
-    let mut rows = Vec::new();
     let own = &set.cases[index];
-    let stiffness = own.unloading_stiffness_n_per_m;
-    let fe = Candidate { envelope: own.envelope.clone(), stiffness, time_s: 0.0 };
-    rows.push(row("fe", format!("FE at {}", km_per_h(speed)), fe, case, &reference)?);
+    let case = cases.iter().find(|c| c.name == own.name).ok_or(DatasetError::Empty)?;
+    let reference = Reference::of(case)?;
+    let rest = set.without(index);
+    let speed = case.speed.m_per_s;
+    let with = |method, curve, candidate| row(method, curve, candidate, &reference);
+    let mut rows = Vec::new();
+    let made_from = format!("FE at {}", km_per_h(speed));
+    rows.push(with("fe", made_from.clone(), Candidate::of_fe(own, &own.envelope, own))?);
+    rows.push(with("fe_body", made_from, Candidate::of_fe(own, &own.motion.force, own))?);
 
     let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
     let nearest = &rest.cases[nearest(speeds, speed)];
-    let fdrm = Candidate {
-        envelope: nearest.envelope.clone(),
-        stiffness: nearest.unloading_stiffness_n_per_m,
-        time_s: 0.0,
-    };
     let made_from = format!("FE at {}", km_per_h(nearest.speed_m_per_s));
-    rows.push(row("fdrm", made_from, fdrm, case, &reference)?);
+    rows.push(with("fdrm", made_from, Candidate::of_fe(nearest, &nearest.envelope, own))?);
 
     let options = Options::Forest(ForestOptions { seed, ..ForestOptions::paper() });
     let start = Instant::now();
-    let model = Model::fit_only(&rest, options)?;
-    let query = Query { speed_m_per_s: speed, mass_kg: None, rule: MaxCrushRule::Spline };
-    let curve = predict(&model, &query)?;
+    let model = Model::fit(&rest, options)?;
+    let curve = predict(&model, &Query::at(speed).with_rule(MaxCrushRule::Spline))?;
     let ddtcm = Candidate {
-        envelope: curve.envelope()?,
-        stiffness: Some(curve.unloading_stiffness_n_per_m),
+        driver: Driver {
+            envelope: curve.envelope()?,
+            stiffness_n_per_m: Some(curve.unloading_stiffness_n_per_m),
+        },
+        truth: &own.envelope,
         time_s: start.elapsed().as_secs_f64(),
     };
-    let made_from = format!("forest on {} speeds", rest.cases.len());
-    rows.push(row("ddtcm", made_from, ddtcm, case, &reference)?);
+    rows.push(with("ddtcm", format!("forest on {} speeds", rest.cases.len()), ddtcm)?);
+
+    let others: Vec<Case> = cases.iter().filter(|c| c.name != own.name).cloned().collect();
+    let start = Instant::now();
+    let model = validate::train(group, &others, Choice::Auto { seed })?;
+    let curve = predict(&model, &Query::at(speed))?;
+    let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
+    let best = Candidate {
+        driver: Driver {
+            envelope: curve.driving_envelope()?,
+            stiffness_n_per_m: rebound.or(Some(curve.unloading_stiffness_n_per_m)),
+        },
+        truth: match curve.body_force_n {
+            Some(_) => &own.motion.force,
+            None => &own.envelope,
+        },
+        time_s: start.elapsed().as_secs_f64(),
+    };
+    rows.push(with("best", format!("{} on {} speeds", curve.model, rest.cases.len()), best)?);
 
     Ok(Comparison {
         group: group.into(),
@@ -155,101 +164,61 @@ pub fn compare(
         speed_kind: case.speed.kind,
         inner: index > 0 && index + 1 < set.cases.len(),
         mass_kg: case.masses.effective_kg(),
-        window_s: reference.time_s[reference.time_s.len() - 1],
+        window_s: reference.window_s(),
         reference_peak_force_n: case.peak_force_n(),
         reference_max_crush_m: case.max_deflection_m(),
         rows,
     })
 }
 
-/// FE's motion over the window of the comparison.
-struct Reference {
-    time_s: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
-    /// FE's loading branch.
-    envelope: Envelope,
-}
-
-impl Reference {
-    fn of(case: &Case) -> Result<Self, CompareError> {
-        let end_s = case.original.time_s()[case.loading_end()] + AFTER_MAX_CRUSH_S;
-        let time_s: Vec<f64> =
-            case.sampled.time_s().iter().copied().take_while(|&t| t <= end_s).collect();
-        if time_s.len() < 3 {
-            let message = format!("only {} states lie in the window", time_s.len());
-            return Err(CompareError::Record { case: case.name.clone(), message });
-        }
-        let velocity = case.closing_speed_m_per_s[..time_s.len()].to_vec();
-        let acceleration = derivative(&time_s, &velocity);
-        Ok(Self { time_s, velocity, acceleration, envelope: case.loading()?.envelope })
-    }
-}
-
-/// A method's curve.
-struct Candidate {
-    envelope: Envelope,
-    stiffness: Option<f64>,
+/// A method's curve, and FE's own of the same kind of force.
+struct Candidate<'a> {
+    driver: Driver,
+    truth: &'a Envelope,
     time_s: f64,
+}
+
+impl<'a> Candidate<'a> {
+    /// A measured curve with its own rebound, held against that of `own`.
+    fn of_fe(from: &TrainingCase, envelope: &Envelope, own: &'a TrainingCase) -> Self {
+        let is_body = *envelope == from.motion.force;
+        Self {
+            driver: Driver::rebounding(
+                envelope.clone(),
+                from.effective_mass_kg,
+                from.motion.rebound_speed_m_per_s,
+                from.unloading_stiffness_n_per_m,
+            ),
+            truth: if is_body { &own.motion.force } else { &own.envelope },
+            time_s: 0.0,
+        }
+    }
 }
 
 fn row(
     method: &'static str,
     curve: String,
-    candidate: Candidate,
-    case: &Case,
+    candidate: Candidate<'_>,
     reference: &Reference,
 ) -> Result<Row, CompareError> {
-    let along = reference.envelope.deflection_m();
-    let force: Vec<f64> = along.iter().map(|&d| candidate.envelope.force_at(d)).collect();
-    let force_l1 = l1_ratio(reference.envelope.force_n(), &force);
+    let truth = candidate.truth;
+    let along = truth.deflection_m();
+    let force: Vec<f64> = along.iter().map(|&d| candidate.driver.envelope.force_at(d)).collect();
+    let force_l1 = l1_ratio(truth.force_n(), &force);
     let start = Instant::now();
-    let run = one_mass(&candidate, case, reference)?;
+    let run = reference.run(&candidate.driver)?;
     let simulation_time_s = start.elapsed().as_secs_f64();
-    let out_of_range = |_| CompareError::Record {
-        case: case.name.clone(),
-        message: "the MB run is shorter than the window".into(),
-    };
-    let velocity = interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &reference.time_s)
-        .map_err(out_of_range)?;
-    let acceleration = derivative(&reference.time_s, &velocity);
+    let errors = reference.errors(&run)?;
     Ok(Row {
         method,
         curve,
-        velocity_l1: l1_ratio(&reference.velocity, &velocity),
-        acceleration_l1: l1_ratio(&reference.acceleration, &acceleration),
+        velocity_l1: errors.velocity_l1,
+        acceleration_l1: errors.acceleration_l1,
+        acceleration_unfiltered_l1: errors.acceleration_unfiltered_l1,
         force_l1,
         peak_force_n: run.interfaces[0].peak_force_n,
         max_crush_m: run.interfaces[0].max_deflection_m,
         curve_time_s: candidate.time_s,
         simulation_time_s,
     })
-}
-
-/// One body of the case's effective mass against a wall, driven by the curve.
-fn one_mass(
-    candidate: &Candidate,
-    case: &Case,
-    reference: &Reference,
-) -> Result<Run, CompareError> {
-    let body = Body {
-        name: "body".into(),
-        mass_kg: case.masses.effective_kg(),
-        speed_m_per_s: case.speed.m_per_s,
-    };
-    let envelope = candidate.envelope.clone();
-    let stiffness_n_per_m = candidate.stiffness.unwrap_or_else(|| envelope.max_slope());
-    let unloading = Unloading::Memory { stiffness_n_per_m };
-    let interface = Interface {
-        name: "body|wall".into(),
-        law: ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold),
-        gap_m: 0.0,
-    };
-    let chain = Chain::new(vec![body], vec![interface])?;
-    let time_s = &reference.time_s;
-    let output_interval_s = time_s[1] - time_s[0];
-    // One output more than the window needs, so that rounding cannot make it too short.
-    let duration_s = time_s[time_s.len() - 1] + 1.5 * output_interval_s;
-    let settings = RunSettings { duration_s, output_interval_s, step_s: DEFAULT_STEP_S };
-    Ok(simulate(&chain, &settings)?)
 }

@@ -1,11 +1,15 @@
-//! Data sets: the cases of a group, checked and made into tables {v, d} → F.
+//! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linfa::Dataset;
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
+use crate::curve::body::{BodyMotion, body_motion};
 use crate::curve::loading::loading_branch;
-use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses};
+use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
 use crate::unit::{SpeedKind, km_per_h};
 
 /// One case as models see it.
@@ -13,26 +17,50 @@ use crate::unit::{SpeedKind, km_per_h};
 pub struct TrainingCase {
     pub name: String,
     pub speed_m_per_s: f64,
+    /// Values of the set's [`features`](TrainingSet::features).
+    pub features: Vec<f64>,
+    /// Mass that moves along the deflection.
+    pub effective_mass_kg: f64,
     /// Loading branch at the solver's rate.
     pub envelope: Envelope,
     /// Loading branch at the common interval, as the reference method uses it.
     pub sampled: Envelope,
+    /// The body's motion, and the force that follows from it.
+    pub motion: BodyMotion,
     pub truncated: bool,
     pub unloading_stiffness_n_per_m: Option<f64>,
     pub fingerprint: String,
 }
 
+/// A column of the table beside speed and deflection: a number, or whether the case is of
+/// a category.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Feature {
+    /// Name of the case parameter.
+    pub parameter: String,
+    /// The category that counts 1; all others count 0. `None` for a number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub category: Option<String>,
+}
+
+/// The parameter that masses become if they differ within a group.
+pub const MASS: &str = "mass_kg";
+/// The mass of the other body of a pair, where it is not that of the first.
+pub const OTHER_MASS: &str = "other_mass_kg";
+
 /// The cases of one group.
 ///
-/// Invariant: at least one case; speeds strictly increasing; one kind of speed and force.
+/// Invariant: at least one case, in order of speed, then features; no two cases equal in
+/// both; one kind of speed and force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingSet {
     pub group: String,
     pub speed_kind: SpeedKind,
     pub force_kind: ForceKind,
-    /// Masses of the first case; [`TrainingSet::equal_masses`] says if all share them.
+    /// Masses of the first case.
     pub masses: Masses,
-    pub equal_masses: bool,
+    /// Further parameters in which the cases differ; what all share is left out.
+    pub features: Vec<Feature>,
     pub cases: Vec<TrainingCase>,
 }
 
@@ -41,12 +69,150 @@ pub struct TrainingSet {
 pub enum DatasetError {
     #[error("the group is empty: build it first")]
     Empty,
-    #[error("cases \"{first}\" and \"{second}\" have the same speed {speed}: keep one of them")]
-    EqualSpeeds { first: String, second: String, speed: String },
+    #[error(
+        "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}: keep one of them{hint}"
+    )]
+    EqualSpeeds {
+        first: String,
+        second: String,
+        speed: String,
+        parameters: &'static str,
+        hint: &'static str,
+    },
     #[error("cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group")]
     Mixed { first: String, second: String, what: &'static str },
+    #[error(
+        "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group"
+    )]
+    NoParameter { parameter: String, with: String, without: String },
+    #[error(
+        "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
+    )]
+    MixedParameter { parameter: String, number: String, category: String },
     #[error("case \"{name}\": {source}")]
     Envelope { name: String, source: EnvelopeError },
+    #[error(
+        "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval"
+    )]
+    NoMotion { name: String },
+    #[error("the model needs {parameter}{among}: give it with the query")]
+    Asked { parameter: String, among: String },
+}
+
+impl Feature {
+    fn value(&self, parameter: &Parameter) -> Option<f64> {
+        match (parameter, &self.category) {
+            (Parameter::Number(value), None) => Some(*value),
+            (Parameter::Category(found), Some(category)) => {
+                Some(if found == category { 1.0 } else { 0.0 })
+            }
+            _ => None,
+        }
+    }
+
+    /// Name of the column: `angle_deg`, `obstacle=pole`.
+    pub fn name(&self) -> String {
+        match &self.category {
+            Some(category) => format!("{}={category}", self.parameter),
+            None => self.parameter.clone(),
+        }
+    }
+}
+
+/// The values of `features` for the parameters of a query.
+///
+/// # Errors
+/// [`DatasetError::Asked`] names what is missing, or the categories there are.
+pub fn feature_values(
+    features: &[Feature],
+    parameters: &BTreeMap<String, Parameter>,
+) -> Result<Vec<f64>, DatasetError> {
+    let asked = |feature: &Feature| {
+        let known: Vec<&str> = features
+            .iter()
+            .filter(|f| f.parameter == feature.parameter)
+            .filter_map(|f| f.category.as_deref())
+            .collect();
+        let among = match known.is_empty() {
+            true => " as a finite number".into(),
+            false => format!(", one of {}", known.join(", ")),
+        };
+        DatasetError::Asked { parameter: feature.parameter.clone(), among }
+    };
+    let is_known = |feature: &Feature, parameter: &Parameter| match parameter {
+        Parameter::Number(v) => feature.category.is_none() && v.is_finite(),
+        Parameter::Category(c) => features
+            .iter()
+            .any(|f| f.parameter == feature.parameter && f.category.as_ref() == Some(c)),
+    };
+    features
+        .iter()
+        .map(|feature| {
+            let parameter = parameters
+                .get(&feature.parameter)
+                .filter(|p| is_known(feature, p))
+                .ok_or_else(|| asked(feature))?;
+            feature.value(parameter).ok_or_else(|| asked(feature))
+        })
+        .collect()
+}
+
+/// The case's parameters, its masses among them.
+fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
+    let mut parameters = case.parameters.clone();
+    parameters.insert(MASS.into(), Parameter::Number(case.masses.body_kg));
+    if let Some(other) = case.masses.other_kg.filter(|&m| m != case.masses.body_kg) {
+        parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
+    }
+    parameters
+}
+
+/// The columns that tell the cases apart: parameters that all share are left out.
+fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
+    let of: Vec<(&str, BTreeMap<String, Parameter>)> =
+        cases.iter().map(|c| (c.name.as_str(), parameters(c))).collect();
+    let names: BTreeSet<&String> = of.iter().flat_map(|(_, p)| p.keys()).collect();
+    let mut features = Vec::new();
+    for name in names {
+        let has = |p: &BTreeMap<String, Parameter>| p.contains_key(name);
+        let with = of.iter().find(|(_, p)| has(p)).map_or("", |(case, _)| *case);
+        if let Some((without, _)) = of.iter().find(|(_, p)| !has(p)) {
+            let (with, without) = (with.to_string(), without.to_string());
+            return Err(DatasetError::NoParameter { parameter: name.clone(), with, without });
+        }
+        let (mut number, mut category) = (None, None);
+        let (mut values, mut categories) = (Vec::new(), BTreeSet::new());
+        for (case, parameters) in &of {
+            match &parameters[name] {
+                Parameter::Number(value) => {
+                    number = Some(*case);
+                    values.push(*value);
+                }
+                Parameter::Category(value) => {
+                    category = Some(*case);
+                    categories.insert(value.clone());
+                }
+            }
+        }
+        if let (Some(number), Some(category)) = (number, category) {
+            return Err(DatasetError::MixedParameter {
+                parameter: name.clone(),
+                number: number.into(),
+                category: category.into(),
+            });
+        }
+        let parameter = name.clone();
+        if values.windows(2).any(|w| w[0] != w[1]) {
+            features.push(Feature { parameter, category: None });
+        } else if categories.len() > 1 {
+            features.extend(
+                categories
+                    .into_iter()
+                    .map(|c| Feature { parameter: parameter.clone(), category: Some(c) }),
+            );
+        }
+    }
+    Ok(features)
 }
 
 /// Which points of the cases make the table.
@@ -62,6 +228,12 @@ pub enum TableKind {
 /// Coarsest deflection grid for training: at 20 m/s one state each 0.75 ms is 15 mm, a
 /// third of the way to the first peak.
 pub const GRID_M: f64 = 2e-3;
+
+/// Even deflections from 0 to `end_m`, no coarser than [`GRID_M`], at least `fewest` steps.
+pub fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
+    let steps = ((end_m / GRID_M).ceil().clamp(1.0, 1e6) as usize).max(fewest);
+    (0..=steps).map(|i| end_m * i as f64 / steps as f64).collect()
+}
 
 /// Index of the speed nearest to `v`; of two equally near ones the first.
 pub fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
@@ -82,37 +254,55 @@ impl TrainingSet {
         cases: impl IntoIterator<Item = &'a Case>,
     ) -> Result<Self, DatasetError> {
         let mut cases: Vec<&Case> = cases.into_iter().collect();
-        cases.sort_by(|a, b| a.speed.m_per_s.total_cmp(&b.speed.m_per_s));
         let first = *cases.first().ok_or(DatasetError::Empty)?;
-        for pair in cases.windows(2) {
-            let (a, b) = (pair[0], pair[1]);
-            let names = || (a.name.clone(), b.name.clone());
-            if a.speed.m_per_s == b.speed.m_per_s {
-                let (first, second) = names();
-                let speed = km_per_h(a.speed.m_per_s);
-                return Err(DatasetError::EqualSpeeds { first, second, speed });
-            }
-            let mixed = if a.speed.kind != b.speed.kind {
-                Some("wall and closing speeds")
-            } else if a.force_kind != b.force_kind {
-                Some("contact and body forces")
+        cases.sort_by(|a, b| a.name.cmp(&b.name));
+        for other in &cases {
+            let mixed = if first.speed.kind != other.speed.kind {
+                "wall and closing speeds"
+            } else if first.force_kind != other.force_kind {
+                "contact and body forces"
             } else {
-                None
+                continue;
             };
-            if let Some(what) = mixed {
-                let (first, second) = names();
-                return Err(DatasetError::Mixed { first, second, what });
-            }
+            let (first, second) = (first.name.clone(), other.name.clone());
+            return Err(DatasetError::Mixed { first, second, what: mixed });
         }
-        let training = cases.iter().map(|c| TrainingCase::new(c)).collect::<Result<_, _>>()?;
+        let features = features(&cases)?;
+        let mut training = cases
+            .iter()
+            .map(|case| TrainingCase::new(case, &features))
+            .collect::<Result<Vec<_>, _>>()?;
+        // By values, so that names and the order of the cases change nothing.
+        training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
+        if let Some(pair) = training.windows(2).find(|w| w[0].key() == w[1].key()) {
+            let (parameters, hint) = match features.is_empty() {
+                true => ("", ", or tell them apart by parameters = { … } in the manifest"),
+                false => (" and parameters", ""),
+            };
+            return Err(DatasetError::EqualSpeeds {
+                first: pair[0].name.clone(),
+                second: pair[1].name.clone(),
+                speed: km_per_h(pair[0].speed_m_per_s),
+                parameters,
+                hint,
+            });
+        }
         Ok(Self {
             group: group.into(),
             speed_kind: first.speed.kind,
             force_kind: first.force_kind,
-            masses: first.masses,
-            equal_masses: cases.iter().all(|c| c.masses == first.masses),
+            masses: cases.iter().find(|c| c.name == training[0].name).unwrap_or(&first).masses,
+            features,
             cases: training,
         })
+    }
+
+    /// The set without its `i`-th case. What the others share stays a feature, so that
+    /// queries for the case left out can be asked.
+    pub fn without(&self, i: usize) -> Self {
+        let mut rest = self.clone();
+        rest.cases.remove(i);
+        rest
     }
 
     /// Hash over the fingerprints of the cases.
@@ -133,27 +323,54 @@ impl TrainingSet {
         self.cases.iter().map(|c| c.envelope.end_m()).fold(0.0, f64::max)
     }
 
-    /// The table {v in m/s, d in m} → F in N over the loading branches of all cases.
+    /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
+    /// cases, of the declared force.
     pub fn table(&self, kind: TableKind) -> Dataset<f64, f64, ndarray::Ix1> {
+        self.table_of(kind, Force::Declared)
+    }
+
+    /// The same table of either force.
+    pub fn table_of(&self, kind: TableKind, force: Force) -> Dataset<f64, f64, ndarray::Ix1> {
+        let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();
         for case in &self.cases {
-            let (deflection_m, force_n) = case.points(kind);
-            records.extend(deflection_m.iter().flat_map(|&d| [case.speed_m_per_s, d]));
-            targets.extend(force_n);
+            let (deflection_m, force_n) = case.points(kind, force);
+            for (d, f) in deflection_m.into_iter().zip(force_n) {
+                records.extend([case.speed_m_per_s, d]);
+                records.extend(&case.features);
+                targets.push(f);
+            }
         }
-        let records = Array2::from_shape_fn((targets.len(), 2), |(i, k)| records[2 * i + k]);
-        Dataset::new(records, Array1::from(targets))
-            .with_feature_names(vec!["speed_m_per_s", "deflection_m"])
+        let records =
+            Array2::from_shape_fn((targets.len(), columns), |(i, k)| records[columns * i + k]);
+        let names = ["speed_m_per_s".to_string(), "deflection_m".into()];
+        Dataset::new(records, Array1::from(targets)).with_feature_names(
+            names.into_iter().chain(self.features.iter().map(Feature::name)).collect(),
+        )
     }
 }
 
+/// Which force of a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Force {
+    /// The recipe's.
+    Declared,
+    /// That of the body's motion.
+    Body,
+}
+
 impl TrainingCase {
-    fn new(case: &Case) -> Result<Self, DatasetError> {
+    fn new(case: &Case, features: &[Feature]) -> Result<Self, DatasetError> {
         let named = |source| DatasetError::Envelope { name: case.name.clone(), source };
+        let motion =
+            body_motion(case).ok_or_else(|| DatasetError::NoMotion { name: case.name.clone() })?;
         Ok(Self {
             name: case.name.clone(),
             speed_m_per_s: case.speed.m_per_s,
+            features: feature_values(features, &parameters(case))?,
+            effective_mass_kg: case.masses.effective_kg(),
+            motion,
             envelope: loading_branch(&case.original).map_err(named)?.envelope,
             sampled: loading_branch(&case.sampled).map_err(named)?.envelope,
             truncated: case.is_truncated(),
@@ -162,17 +379,31 @@ impl TrainingCase {
         })
     }
 
-    fn points(&self, kind: TableKind) -> (Vec<f64>, Vec<f64>) {
-        match kind {
-            TableKind::Samples => {
+    /// What cases are ordered by.
+    fn key(&self) -> (f64, &[f64]) {
+        (self.speed_m_per_s, &self.features)
+    }
+
+    pub fn envelope_of(&self, force: Force) -> &Envelope {
+        match force {
+            Force::Declared => &self.envelope,
+            Force::Body => &self.motion.force,
+        }
+    }
+
+    fn points(&self, kind: TableKind, force: Force) -> (Vec<f64>, Vec<f64>) {
+        match (kind, force) {
+            (TableKind::Samples, Force::Declared) => {
                 (self.sampled.deflection_m().to_vec(), self.sampled.force_n().to_vec())
             }
-            TableKind::Grid => {
-                let end = self.envelope.end_m();
-                let steps = (end / GRID_M).ceil().clamp(1.0, 1e6) as usize;
-                let at = |i| end * i as f64 / steps as f64;
-                let deflection_m: Vec<f64> = (0..=steps).map(at).collect();
-                let force_n = deflection_m.iter().map(|&d| self.envelope.force_at(d)).collect();
+            (TableKind::Samples, Force::Body) => {
+                let force = &self.motion.force;
+                (force.deflection_m().to_vec(), force.force_n().to_vec())
+            }
+            (TableKind::Grid, _) => {
+                let deflection_m = grid(self.envelope.end_m(), 1);
+                let envelope = self.envelope_of(force);
+                let force_n = deflection_m.iter().map(|&d| envelope.force_at(d)).collect();
                 (deflection_m, force_n)
             }
         }

@@ -6,7 +6,6 @@
 //! use crumple::build::build;
 //! use crumple::dataset::TrainingSet;
 //! use crumple::surrogate::{Model, Options, Query, forest::ForestOptions, predict};
-//! use crumple::surrogate::max_crush::MaxCrushRule;
 //! use std::path::Path;
 //!
 //! # let folder = tempfile::tempdir()?;
@@ -20,12 +19,7 @@
 //! let model = Model::fit(&set, Options::Forest(ForestOptions::default()))?;
 //!
 //! // forest → curve at a speed that was never run
-//! let query = Query {
-//!     speed_m_per_s: 50.0 / 3.6,
-//!     mass_kg: None,
-//!     rule: MaxCrushRule::Monotone,
-//! };
-//! let curve = predict(&model, &query)?;
+//! let curve = predict(&model, &Query::at(50.0 / 3.6))?;
 //! assert!(curve.max_deflection_m > 0.87 && curve.max_deflection_m < 1.24);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -60,6 +54,8 @@ pub mod multibody;
 pub mod export;
 
 pub mod scenario;
+
+pub mod validate;
 
 pub mod compare;
 

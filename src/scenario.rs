@@ -85,7 +85,7 @@ pub struct CurveTable {
     #[serde(default)]
     pub end: EndName,
     #[serde(default)]
-    pub max_crush: MaxCrushRule,
+    pub max_crush: Option<MaxCrushRule>,
 }
 
 /// Force law of an interface.
@@ -423,7 +423,7 @@ impl Builder {
                     && asked < steepest
                 {
                     self.warnings.push(format!(
-                        "curve \"{curve}\": unloading {:.4} MN/m is softer than the curve's steepest rise and was raised to {:.4} MN/m",
+                        "curve \"{curve}\": unloading {:.4} MN/m is softer than the curve's steepest rise ({:.4} MN/m): where it rises so, unloading is stiffer",
                         asked / 1e6,
                         steepest / 1e6
                     ));
@@ -483,11 +483,8 @@ fn from_model(
     meeting: &Meeting<'_>,
 ) -> Result<Source, ScenarioError> {
     let model = Model::read(path)?;
-    let query = Query {
-        speed_m_per_s: meeting.speed_m_per_s,
-        mass_kg: Some(mass_kg),
-        rule: table.max_crush,
-    };
+    let query =
+        Query { mass_kg: Some(mass_kg), rule: table.max_crush, ..Query::at(meeting.speed_m_per_s) };
     let failed = |source| ScenarioError::Predict { curve: name.into(), source };
     let curve = predict(&model, &query).map_err(failed)?;
     Ok(Source {

@@ -414,7 +414,7 @@ fn rescale(path: &Path, length: f64, time: f64, force: f64) {
 fn training_is_bitwise_repeatable_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     build_fixture(folder.path(), WALL);
-    for extra in [&[][..], &["--thresholds", "random"], &["--paper"]] {
+    for extra in [&[][..], &["--model", "extra", "--trees", "20"], &["--paper"]] {
         let train = |threads: &str, output: &str| {
             let mut arguments =
                 vec!["train", "curves.h5", "--group", WALL, "--seed", "42", "-o", output];
@@ -439,12 +439,20 @@ fn a_saved_model_predicts_the_same_bits() {
     use crumple::database::Database;
     use crumple::dataset::TrainingSet;
     use crumple::surrogate::forest::ForestOptions;
-    use crumple::surrogate::{Model, Options};
+    use crumple::surrogate::{At, Model, Options};
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), WALL);
     let database = Database::read(&path).unwrap();
     let set = TrainingSet::new(WALL, database.cases(WALL)).unwrap();
-    for options in [Options::Forest(ForestOptions::default()), Options::Nearest] {
+    for options in [
+        Options::Nearest,
+        Options::Linear,
+        Options::Rate,
+        Options::Registered,
+        Options::Extra(ForestOptions { trees: 20, ..ForestOptions::extra() }),
+        Options::Forest(ForestOptions::default()),
+        Options::Gp,
+    ] {
         let model = Model::fit(&set, options).unwrap();
         let file = folder.path().join("a.model");
         model.write(&file).unwrap();
@@ -452,8 +460,12 @@ fn a_saved_model_predicts_the_same_bits() {
         assert_eq!(read, model);
         let d: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.003).collect();
         for v in [7.0, 13.3, 14.9, 15.1, 25.0] {
-            let bits = |m: &Model| m.force_n(v, &d).iter().map(|f| f.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&model), bits(&read));
+            let at = At { speed_m_per_s: v, features: &[], mass_kg: 24e3, closing_m_per_s: None };
+            let bits = |m: &Model| -> Vec<u64> {
+                let forces = [m.force_n(&at, &d), m.body_force_n(&at, &d)];
+                forces.concat().iter().map(|f| f.to_bits()).collect()
+            };
+            assert_eq!(bits(&model), bits(&read), "{}", options.name());
         }
     }
 }
@@ -508,8 +520,8 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         .lines()
         .filter(|l| !l.starts_with('#'))
         .skip(1)
-        .map(|l| l.split_once(',').unwrap())
-        .map(|(d, f)| (d.parse().unwrap(), f.parse().unwrap()))
+        .map(|l| l.split(',').collect::<Vec<_>>())
+        .map(|c| (c[0].parse().unwrap(), c[1].parse().unwrap()))
         .collect();
     let deck = std::fs::read_to_string(folder.path().join("a.k")).unwrap();
     let keyword: Vec<&str> = deck
@@ -571,6 +583,7 @@ fn warnings_stand_in_text_and_json() {
         let warnings = curve["warnings"].as_array().unwrap();
         warnings.iter().map(|w| w["code"].as_str().unwrap().to_string()).collect()
     };
+    let forest = ["--model", "forest", "-o", "lead.model"];
     let text = |speed: &str| {
         let output =
             crumple_in(folder.path(), &["predict", "lead.model", "--speed", speed, "--strict"]);
@@ -581,16 +594,16 @@ fn warnings_stand_in_text_and_json() {
     assert_eq!(code, Some(3));
     assert!(human.contains("80 km/h is 8 km/h above the highest training speed"), "{human}");
     assert!(codes("20km/h").contains(&"out_of_range".into()));
+    let train = ["train", "curves.h5", "--group", WALL];
+    crumple_ok(folder.path(), &[&train[..], &forest[..]].concat());
     // The midpoint of 36 and 48 km/h, and both sides of 1 %.
     assert!(codes("42km/h").contains(&"near_split_midpoint".into()));
     assert!(codes("42.4km/h").contains(&"near_split_midpoint".into()));
     assert!(!codes("42.5km/h").contains(&"near_split_midpoint".into()));
     assert!(text("42km/h").1.contains("within 1 % of 42 km/h"));
     // Random thresholds have no midpoints.
-    crumple_ok(
-        folder.path(),
-        &["train", "curves.h5", "--group", WALL, "--thresholds", "random", "-o", "lead.model"],
-    );
+    let random = ["--thresholds", "random"];
+    crumple_ok(folder.path(), &[&train[..], &forest[..], &random[..]].concat());
     assert!(!codes("42km/h").contains(&"near_split_midpoint".into()));
 }
 
@@ -678,14 +691,18 @@ fn compare_leaves_the_speed_out() {
     ));
     let rows = result["rows"].as_array().unwrap();
     let methods: Vec<&str> = rows.iter().map(|r| r["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["fe", "fdrm", "ddtcm"]);
+    assert_eq!(methods, ["fe", "fe_body", "fdrm", "ddtcm", "best"]);
     let value = |row: usize, key: &str| rows[row][key].as_f64().unwrap();
     // FE's own contact curve in a one-mass model misses by 2-7 % in velocity.
     assert!((0.02..0.07).contains(&value(0, "velocity_l1")), "{}", value(0, "velocity_l1"));
     assert_eq!(value(0, "force_l1"), 0.0);
-    assert!(value(1, "force_l1") > 0.05 && value(2, "force_l1") > 0.05, "both were left out");
-    assert_eq!(rows[1]["curve"], "FE at 36 km/h");
-    assert_eq!(rows[2]["curve"], "forest on 4 speeds");
+    // Its body force nearly repeats the motion.
+    assert!(value(1, "velocity_l1") < 0.01 && value(1, "acceleration_l1") < 0.05);
+    assert!(value(2, "force_l1") > 0.05 && value(3, "force_l1") > 0.05, "both were left out");
+    assert_eq!(rows[2]["curve"], "FE at 36 km/h");
+    assert_eq!(rows[3]["curve"], "forest on 4 speeds");
+    assert!(rows[4]["curve"].as_str().unwrap().ends_with(" on 4 speeds"));
+    assert!(value(4, "velocity_l1") < value(3, "velocity_l1"));
 }
 
 #[test]

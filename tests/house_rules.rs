@@ -11,7 +11,7 @@ use common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 16] = [
+const MAY_NAME: [(&str, &[&str]); 17] = [
     ("unit", &[]),
     ("history", &[]),
     ("file", &[]),
@@ -27,7 +27,8 @@ const MAY_NAME: [(&str, &[&str]); 16] = [
     ("multibody", &["curve", "unit"]),
     ("export", &["surrogate", "curve", "unit"]),
     ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
-    ("compare", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
+    ("validate", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
+    ("compare", &["validate", "surrogate", "dataset", "curve", "unit"]),
 ];
 
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
@@ -158,6 +159,11 @@ fn schemas_are_those_of_the_types() {
     let schemas = [
         ("study.schema.json", schemars::schema_for!(crumple::study::Manifest)),
         ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
+        ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
+        (
+            "validation.schema.json",
+            schemars::schema_for!(crumple::surrogate::leave_one_out::Validation),
+        ),
     ];
     for (name, schema) in schemas {
         let path = root().join("schemas").join(name);

@@ -251,7 +251,7 @@ fn files_that_are_not_ours() {
     );
     fs::write(
         here.join("m2.model"),
-        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":1", "\"version\":9"),
+        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":2", "\"version\":9"),
     )
     .unwrap();
     t(

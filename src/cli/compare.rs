@@ -16,9 +16,11 @@ use super::{CommandResult, Manners, Outcome};
 #[command(after_help = "Examples:
   crumple compare curves.h5 --group lead-car-wall --speed 48km/h
   crumple compare curves.h5 --group lead-car-wall --speed 48km/h --json
-Rows: fe is FE's own curve in the one-mass model, the floor for contact-force curves; fdrm is
-the FE curve of the nearest other speed; ddtcm the reference method's forest and spline.
-Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's largest crush.")]
+Rows: fe and fe_body are FE's own curves in the one-mass model, the floors for contact forces and
+for body forces; fdrm is the FE curve of the nearest other speed; ddtcm the reference method's
+forest and spline; best the model that leaving speeds out chooses among the others, by its body
+force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's largest crush; accelerations
+are filtered with CFC 60, in brackets not.")]
 pub struct Args {
     /// Curve database
     database: PathBuf,
@@ -67,7 +69,11 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
                 row.method.to_string(),
                 row.curve.clone(),
                 percent(row.velocity_l1),
-                percent(row.acceleration_l1),
+                format!(
+                    "{} ({:.2})",
+                    percent(row.acceleration_l1),
+                    row.acceleration_unfiltered_l1 * 100.0
+                ),
                 percent(row.force_l1),
                 format!("{:.3} MN", row.peak_force_n / 1e6),
                 format!("{:.4} m", row.max_crush_m),

@@ -295,7 +295,7 @@ fn check(database: &Database, manners: Manners) -> CommandResult {
             check_case(case, &mut add);
         }
         for pair in database.cases(group).windows(2) {
-            if pair[0].speed == pair[1].speed {
+            if pair[0].speed == pair[1].speed && pair[0].parameters == pair[1].parameters {
                 findings.push(Finding {
                     group: group.to_string(),
                     case: pair[1].name.clone(),

@@ -5,18 +5,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crumple::build::{self, RunOutcome};
-use crumple::compare::{self, Comparison};
 use crumple::curve::Case;
 use crumple::database::Database;
-use crumple::dataset::TrainingSet;
 use crumple::export;
 use crumple::file::write_whole;
 use crumple::multibody::{Run, simulate};
 use crumple::scenario;
-use crumple::surrogate::forest::ForestOptions;
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{Model, Options, PredictedCurve, Query, predict};
+use crumple::surrogate::leave_one_out::Validation;
+use crumple::surrogate::{Model, PredictedCurve, Query, predict};
 use crumple::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
+use crumple::validate::{self, Choice, candidates};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
 
@@ -63,7 +61,7 @@ curve = "nose"
 #[derive(Serialize)]
 struct Document {
     cases: Vec<CaseLine>,
-    comparisons: Vec<Comparison>,
+    validations: Vec<Validation>,
     prediction: Prediction,
     files: Vec<String>,
     seconds: f64,
@@ -81,6 +79,7 @@ struct CaseLine {
 
 #[derive(Serialize)]
 struct Prediction {
+    model: String,
     speed_m_per_s: f64,
     #[serde(rename = "peak_force_N")]
     peak_force_n: f64,
@@ -106,7 +105,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     };
     flow.unpack()?;
     let database = flow.build()?;
-    let comparisons = flow.compare(&database)?;
+    let validations = flow.validate(&database)?;
     let model = flow.train(&database)?;
     let curve = flow.predict(&model)?;
     let run = flow.simulate()?;
@@ -114,8 +113,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     bar.end();
     let document = Document {
         cases: cases(&database).map(|(group, case)| case_line(group, case)).collect(),
-        comparisons,
+        validations,
         prediction: Prediction {
+            model: curve.model.clone(),
             speed_m_per_s: curve.speed_m_per_s,
             peak_force_n: curve.force_n.iter().copied().fold(0.0, f64::max),
             max_deflection_m: curve.max_deflection_m,
@@ -127,7 +127,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         seconds: start.elapsed().as_secs_f64(),
     };
     for warning in &curve.warnings {
-        manners.warn(&warning.message);
+        manners.warn(&warning.to_string());
     }
     if manners.json {
         output::print_json(&document)?;
@@ -169,31 +169,26 @@ impl Flow<'_> {
         Ok(database)
     }
 
-    /// Leaves out every inner speed of every group.
-    fn compare(&self, database: &Database) -> Result<Vec<Comparison>, Failure> {
-        let mut comparisons = Vec::new();
+    /// Leaves out every speed of every group.
+    fn validate(&self, database: &Database) -> Result<Vec<Validation>, Failure> {
+        let mut validations = Vec::new();
         for group in database.groups() {
+            self.bar.step(&format!("validating {group}"));
             let cases = database.cases(group);
-            for case in &cases[1..cases.len() - 1] {
-                self.bar.step(&format!("{group} without {}", case.name));
-                comparisons.push(compare::compare(group, cases, case.speed.m_per_s, 0)?);
-            }
+            validations.push(validate::validate(group, cases, &candidates(0), None)?);
         }
-        Ok(comparisons)
+        Ok(validations)
     }
 
     fn train(&mut self, database: &Database) -> Result<Model, Failure> {
-        self.bar.step("training the forest");
-        let set = TrainingSet::new(GROUP, database.cases(GROUP))?;
-        let model = Model::fit(&set, Options::Forest(ForestOptions::default()))?;
+        self.bar.step("training the model");
+        let model = validate::train(GROUP, database.cases(GROUP), Choice::Auto { seed: 0 })?;
         model.write(&self.path("lead.model"))?;
         Ok(model)
     }
 
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
-        let query =
-            Query { speed_m_per_s: SPEED_M_PER_S, mass_kg: None, rule: MaxCrushRule::Monotone };
-        let curve = predict(model, &query)?;
+        let curve = predict(model, &Query::at(SPEED_M_PER_S))?;
         for name in ["lead50.json", "lead50.csv", "lead50.k"] {
             let path = self.path(name);
             let bytes = export::by_extension(&path)?.encode(&curve, &export::Options::default())?;
@@ -240,24 +235,17 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
         .collect();
     output::table(out, &["FE run", "speed", "peak force", "max crush", "W/E"], &rows)?;
     writeln!(out)?;
-    let percent = |error: f64| format!("{:.1} %", error * 100.0);
-    let rows: Vec<Vec<String>> = document
-        .comparisons
-        .iter()
-        .map(|c| {
-            let errors = c.rows.iter().flat_map(|r| [r.velocity_l1, r.acceleration_l1]);
-            let label = [c.group.clone(), km_per_h(c.speed_m_per_s)];
-            label.into_iter().chain(errors.map(percent)).collect()
-        })
-        .collect();
-    let heading = ["left out", "speed", "FE curve v", "a", "FDRM v", "a", "forest v", "a"];
-    output::table(out, &heading, &rows)?;
+    for validation in &document.validations {
+        super::validate::print_means(out, validation)?;
+        writeln!(out)?;
+    }
     let p = &document.prediction;
     writeln!(
         out,
-        "\nerrors of velocity v and acceleration a in one multi-body model: sum|p-r|/sum|r| to 30 ms after max crush\n\
-         {GROUP} at {} by the forest: peak force {:.3} MN, max crush {:.4} m, energy {:.2} %; multi-body run: crush {:.4} m, energy off by {:.0e}\n",
+        "errors as sum|p-r|/sum|r|: force along FE's crush; velocity v and acceleration a (CFC 60; in brackets not filtered) in one multi-body model to 30 ms after max crush\n\
+         {GROUP} at {} by the model {}: peak force {:.3} MN, max crush {:.4} m, energy {:.2} %; multi-body run: crush {:.4} m, energy off by {:.0e}\n",
         km_per_h(p.speed_m_per_s),
+        p.model,
         p.peak_force_n / 1e6,
         p.max_deflection_m,
         p.energy_over_kinetic * 100.0,

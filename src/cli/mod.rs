@@ -16,6 +16,7 @@ mod progress;
 mod shell;
 mod simulate;
 mod train;
+mod validate;
 
 use std::error::Error;
 use std::path::Path;
@@ -62,6 +63,7 @@ enum Command {
     Histories(histories::Args),
     Build(build::Args),
     Db(db::Args),
+    Validate(validate::Args),
     Train(train::Args),
     Predict(predict::Args),
     Simulate(simulate::Args),
@@ -131,6 +133,7 @@ pub fn main() -> ExitCode {
         Command::Histories(args) => histories::run(&args, manners),
         Command::Build(args) => build::run(&args, manners),
         Command::Db(args) => db::run(&args, manners),
+        Command::Validate(args) => validate::run(&args, manners),
         Command::Train(args) => train::run(&args, manners),
         Command::Predict(args) => predict::run(&args, manners),
         Command::Simulate(args) => simulate::run(&args, manners),

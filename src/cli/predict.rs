@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use crumple::curve::Parameter;
 use crumple::file::write_all_whole;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, PredictedCurve, Query, predict};
@@ -27,12 +28,18 @@ pub struct Args {
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for the maximal crush [default: monotone]
+    /// Rule for the maximal crush [default: the one that was best when speeds were left out]
     #[arg(long, value_enum)]
     max_crush: Option<MaxCrush>,
     /// The reference method's choices: maximal crush by the cubic spline
     #[arg(long, conflicts_with = "max_crush")]
     paper: bool,
+    /// Value of a further parameter of the training cases, as NAME=VALUE; may be repeated
+    #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
+    parameter: Vec<(String, Parameter)>,
+    /// Scale the force so that the curve takes up the impact's kinetic energy (by 0.8 to 1.25)
+    #[arg(long)]
+    energy_correct: bool,
     /// File to write, its format told by the extension or by --to; may be repeated
     #[arg(short, long)]
     output: Vec<PathBuf>,
@@ -41,10 +48,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
-    let rule = match (args.paper, args.max_crush) {
-        (true, _) => MaxCrushRule::Spline,
-        (false, Some(rule)) => rule.into(),
-        (false, None) => MaxCrushRule::Monotone,
+    let rule = match args.paper {
+        true => Some(MaxCrushRule::Spline),
+        false => args.max_crush.map(MaxCrushRule::from),
     };
     let options = args.target.options()?;
     let formats = args
@@ -54,7 +60,13 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         .collect::<Result<Vec<_>, _>>()?;
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     let model = Model::read(&args.model)?;
-    let query = Query { speed_m_per_s: args.speed, mass_kg: args.mass, rule };
+    let query = Query {
+        speed_m_per_s: args.speed,
+        mass_kg: args.mass,
+        rule,
+        parameters: args.parameter.iter().cloned().collect(),
+        energy_correct: args.energy_correct,
+    };
     let curve = predict(&model, &query)?;
     // All files are encoded before the first is written.
     let files = formats
@@ -64,7 +76,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
     write_all_whole(&named.collect::<Vec<_>>())?;
     for warning in &curve.warnings {
-        manners.warn(&warning.message);
+        manners.warn(&warning.to_string());
     }
     if manners.json {
         output::print_json(&curve)?;
@@ -93,12 +105,13 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     writeln!(out, "  peak force           {:.3} MN", peak / 1e6)?;
     writeln!(
         out,
-        "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}",
+        "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
         curve.max_deflection_m,
         provenance.max_crush_rule.name(),
         metres(crush.spline_m),
         metres(crush.monotone_m),
-        metres(crush.energy_m)
+        metres(crush.energy_m),
+        metres(crush.motion_m)
     )?;
     writeln!(
         out,
@@ -107,14 +120,34 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         provenance.energy_over_kinetic * 100.0,
         provenance.kinetic_energy_j / 1e6
     )?;
+    if let Some(share) = provenance.body_energy_over_kinetic {
+        writeln!(out, "  of the body force    {:.2} %", share * 100.0)?;
+    }
     writeln!(out, "  unloading stiffness  {:.1} MN/m", curve.unloading_stiffness_n_per_m / 1e6)?;
+    if let Some(rebound) = curve.rebound {
+        writeln!(
+            out,
+            "  rebound              {} (unloading from the maximal crush with {:.1} MN/m)",
+            km_per_h(rebound.speed_m_per_s),
+            rebound.stiffness_n_per_m / 1e6
+        )?;
+    }
+    if let Some(band) = &provenance.band {
+        writeln!(
+            out,
+            "  band                 ±{:.1} % of the local force: empirical range for {:.0} %, from {} curves that were left out",
+            band.pointwise_share * 100.0,
+            band.level * 100.0,
+            band.curves
+        )?;
+    }
     writeln!(
         out,
         "  nearest training     {} away",
         km_per_h(provenance.distance_to_nearest_m_per_s)
     )?;
     for warning in &curve.warnings {
-        writeln!(out, "  warning              {}", warning.message)?;
+        writeln!(out, "  warning              {warning}")?;
     }
     writeln!(out, "\nforce [MN] over deflection [m]")?;
     super::plot::curve(out, &curve.deflection_m, &curve.force_n)

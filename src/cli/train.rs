@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use crumple::database::Database;
-use crumple::dataset::TrainingSet;
 use crumple::forest::{StopRule, Thresholds};
 use crumple::surrogate::forest::ForestOptions;
-use crumple::surrogate::leave_one_out::LeftOut;
-use crumple::surrogate::{Fitted, Model, Options};
+use crumple::surrogate::leave_one_out::Validation;
+use crumple::surrogate::max_crush::MaxCrushRule;
+use crumple::surrogate::{Fitted, Options};
 use crumple::unit::km_per_h;
+use crumple::validate::{self, Choice};
 use serde::Serialize;
 
 use super::output;
@@ -20,7 +21,8 @@ use super::{CommandResult, Failure, Manners, Outcome, keep_input};
   crumple train curves.h5 --group lead-car-wall -o lead.model
   crumple train curves.h5 --group lead-car-wall --paper -o ddtcm.model
   crumple train curves.h5 --group lead-car-wall --model nearest -o fdrm.model
-The same seed gives the same bytes, on any number of threads.")]
+auto fits every model with each speed left out (crumple validate shows the table) and takes the
+simplest of the best. The same seed gives the same bytes, on any number of threads.")]
 pub struct Args {
     /// Curve database
     database: PathBuf,
@@ -28,20 +30,20 @@ pub struct Args {
     #[arg(long)]
     group: String,
     /// Kind of model
-    #[arg(long, value_enum, default_value_t = Kind::Forest)]
+    #[arg(long, value_enum, default_value_t = Kind::Auto)]
     model: Kind,
-    /// Number of trees
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    trees: u32,
+    /// Number of trees [default: 50 of a forest, 500 of extra]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    trees: Option<u32>,
     /// Seed of all random draws
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Fewest samples of a leaf
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_samples_leaf: u32,
-    /// Thresholds of splits
-    #[arg(long, value_enum, default_value_t = ThresholdKind::Midpoint)]
-    thresholds: ThresholdKind,
+    /// Thresholds of splits [default: midpoint of a forest, random of extra]
+    #[arg(long, value_enum)]
+    thresholds: Option<ThresholdKind>,
     /// When a node is not split any more
     #[arg(long, value_enum, default_value_t = StopKind::StdOverMean)]
     stop: StopKind,
@@ -59,8 +61,20 @@ pub struct Args {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Kind {
+    /// The model that leave-one-speed-out chooses
+    Auto,
     /// Random forest on speed and deflection (DDTCM)
     Forest,
+    /// Extremely randomised trees
+    Extra,
+    /// Linear in speed at equal deflection
+    Linear,
+    /// Linear in speed, with the force following the speed at each deflection
+    Rate,
+    /// Peaks matched and warped onto each other before blending
+    Registered,
+    /// Principal scores of registered curves, each a Gaussian process
+    Gp,
     /// The FE curve of the nearest speed (FDRM)
     Nearest,
 }
@@ -87,36 +101,53 @@ struct Document<'a> {
     group: &'a str,
     model: &'a str,
     options: &'a Options,
+    max_crush_rule: MaxCrushRule,
     training_speeds_m_per_s: Vec<f64>,
     training_hash: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     out_of_bag: Option<crumple::forest::OutOfBag>,
-    validation: &'a [LeftOut],
+    validation: &'a Option<Validation>,
 }
 
 impl Args {
-    fn options(&self) -> Options {
+    fn choice(&self) -> Result<Choice, Failure> {
+        let seed = self.seed;
         if self.paper {
-            return Options::Forest(ForestOptions { seed: self.seed, ..ForestOptions::paper() });
+            let options = ForestOptions { seed, ..ForestOptions::paper() };
+            return Ok(Choice::Options(Options::Forest(options)));
         }
-        match self.model {
+        let is_forest = matches!(self.model, Kind::Forest | Kind::Extra);
+        if !is_forest && (self.trees.is_some() || self.thresholds.is_some()) {
+            return Err(Failure::Usage(
+                "--trees and --thresholds need --model forest or --model extra".into(),
+            ));
+        }
+        let forest = |options: ForestOptions| ForestOptions {
+            trees: self.trees.map_or(options.trees, |t| t as usize),
+            seed,
+            thresholds: match self.thresholds {
+                Some(ThresholdKind::Midpoint) => Thresholds::Midpoint,
+                Some(ThresholdKind::Random) => Thresholds::Random,
+                None => options.thresholds,
+            },
+            stop: match self.stop {
+                StopKind::Never => StopRule::Unpruned,
+                StopKind::VarOverMean => StopRule::VarOverMean(self.stop_threshold),
+                StopKind::StdOverMean => StopRule::StdOverMean(self.stop_threshold),
+            },
+            min_samples_leaf: self.min_samples_leaf as usize,
+            ..options
+        };
+        Ok(Choice::Options(match self.model {
+            Kind::Auto => return Ok(Choice::Auto { seed }),
+            Kind::Forest => Options::Forest(forest(ForestOptions::default())),
+            Kind::Extra => Options::Extra(forest(ForestOptions::extra())),
+            Kind::Linear => Options::Linear,
+            Kind::Rate => Options::Rate,
+            Kind::Registered => Options::Registered,
+            Kind::Gp => Options::Gp,
             Kind::Nearest => Options::Nearest,
-            Kind::Forest => Options::Forest(ForestOptions {
-                trees: self.trees as usize,
-                seed: self.seed,
-                thresholds: match self.thresholds {
-                    ThresholdKind::Midpoint => Thresholds::Midpoint,
-                    ThresholdKind::Random => Thresholds::Random,
-                },
-                stop: match self.stop {
-                    StopKind::Never => StopRule::Unpruned,
-                    StopKind::VarOverMean => StopRule::VarOverMean(self.stop_threshold),
-                    StopKind::StdOverMean => StopRule::StdOverMean(self.stop_threshold),
-                },
-                min_samples_leaf: self.min_samples_leaf as usize,
-                ..ForestOptions::default()
-            }),
-        }
+        }))
     }
 }
 
@@ -127,63 +158,57 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             args.stop_threshold
         )));
     }
+    let choice = args.choice()?;
     keep_input(&args.database, &args.output)?;
     let database = Database::read(&args.database)?;
     let cases = database.group(&args.database, &args.group)?;
-    let set = TrainingSet::new(&args.group, cases)?;
-    let model = Model::fit(&set, args.options())?;
+    let model = validate::train(&args.group, cases, choice)?;
     model.write(&args.output)?;
     let truncated: Vec<&str> =
-        set.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
+        model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
     if !truncated.is_empty() {
         manners.warn(&format!(
             "runs that ended while loading are left out of the maximal crush: {}",
             truncated.join(", ")
         ));
     }
-    if !set.equal_masses {
-        manners.warn("the cases have different masses, which the model does not see");
+    if model.cases.len() < 3 {
+        manners.warn(&format!(
+            "the group has {} curves: with fewer than 3 no speed can be left out to see how good the model is",
+            model.cases.len()
+        ));
     }
-    let warned = !truncated.is_empty() || !set.equal_masses;
+    let warned = !truncated.is_empty() || model.cases.len() < 3;
     let out_of_bag = match model.fitted() {
         Fitted::Forest(forest) => forest.forest().out_of_bag(),
-        Fitted::Nearest(_) => None,
+        _ => None,
     };
+    let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
     if manners.json {
         output::print_json(&Document {
             output: args.output.display().to_string(),
             group: &args.group,
             model: model.options.name(),
             options: &model.options,
-            training_speeds_m_per_s: set.speeds_m_per_s(),
+            max_crush_rule: model.max_crush_rule,
+            training_speeds_m_per_s: speeds().collect(),
             training_hash: &model.training_hash,
             out_of_bag,
-            validation: &model.validation,
+            validation: &model.leave_one_out,
         })?;
     } else {
         output::print(|out| {
-            let speeds: Vec<String> = set.speeds_m_per_s().iter().map(|&v| km_per_h(v)).collect();
+            let speeds: Vec<String> = speeds().map(km_per_h).collect();
             writeln!(out, "{} on {}", model.options.name(), speeds.join(", "))?;
             if let Some(oob) = out_of_bag {
                 let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
                 writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;
             }
-            if !model.validation.is_empty() {
-                let heading = ["left out", "force error", "energy", "max crush"];
-                let rows: Vec<Vec<String>> = model.validation.iter().map(validation_row).collect();
-                output::table(out, &heading, &rows)?;
+            if let Some(validation) = &model.leave_one_out {
+                super::validate::print_means(out, validation)?;
             }
             writeln!(out, "wrote {}", args.output.display())
         })?;
     }
     Ok(if warned { Outcome::Warned } else { Outcome::Clean })
-}
-
-fn validation_row(left_out: &LeftOut) -> Vec<String> {
-    vec![
-        km_per_h(left_out.speed_m_per_s),
-        format!("{:.2} %", left_out.force_l1 * 100.0),
-        format!("{:+.2} %", left_out.energy_error * 100.0),
-        format!("{:+.2} %", left_out.max_crush_error * 100.0),
-    ]
 }

@@ -2,6 +2,7 @@
 //!
 //! Deflection is positive in compression, force pushes the bodies apart; SI throughout.
 
+pub mod body;
 pub mod cfc;
 pub mod energy;
 pub mod envelope;
@@ -11,6 +12,9 @@ pub mod rating;
 pub mod recipe;
 pub mod resample;
 
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::Speed;
@@ -139,6 +143,15 @@ pub struct Source {
     pub problems: usize,
 }
 
+/// A further case parameter beside speed: a number whose name carries its unit
+/// (`angle_deg`), or a category (`obstacle`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Parameter {
+    Number(f64),
+    Category(String),
+}
+
 /// Energy of the loading branch against the kinetic energy it stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyAudit {
@@ -166,6 +179,8 @@ pub struct Case {
     pub name: String,
     pub speed: Speed,
     pub masses: Masses,
+    /// What else distinguishes the case from others of its group, by name.
+    pub parameters: BTreeMap<String, Parameter>,
     pub force_kind: ForceKind,
     /// At the common interval, from contact on.
     pub sampled: Curve,

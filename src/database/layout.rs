@@ -1,6 +1,6 @@
 //! Layout of the database file: `/group/case` with attributes and datasets.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use hdf5_pure::{AttrValue, File, FileBuilder, Group, GroupBuilder};
@@ -12,7 +12,7 @@ use crate::unit::{Speed, SpeedKind};
 /// Value of the root attribute `format`.
 pub const FORMAT: &str = "crumple curve database";
 /// Layout version this program writes; it reads this and every older one.
-pub const VERSION: i64 = 1;
+pub const VERSION: i64 = 2;
 
 /// Encodes a database as the bytes of an HDF5 file.
 pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
@@ -49,6 +49,7 @@ fn encode_case(case: &Case, group: &mut GroupBuilder) -> Result<(), DatabaseErro
     if let Some(other) = case.masses.other_kg {
         group.set_attr("other_mass_kg", AttrValue::F64(other));
     }
+    group.set_attr("parameters", text(&json(serde_json::to_string(&case.parameters))?));
     group.set_attr("force_kind", text(case.force_kind.name()));
     group.set_attr("contact_time_s", AttrValue::F64(case.contact_time_s));
     group.set_attr("loading_end", AttrValue::I64(case.loading_end() as i64));
@@ -212,6 +213,11 @@ fn decode_case(
                 true => Some(attrs.positive("other_mass_kg")?),
                 false => None,
             },
+        },
+        // Layout version 1 has none.
+        parameters: match attrs.map.contains_key("parameters") {
+            true => attrs.json("parameters")?,
+            false => BTreeMap::new(),
         },
         force_kind,
         sampled,

@@ -7,7 +7,8 @@ use crate::curve::Envelope;
 pub enum Unloading {
     /// The envelope is followed back (the reference model, which has no memory).
     Elastic,
-    /// A straight line of this stiffness in N/m; reloading follows it back up.
+    /// A straight line of this stiffness in N/m; reloading follows it back up. Where the
+    /// envelope rises more steeply than that, the line is stiffer: see [`ForceLaw`].
     Memory { stiffness_n_per_m: f64 },
 }
 
@@ -24,19 +25,28 @@ pub enum EnvelopeEnd {
 
 /// Force over deflection at an interface.
 ///
-/// Invariant: with memory, the unloading stiffness is at least the envelope's steepest
-/// rise, so that no deflection creates energy.
+/// Invariant: with memory, the dissipated energy never falls while the deflection grows, so
+/// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
+/// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
+/// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
+/// one stiff line for both would lose most of the rebound. Therefore
+/// `D(δ) = min(A(δ) − F_e²/2k_s, max over s ≤ δ of A(s) − F_e(s)²/2k)`, not below 0, and the
+/// line at δ has the stiffness `F_e²/2(A − D)`, which lies between `k` and `k_s`. With
+/// `k ≥ k_s` this is the law of one stiffness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceLaw {
     envelope: Envelope,
     unloading: Unloading,
     end: EnvelopeEnd,
     end_slope_n_per_m: f64,
+    /// Steepest rise of the envelope, or the unloading stiffness if that is more.
+    steepest_n_per_m: f64,
+    /// `max over s ≤ δ of A(s) − F_e(s)²/2k` at each point of the envelope, in J.
+    dissipated_j: Vec<f64>,
 }
 
 impl ForceLaw {
-    /// A softer unloading than the envelope's steepest rise is raised to it; forces below
-    /// zero become zero, because an interface only pushes.
+    /// Forces below zero become zero, because an interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
         let envelope = envelope.pushing();
         let n = envelope.deflection_m().len();
@@ -45,13 +55,16 @@ impl ForceLaw {
             EnvelopeEnd::Slope => ((f[n - 1] - f[n - 2]) / (d[n - 1] - d[n - 2])).max(0.0),
             EnvelopeEnd::Hold | EnvelopeEnd::Error => 0.0,
         };
-        let unloading = match unloading {
-            Unloading::Elastic => Unloading::Elastic,
-            Unloading::Memory { stiffness_n_per_m } => {
-                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m.max(envelope.max_slope()) }
+        let (mut steepest_n_per_m, mut dissipated_j) = (envelope.max_slope(), Vec::new());
+        if let Unloading::Memory { stiffness_n_per_m } = unloading {
+            steepest_n_per_m = steepest_n_per_m.max(stiffness_n_per_m);
+            let mut most = 0.0_f64;
+            for (&d, &f) in d.iter().zip(f) {
+                most = most.max(envelope.work_to(d) - 0.5 * f * f / stiffness_n_per_m);
+                dissipated_j.push(most);
             }
-        };
-        Self { envelope, unloading, end, end_slope_n_per_m }
+        }
+        Self { envelope, unloading, end, end_slope_n_per_m, steepest_n_per_m, dissipated_j }
     }
 
     pub fn unloading(&self) -> Unloading {
@@ -72,8 +85,23 @@ impl ForceLaw {
     pub fn max_stiffness_n_per_m(&self) -> f64 {
         match self.unloading {
             Unloading::Elastic => self.envelope.max_slope().max(self.steepest_fall()),
-            Unloading::Memory { stiffness_n_per_m } => stiffness_n_per_m,
+            Unloading::Memory { .. } => self.steepest_n_per_m,
         }
+    }
+
+    /// Force on the envelope at δ and the energy stored there, in N and J.
+    fn stored_at(&self, deflection_m: f64, stiffness_n_per_m: f64) -> (f64, f64) {
+        let force = self.envelope_n(deflection_m);
+        let softest = 0.5 * force * force / stiffness_n_per_m;
+        if stiffness_n_per_m >= self.steepest_n_per_m {
+            return (force, softest);
+        }
+        let work = self.envelope_work_j(deflection_m);
+        let before = self.envelope.deflection_m().partition_point(|&d| d <= deflection_m);
+        // Within a segment A − F²/2k is monotone, so its ends and δ decide.
+        let dissipated = self.dissipated_j[before.max(1) - 1].max(work - softest);
+        let stiffest = 0.5 * force * force / self.steepest_n_per_m;
+        (force, (work - dissipated).max(stiffest))
     }
 
     fn steepest_fall(&self) -> f64 {
@@ -103,8 +131,12 @@ impl ForceLaw {
             Unloading::Elastic => self.envelope_n(deflection_m),
             Unloading::Memory { .. } if deflection_m >= largest_m => self.envelope_n(deflection_m),
             Unloading::Memory { stiffness_n_per_m } => {
-                let top = self.envelope_n(largest_m);
-                (top - stiffness_n_per_m * (largest_m - deflection_m)).max(0.0)
+                let (top, stored) = self.stored_at(largest_m, stiffness_n_per_m);
+                if stored <= 0.0 {
+                    return 0.0; // the envelope itself has no force here
+                }
+                let stiffness = 0.5 * top * top / stored;
+                (top - stiffness * (largest_m - deflection_m)).max(0.0)
             }
         }
     }
@@ -117,10 +149,13 @@ impl ForceLaw {
         match self.unloading {
             Unloading::Elastic => (self.envelope_work_j(deflection_m.max(0.0)), 0.0),
             Unloading::Memory { stiffness_n_per_m } => {
-                let stored = |force: f64| force * force / (2.0 * stiffness_n_per_m);
-                let top = self.envelope_n(largest_m);
-                let dissipated = self.envelope_work_j(largest_m) - stored(top);
-                (stored(self.force_n(deflection_m, largest_m)), dissipated)
+                let (top, stored) = self.stored_at(largest_m, stiffness_n_per_m);
+                let dissipated = self.envelope_work_j(largest_m) - stored;
+                if top <= 0.0 {
+                    return (0.0, dissipated);
+                }
+                let share = self.force_n(deflection_m, largest_m) / top;
+                (share * share * stored, dissipated)
             }
         }
     }
@@ -156,10 +191,30 @@ mod tests {
         assert_eq!((stored, same), (0.0, dissipated));
     }
 
+    /// Softer than the spike's flank: the rebound at the end follows the stiffness asked
+    /// for, and on the way there no step of the deflection gives energy back.
     #[test]
-    fn soft_unloading_is_raised_to_the_steepest_rise() {
-        let law = law(Unloading::Memory { stiffness_n_per_m: 1.0 });
-        assert_eq!(law.unloading(), Unloading::Memory { stiffness_n_per_m: 10e6 });
+    fn soft_unloading_never_creates_energy() {
+        let envelope =
+            || Envelope::new(vec![0.0, 0.01, 0.02, 0.5], vec![0.0, 3e6, 1e6, 2e6]).unwrap();
+        let with = |stiffness_n_per_m| {
+            let unloading = Unloading::Memory { stiffness_n_per_m };
+            ForceLaw::new(envelope(), unloading, EnvelopeEnd::Hold)
+        };
+        let soft = with(40e6);
+        assert_eq!(soft.max_stiffness_n_per_m(), 300e6);
+        let (stored, _) = soft.energies_j(0.4, 0.4);
+        let top = soft.force_n(0.4, 0.4);
+        assert!((stored - top * top / 80e6).abs() < 1e-6, "on its own line at the end");
+        let mut before = 0.0;
+        for i in 1..=600 {
+            let largest = 1e-3 * f64::from(i);
+            let (stored, dissipated) = soft.energies_j(largest, largest);
+            assert!(dissipated >= before - 1e-9, "at {largest} m");
+            let line = with(300e6).energies_j(largest, largest);
+            assert!(stored >= line.0 - 1e-9 && dissipated <= line.1 + 1e-9);
+            before = dissipated;
+        }
     }
 
     #[test]

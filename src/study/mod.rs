@@ -2,7 +2,7 @@
 
 mod located;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use crate::curve::extract::{DeclaredSpeed, ExtractError, Measured, MeasuredForce, Setup, extract};
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
-use crate::curve::{Case, ForceKind, Masses, Source};
+use crate::curve::{Case, ForceKind, Masses, Parameter, Source};
 use crate::history::{EntityId, Side};
 use crate::manifest::{self, ManifestError};
 use crate::solver::decks::{self, Search};
@@ -78,6 +78,10 @@ pub struct RunEntry {
     pub mass: MassText,
     /// Mass of the other body, if the bodies of a pair differ.
     pub other_mass: Option<MassText>,
+    /// Further parameters of the case, the same names in every run: numbers whose names carry
+    /// their units (`angle_deg = 10`), or categories (`obstacle = "pole"`).
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
 }
 
 /// A manifest that makes sense, and where it stands.
@@ -168,6 +172,7 @@ fn check(manifest: &Manifest) -> Result<(), String> {
     }
     let mut names = HashSet::new();
     for run in &manifest.run {
+        check_parameters(run)?;
         if run.path.trim().is_empty() {
             return Err("a [[run]] has an empty path".into());
         }
@@ -185,6 +190,28 @@ fn check(manifest: &Manifest) -> Result<(), String> {
                 "two runs are named \"{}\": give one of them a name = …",
                 run.case_name()
             ));
+        }
+    }
+    Ok(())
+}
+
+/// Names that the models use themselves.
+const TAKEN: [&str; 4] = ["speed_m_per_s", "deflection_m", "mass_kg", "other_mass_kg"];
+
+fn check_parameters(run: &RunEntry) -> Result<(), String> {
+    for (name, value) in &run.parameters {
+        let shown = name.escape_debug();
+        if name.trim().is_empty() || name.contains(|c: char| c.is_control() || c == '=') {
+            return Err(format!("run \"{}\": parameter \"{shown}\" is no name", run.path));
+        }
+        if TAKEN.contains(&name.as_str()) {
+            return Err(format!(
+                "run \"{}\": parameter \"{shown}\" has a key of its own: use speed or mass",
+                run.path
+            ));
+        }
+        if matches!(value, Parameter::Number(v) if !v.is_finite()) {
+            return Err(format!("run \"{}\": parameter \"{shown}\" is not finite", run.path));
         }
     }
     Ok(())
@@ -292,6 +319,7 @@ impl Study {
                 "speed_m_per_s": entry.speed.map(|s| s.0),
                 "mass_kg": entry.mass.0,
                 "other_mass_kg": entry.other_mass.map(|m| m.0),
+                "parameters": entry.parameters,
             },
         })
         .to_string()
@@ -415,6 +443,7 @@ impl LocatedRun<'_> {
             name: self.entry.case_name(),
             speed: extracted.speed,
             masses,
+            parameters: self.entry.parameters.clone(),
             force_kind,
             sampled: extracted.sampled,
             closing_speed_m_per_s: extracted.closing_speed_m_per_s,

@@ -1,11 +1,11 @@
-//! `forest` (DDTCM): the reference method's random forest on {v, d} → F.
+//! `forest` (DDTCM), the reference method's random forest on {v, d} → F, and `extra`.
 
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
-use super::{Surrogate, Warning};
-use crate::dataset::{TableKind, TrainingSet};
+use super::{At, CaseCurve, Surrogate, Warning};
+use crate::dataset::{Force, TableKind, TrainingSet};
 use crate::forest::{ForestError, ForestParams, RegressionForest, StopRule, Thresholds};
 
 /// Choices of the forest surrogate.
@@ -17,6 +17,13 @@ pub struct ForestOptions {
     pub stop: StopRule,
     pub min_samples_leaf: usize,
     pub table: TableKind,
+    /// Whether each tree sees a sample drawn with replacement, or all points.
+    #[serde(default = "yes")]
+    pub bootstrap: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl Default for ForestOptions {
@@ -29,6 +36,7 @@ impl Default for ForestOptions {
             stop: StopRule::StdOverMean(0.01),
             min_samples_leaf: 1,
             table: TableKind::Grid,
+            bootstrap: true,
         }
     }
 }
@@ -39,6 +47,12 @@ impl ForestOptions {
     /// leaves the trees practically unpruned.
     pub fn paper() -> Self {
         Self { stop: StopRule::VarOverMean(0.01), table: TableKind::Samples, ..Self::default() }
+    }
+
+    /// Extremely randomised trees: 500 on all points, thresholds at random, so that the
+    /// forest is nearly continuous in speed.
+    pub fn extra() -> Self {
+        Self { trees: 500, thresholds: Thresholds::Random, bootstrap: false, ..Self::default() }
     }
 }
 
@@ -57,14 +71,19 @@ impl ForestSurrogate {
     ///
     /// # Errors
     /// [`ForestError`] for options that make no forest.
-    pub fn fit(set: &TrainingSet, options: &ForestOptions) -> Result<Self, ForestError> {
+    pub fn fit(
+        set: &TrainingSet,
+        force: Force,
+        options: &ForestOptions,
+    ) -> Result<Self, ForestError> {
         let forest = ForestParams::new(options.trees)
             .seed(options.seed)
             .thresholds(options.thresholds)
             .stop(options.stop)
             .min_samples_leaf(options.min_samples_leaf)
-            .out_of_bag(true)
-            .fit(&set.table(options.table))?;
+            .bootstrap(options.bootstrap)
+            .out_of_bag(options.bootstrap)
+            .fit(&set.table_of(options.table, force))?;
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
 
@@ -73,25 +92,29 @@ impl ForestSurrogate {
     }
 
     /// Checks a forest that was read from a file.
-    pub fn check(&self) -> Result<(), String> {
-        if self.forest.features() != 2 {
-            return Err(format!("the forest has {} features instead of 2", self.forest.features()));
+    pub fn check(&self, features: usize) -> Result<(), String> {
+        if self.forest.features() != features {
+            let found = self.forest.features();
+            return Err(format!("the forest has {found} features instead of {features}"));
         }
         self.forest.check().map_err(|e| e.to_string())
     }
 }
 
 impl Surrogate for ForestSurrogate {
-    fn force_n(&self, speed_m_per_s: f64, deflection_m: &[f64]) -> Vec<f64> {
-        let records = Array2::from_shape_fn((deflection_m.len(), 2), |(i, k)| match k {
-            0 => speed_m_per_s,
-            _ => deflection_m[i],
+    fn force_n(&self, _: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+        let shape = (deflection_m.len(), 2 + at.features.len());
+        let records = Array2::from_shape_fn(shape, |(i, k)| match k {
+            0 => at.speed_m_per_s,
+            1 => deflection_m[i],
+            _ => at.features[k - 2],
         });
         let force: Array1<f64> = self.forest.predict(&records);
         force.to_vec()
     }
 
-    fn warnings(&self, speed_m_per_s: f64) -> Vec<Warning> {
+    fn warnings(&self, _: &[CaseCurve], at: &At<'_>) -> Vec<Warning> {
+        let speed_m_per_s = at.speed_m_per_s;
         if self.forest.params().thresholds() == Thresholds::Random {
             return Vec::new();
         }
@@ -101,6 +124,7 @@ impl Surrogate for ForestSurrogate {
         };
         self.speeds_m_per_s
             .windows(2)
+            .filter(|pair| pair[0] < pair[1])
             .filter(near)
             .map(|pair| Warning::near_split_midpoint(speed_m_per_s, pair[0], pair[1]))
             .collect()

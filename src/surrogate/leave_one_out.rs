@@ -1,63 +1,105 @@
-//! Leave-one-speed-out: predict every inner speed from the others.
+//! What leave-one-speed-out finds: errors of a model at speeds it was not trained on.
 
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::band::Band;
 use super::max_crush::MaxCrushRule;
-use super::model::{Model, ModelError, Options};
-use super::predict::{Query, predict};
-use crate::curve::rating::l1_ratio;
-use crate::dataset::{GRID_M, TrainingSet};
 
-/// Errors of a model at a speed it was not trained on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Errors of one model at one speed that was left out.
+///
+/// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, less 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
+    pub model: String,
     pub case: String,
     pub speed_m_per_s: f64,
-    /// Force along the FE case's crush.
+    /// Whether training speeds lie on both sides; else it is extrapolation.
+    pub inner: bool,
+    /// Declared force along the FE case's crush.
     pub force_l1: f64,
-    /// Energy of the predicted curve over FE's, less 1.
+    /// Energy of the predicted curve.
     pub energy_error: f64,
-    /// Predicted maximal crush (monotone rule) over FE's, less 1.
+    /// Maximal crush by the model's rule.
     pub max_crush_error: f64,
+    /// Maximal crush by every rule that has an answer.
+    pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
+    /// The first two peaks of FE's curve.
+    pub peaks: Vec<PeakError>,
+    /// Multi-body run driven by the model's body force; by the declared one if the two are
+    /// the same.
+    pub velocity_l1: f64,
+    /// Accelerations filtered with CFC 60, as SAE J211 has it for the comparison of vehicles.
+    pub acceleration_l1: f64,
+    /// Accelerations as central differences over two sampling intervals, not filtered.
+    pub acceleration_unfiltered_l1: f64,
+    /// The same run driven by the contact force, where that is another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_velocity_l1: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_acceleration_l1: Option<f64>,
+    /// Share of the FE curve's points inside the band that the other left-out speeds give.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
 }
 
-/// Leaves each inner speed out in turn; empty with fewer than three cases.
-///
-/// # Errors
-/// [`ModelError`] if the remaining cases make no model.
-pub fn validate(set: &TrainingSet, options: Options) -> Result<Vec<LeftOut>, ModelError> {
-    (1..set.cases.len().saturating_sub(1))
-        .filter_map(|i| left_out(set, options, i).transpose())
-        .collect()
+/// One peak of FE's curve and the predicted one that matches it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PeakError {
+    pub deflection_m: f64,
+    #[serde(rename = "force_N")]
+    pub force_n: f64,
+    /// `None`: the prediction has no peak there.
+    pub force_error: Option<f64>,
+    pub shift_m: Option<f64>,
 }
 
-fn left_out(set: &TrainingSet, options: Options, i: usize) -> Result<Option<LeftOut>, ModelError> {
-    let case = &set.cases[i];
-    let model = Model::fit_only(&without(set, i), options)?;
-    let end = case.envelope.end_m();
-    let steps = (end / GRID_M).ceil().clamp(2.0, 1e6) as usize;
-    let grid: Vec<f64> = (0..=steps).map(|k| end * k as f64 / steps as f64).collect();
-    let reference: Vec<f64> = grid.iter().map(|&d| case.envelope.force_at(d)).collect();
-    let predicted = model.force_n(case.speed_m_per_s, &grid);
-    let query =
-        Query { speed_m_per_s: case.speed_m_per_s, mass_kg: None, rule: MaxCrushRule::Monotone };
-    // Without a maximal crush (all runs truncated) there is nothing to report.
-    let Ok(curve) = predict(&model, &query) else { return Ok(None) };
-    let left_out = LeftOut {
-        case: case.name.clone(),
-        speed_m_per_s: case.speed_m_per_s,
-        force_l1: l1_ratio(&reference, &predicted),
-        energy_error: curve.energy_j / case.envelope.work() - 1.0,
-        max_crush_error: curve.max_deflection_m / end - 1.0,
-    };
-    // A reference without force has no relative errors; JSON could not hold them either.
-    let errors = [left_out.force_l1, left_out.energy_error, left_out.max_crush_error];
-    Ok(errors.iter().all(|e| e.is_finite()).then_some(left_out))
+/// FE's own curve in the same multi-body model: what no prediction of that force beats,
+/// but for luck.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Floor {
+    /// `contact` or `body`.
+    pub force: String,
+    pub case: String,
+    pub speed_m_per_s: f64,
+    pub inner: bool,
+    pub velocity_l1: f64,
+    pub acceleration_l1: f64,
+    pub acceleration_unfiltered_l1: f64,
 }
 
-/// The set without its `i`-th case.
-pub fn without(set: &TrainingSet, i: usize) -> TrainingSet {
-    let mut rest = set.clone();
-    rest.cases.remove(i);
-    rest
+/// Means of one model over the inner speeds; of magnitudes where errors have signs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Means {
+    pub model: String,
+    pub speeds: usize,
+    pub force_l1: f64,
+    pub energy_error: f64,
+    /// By the model's rule.
+    pub max_crush_error: f64,
+    pub max_crush_rule: MaxCrushRule,
+    pub velocity_l1: f64,
+    pub acceleration_l1: f64,
+    pub acceleration_unfiltered_l1: f64,
+}
+
+/// Leave-one-speed-out of a group: what `crumple validate` prints and a model file keeps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Validation {
+    pub group: String,
+    /// The model that `auto` takes.
+    pub chosen: String,
+    /// Why it is that one.
+    pub reason: String,
+    pub rows: Vec<LeftOut>,
+    pub means: Vec<Means>,
+    pub floors: Vec<Floor>,
+    /// Of the chosen model, from its residuals at the inner speeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band: Option<Band>,
+    /// What was left out of the table, with the reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }

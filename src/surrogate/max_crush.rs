@@ -1,4 +1,4 @@
-//! Maximal crush as a function of impact speed: three rules, and their spread.
+//! Maximal crush as a function of impact speed: four rules, and their spread.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,17 @@ use crate::curve::Envelope;
 
 /// How the maximal crush is found.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum MaxCrushRule {
@@ -17,14 +27,21 @@ pub enum MaxCrushRule {
     Monotone,
     /// Where the predicted curve has taken up the kinetic energy.
     Energy,
+    /// Where the body's force has stopped the body; the same as `energy` if the predicted
+    /// curve is that force. A contact curve takes up the energy too early, because mass in the
+    /// crush zone is stopped before the body.
+    Motion,
 }
 
 impl MaxCrushRule {
+    pub const ALL: [Self; 4] = [Self::Spline, Self::Monotone, Self::Energy, Self::Motion];
+
     pub fn name(self) -> &'static str {
         match self {
             Self::Spline => "spline",
             Self::Monotone => "monotone",
             Self::Energy => "energy",
+            Self::Motion => "motion",
         }
     }
 }

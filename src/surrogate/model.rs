@@ -6,11 +6,17 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::forest::{ForestOptions, ForestSurrogate};
-use super::leave_one_out::{self, LeftOut};
+use super::gp::Gp;
+use super::landmarks::Landmarks;
+use super::leave_one_out::Validation;
+use super::linear::Linear;
+use super::max_crush::MaxCrushRule;
 use super::nearest::Nearest;
-use super::{Surrogate, Warning};
-use crate::curve::{ForceKind, Masses};
-use crate::dataset::{DatasetError, TrainingSet};
+use super::rate::Rate;
+use super::registered::Registered;
+use super::{At, CaseCurve, Surrogate, Warning};
+use crate::curve::{EnvelopeError, ForceKind, Masses};
+use crate::dataset::{DatasetError, Feature, Force, TrainingCase, TrainingSet, grid, nearest};
 use crate::file::{WriteError, write_whole};
 use crate::forest::ForestError;
 use crate::unit::SpeedKind;
@@ -18,51 +24,157 @@ use crate::unit::SpeedKind;
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
 /// Version of model files this program writes; it reads this and every older one.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+/// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
+const STEPS: usize = 200;
+/// A nearest training speed further away than this share of the speed needs a word.
+const FAR: f64 = 0.25;
 
 /// Which surrogate, with its choices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case")]
 pub enum Options {
-    Forest(ForestOptions),
     Nearest,
+    Linear,
+    Rate,
+    Registered,
+    Extra(ForestOptions),
+    Forest(ForestOptions),
+    Gp,
 }
 
 impl Options {
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Forest(_) => "forest",
             Self::Nearest => "nearest",
+            Self::Linear => "linear",
+            Self::Rate => "rate",
+            Self::Registered => "registered",
+            Self::Extra(_) => "extra",
+            Self::Forest(_) => "forest",
+            Self::Gp => "gp",
+        }
+    }
+
+    /// Whether the model sees more than the speed.
+    fn takes_features(&self) -> bool {
+        match self {
+            Self::Nearest | Self::Extra(_) | Self::Forest(_) | Self::Gp => true,
+            Self::Linear | Self::Rate | Self::Registered => false,
         }
     }
 }
 
-/// A fitted surrogate.
+/// A fitted surrogate. Those without content answer from the training curves alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitted {
+    Nearest,
+    Linear,
+    Rate(Rate),
+    Registered,
+    Extra(ForestSurrogate),
     Forest(ForestSurrogate),
-    Nearest(Nearest),
+    Gp,
 }
 
 impl Fitted {
+    fn of(
+        set: &TrainingSet,
+        cases: &[CaseCurve],
+        force: Force,
+        options: &Options,
+    ) -> Result<Self, ModelError> {
+        Ok(match options {
+            Options::Nearest => Self::Nearest,
+            Options::Linear => Self::Linear,
+            Options::Rate => Self::Rate(Rate::fit(cases)),
+            Options::Registered => Self::Registered,
+            Options::Extra(options) => Self::Extra(ForestSurrogate::fit(set, force, options)?),
+            Options::Forest(options) => Self::Forest(ForestSurrogate::fit(set, force, options)?),
+            Options::Gp => Self::Gp,
+        })
+    }
+
     fn surrogate(&self) -> &dyn Surrogate {
         match self {
-            Self::Forest(forest) => forest,
-            Self::Nearest(nearest) => nearest,
+            Self::Nearest => &Nearest,
+            Self::Linear => &Linear,
+            Self::Rate(rate) => rate,
+            Self::Registered => &Registered,
+            Self::Extra(forest) | Self::Forest(forest) => forest,
+            Self::Gp => &Gp,
+        }
+    }
+
+    fn check(&self, features: usize) -> Result<(), String> {
+        match self {
+            Self::Rate(rate) => rate.check(),
+            Self::Extra(forest) | Self::Forest(forest) => forest.check(2 + features),
+            Self::Nearest | Self::Linear | Self::Registered | Self::Gp => Ok(()),
         }
     }
 }
 
-/// What a model keeps of a training case.
+/// What a model keeps of a training case: its curves over even deflections, no coarser than
+/// 2 mm, and its ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelCase {
     pub name: String,
     pub speed_m_per_s: f64,
+    /// Values of the model's features.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub features: Vec<f64>,
     pub max_deflection_m: f64,
     pub truncated: bool,
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Speed of separation when the body force has first fallen to zero.
+    #[serde(default)]
+    pub rebound_speed_m_per_s: Option<f64>,
+    /// Empty in files of version 1.
+    #[serde(default)]
+    pub deflection_m: Vec<f64>,
+    #[serde(rename = "force_N", default)]
+    pub force_n: Vec<f64>,
+    /// The force of the body's motion; empty where the declared force is one.
+    #[serde(rename = "body_force_N", default)]
+    pub body_force_n: Vec<f64>,
+    #[serde(default)]
+    pub closing_speed_m_per_s: Vec<f64>,
+}
+
+impl ModelCase {
+    fn of(case: &TrainingCase, kind: ForceKind) -> Self {
+        let deflection_m = grid(case.envelope.end_m(), STEPS);
+        let over = |at: &dyn Fn(f64) -> f64| deflection_m.iter().map(|&d| at(d)).collect();
+        Self {
+            name: case.name.clone(),
+            speed_m_per_s: case.speed_m_per_s,
+            features: case.features.clone(),
+            max_deflection_m: case.envelope.end_m(),
+            truncated: case.truncated,
+            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            rebound_speed_m_per_s: case.motion.rebound_speed_m_per_s,
+            force_n: over(&|d| case.envelope.force_at(d)),
+            body_force_n: match kind {
+                ForceKind::Contact => over(&|d| case.motion.force.force_at(d)),
+                ForceKind::Body => Vec::new(),
+            },
+            closing_speed_m_per_s: over(&|d| case.motion.closing_speed.force_at(d).max(0.0)),
+            deflection_m,
+        }
+    }
+
+    fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, EnvelopeError> {
+        CaseCurve::new(
+            self.speed_m_per_s,
+            self.features.clone(),
+            self.deflection_m.clone(),
+            force_n.to_vec(),
+            self.closing_speed_m_per_s.clone(),
+        )
+    }
 }
 
 /// A model file: versioned, self-describing JSON, readable without this program.
@@ -76,14 +188,47 @@ pub struct Model {
     pub force_kind: ForceKind,
     pub mass_kg: f64,
     pub other_mass_kg: Option<f64>,
+    /// Parameters beside speed that queries must give.
+    #[serde(default)]
+    pub features: Vec<Feature>,
     /// Hash over the fingerprints of the training cases.
     pub training_hash: String,
     /// In order of speed.
     pub cases: Vec<ModelCase>,
     pub options: Options,
-    /// Errors when each inner speed was left out; empty with fewer than three cases.
-    pub validation: Vec<LeftOut>,
+    /// How the maximal crush is found if a query does not say.
+    #[serde(default)]
+    pub max_crush_rule: MaxCrushRule,
+    /// Pairs of neighbouring training speeds between which the collapse changes its mode.
+    #[serde(default)]
+    pub mode_switches_m_per_s: Vec<(f64, f64)>,
+    /// Leave-one-speed-out of the group, if it was asked for.
+    #[serde(default)]
+    pub leave_one_out: Option<Validation>,
+    /// For the declared force.
     fitted: Fitted,
+    /// For the force of the body's motion, where that is another.
+    #[serde(default)]
+    fitted_body: Option<Fitted>,
+    /// The curves of `cases`, made when the model is fitted or read.
+    #[serde(skip)]
+    curves: Curves,
+}
+
+/// Training curves by force.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Curves {
+    declared: Vec<CaseCurve>,
+    body: Vec<CaseCurve>,
+}
+
+impl Curves {
+    fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
+        let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
+            cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
+        };
+        Ok(Self { declared: with(|c| &c.force_n)?, body: with(|c| &c.body_force_n)? })
+    }
 }
 
 /// Why a model cannot be fitted, read or written.
@@ -94,9 +239,15 @@ pub enum ModelError {
     #[error(transparent)]
     Forest(#[from] ForestError),
     #[error(
-        "a forest needs at least 2 speeds, the group has 1: only --model nearest can use a single curve"
+        "a {model} model needs at least 2 curves, the group has 1: only --model nearest can use a single curve, as it is"
     )]
-    OneSpeed,
+    OneCurve { model: &'static str },
+    #[error(
+        "a {model} model sees only the speed, but the cases also differ in {features}: use --model forest, extra or gp, or keep cases that differ in speed alone"
+    )]
+    OneParameter { model: &'static str, features: String },
+    #[error("{0}")]
+    Curve(#[from] EnvelopeError),
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
     #[error(
@@ -112,33 +263,29 @@ pub enum ModelError {
 }
 
 impl Model {
-    /// Fits the model and validates it by leaving each inner speed out.
+    /// Fits the model to both forces of the set. The choice of a model by leaving speeds
+    /// out is `validate::train`'s.
     ///
     /// # Errors
-    /// [`ModelError`] if the set is too small for the model or its options are wrong.
+    /// [`ModelError`] if the set is too small for the model, differs in more than the model
+    /// sees, or its options are wrong.
     pub fn fit(set: &TrainingSet, options: Options) -> Result<Self, ModelError> {
-        let mut model = Self::fit_only(set, options)?;
-        model.validation = leave_one_out::validate(set, options)?;
-        Ok(model)
-    }
-
-    /// Fits the model without validating it.
-    ///
-    /// # Errors
-    /// As [`Model::fit`].
-    pub fn fit_only(set: &TrainingSet, options: Options) -> Result<Self, ModelError> {
-        let fitted = match &options {
-            Options::Forest(_) if set.cases.len() < 2 => return Err(ModelError::OneSpeed),
-            Options::Forest(options) => Fitted::Forest(ForestSurrogate::fit(set, options)?),
-            Options::Nearest => Fitted::Nearest(Nearest::fit(set)),
+        let model = options.name();
+        if set.cases.len() < 2 && options != Options::Nearest {
+            return Err(ModelError::OneCurve { model });
+        }
+        if !set.features.is_empty() && !options.takes_features() {
+            let features: Vec<String> = set.features.iter().map(Feature::name).collect();
+            return Err(ModelError::OneParameter { model, features: features.join(", ") });
+        }
+        let cases: Vec<ModelCase> =
+            set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
+        let curves = Curves::of(&cases)?;
+        let switches = match set.features.is_empty() {
+            true => Landmarks::of(&curves.declared).jumps,
+            false => Vec::new(),
         };
-        let case = |c: &crate::dataset::TrainingCase| ModelCase {
-            name: c.name.clone(),
-            speed_m_per_s: c.speed_m_per_s,
-            max_deflection_m: c.envelope.end_m(),
-            truncated: c.truncated,
-            unloading_stiffness_n_per_m: c.unloading_stiffness_n_per_m,
-        };
+        let speed = |i: usize| cases[i].speed_m_per_s;
         Ok(Self {
             format: FORMAT.into(),
             version: VERSION,
@@ -148,11 +295,19 @@ impl Model {
             force_kind: set.force_kind,
             mass_kg: set.masses.body_kg,
             other_mass_kg: set.masses.other_kg,
+            features: set.features.clone(),
             training_hash: set.hash(),
-            cases: set.cases.iter().map(case).collect(),
+            max_crush_rule: default_rule(&options, set),
+            mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
+            leave_one_out: None,
+            fitted: Fitted::of(set, &curves.declared, Force::Declared, &options)?,
+            fitted_body: match set.force_kind {
+                ForceKind::Contact => Some(Fitted::of(set, &curves.body, Force::Body, &options)?),
+                ForceKind::Body => None,
+            },
             options,
-            validation: Vec::new(),
-            fitted,
+            cases,
+            curves,
         })
     }
 
@@ -181,7 +336,12 @@ impl Model {
         if head.version > VERSION {
             return Err(ModelError::Version { path: path.into(), found: head.version });
         }
-        let model: Self = serde_json::from_slice(&text).map_err(no_model)?;
+        let mut model: Self = match head.version {
+            1 => from_version_1(&text).map_err(no_model)?,
+            _ => serde_json::from_slice(&text).map_err(no_model)?,
+        };
+        model.curves = Curves::of(&model.cases)
+            .map_err(|e| ModelError::Damaged { path: path.into(), detail: e.to_string() })?;
         model.check().map_err(|detail| ModelError::Damaged { path: path.into(), detail })?;
         Ok(model)
     }
@@ -192,10 +352,14 @@ impl Model {
             return Err("it has no cases".into());
         }
         let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
-        if !speeds().zip(speeds().skip(1)).all(|(a, b)| a < b)
+        let several = !self.features.is_empty();
+        if !speeds().zip(speeds().skip(1)).all(|(a, b)| a < b || several && a == b)
             || !speeds().all(|v| v > 0.0 && v.is_finite())
         {
             return Err("its speeds are not increasing".into());
+        }
+        if self.cases.iter().any(|c| c.features.len() != self.features.len()) {
+            return Err("its cases have not as many features as it names".into());
         }
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
             return Err("a maximal deflection is not above 0".into());
@@ -204,10 +368,18 @@ impl Model {
         if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {
             return Err("a mass is not above 0".into());
         }
-        match &self.fitted {
-            Fitted::Forest(forest) => forest.check(),
-            Fitted::Nearest(nearest) => nearest.check(),
+        let answers = |fitted: &Fitted, curves: usize| match fitted {
+            Fitted::Forest(_) | Fitted::Extra(_) => true,
+            _ => curves == self.cases.len(),
+        };
+        let body = self.fitted_body.as_ref();
+        if !answers(&self.fitted, self.curves.declared.len())
+            || !body.is_none_or(|b| answers(b, self.curves.body.len()))
+        {
+            return Err("it lacks the curves of its cases".into());
         }
+        self.fitted.check(self.features.len())?;
+        body.map_or(Ok(()), |b| b.check(self.features.len()))
     }
 
     /// The model file's bytes.
@@ -241,21 +413,78 @@ impl Model {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
     }
 
-    /// Forces in N at a speed and increasing deflections.
-    pub fn force_n(&self, speed_m_per_s: f64, deflection_m: &[f64]) -> Vec<f64> {
-        self.fitted.surrogate().force_n(speed_m_per_s, deflection_m)
+    /// The declared forces in N at increasing deflections.
+    pub fn force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+        self.fitted.surrogate().force_n(&self.curves.declared, at, deflection_m)
     }
 
-    /// What a query at this speed must say, for any mass and rule.
-    pub fn warnings(&self, speed_m_per_s: f64) -> Vec<Warning> {
+    /// The forces in N that move the body: of its motion, or the declared ones if the model
+    /// has no others.
+    pub fn body_force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+        match &self.fitted_body {
+            Some(body) => body.surrogate().force_n(&self.curves.body, at, deflection_m),
+            None => self.force_n(at, deflection_m),
+        }
+    }
+
+    /// Whether declared force and body force are two.
+    pub fn has_body_force(&self) -> bool {
+        self.fitted_body.is_some()
+    }
+
+    /// The training curves: of the declared force, and of the body's where it is another.
+    pub fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
+        (&self.curves.declared, &self.curves.body)
+    }
+
+    /// What a query here must say, for any mass and rule.
+    pub fn warnings(&self, at: &At<'_>) -> Vec<Warning> {
+        let v = at.speed_m_per_s;
         let (low, high) = self.range_m_per_s();
         let mut warnings = Vec::new();
-        if !(low..=high).contains(&speed_m_per_s) {
-            warnings.push(Warning::out_of_range(speed_m_per_s, low, high));
+        if self.cases.len() < 3 {
+            warnings.push(Warning::too_few_curves(self.cases.len()));
         }
-        warnings.extend(self.fitted.surrogate().warnings(speed_m_per_s));
+        let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
+        let nearest = self.cases[nearest(speeds(), v)].speed_m_per_s;
+        if !(low..=high).contains(&v) {
+            warnings.push(Warning::out_of_range(v, low, high));
+        } else if (nearest / v - 1.0).abs() > FAR {
+            warnings.push(Warning::far_from_training(v, nearest));
+        }
+        for &(below, above) in &self.mode_switches_m_per_s {
+            if below < v && v < above {
+                warnings.push(Warning::mode_switch(below, above));
+            }
+        }
+        warnings.extend(self.fitted.surrogate().warnings(&self.curves.declared, at));
         let truncated = self.cases.iter().filter(|c| c.truncated);
         warnings.extend(truncated.map(|c| Warning::truncated_training_run(&c.name)));
         warnings
     }
+}
+
+/// The body's own motion; the reference method's forest knows only crush over speed.
+fn default_rule(options: &Options, set: &TrainingSet) -> MaxCrushRule {
+    match options {
+        Options::Forest(_) if set.features.is_empty() => MaxCrushRule::Monotone,
+        _ => MaxCrushRule::Motion,
+    }
+}
+
+/// Files of version 1 have one force; `nearest` kept its curves beside the cases.
+fn from_version_1(text: &[u8]) -> Result<Model, serde_json::Error> {
+    let mut json: serde_json::Value = serde_json::from_slice(text)?;
+    let curves = json.pointer("/fitted/nearest/curves").cloned();
+    if let Some(serde_json::Value::Array(curves)) = curves {
+        if let Some(cases) = json.pointer_mut("/cases").and_then(|c| c.as_array_mut()) {
+            for (case, mut curve) in cases.iter_mut().zip(curves) {
+                for key in ["deflection_m", "force_N"] {
+                    case[key] = curve[key].take();
+                }
+            }
+        }
+        json["fitted"] = "nearest".into();
+    }
+    serde_json::from_value(json)
 }

@@ -1,30 +1,66 @@
 //! Prediction: the force–deflection curve at a new speed.
 
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Model;
+use super::band::Band;
+use super::curves::interpolate_held;
 use super::max_crush::{self, MaxCrushRule};
+use super::model::ModelCase;
 use super::warning::Warning;
-use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses};
-use crate::dataset::{GRID_M, nearest};
+use super::{At, Model};
+use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
+use crate::dataset::{DatasetError, MASS, OTHER_MASS, feature_values, grid, nearest};
 use crate::unit::{Speed, SpeedKind};
 
 /// Points of a predicted curve beside (0, 0), as in the reference data.
 const POINTS: usize = 400;
 /// Deviation of the mass from the training runs' that needs no warning.
 const SAME_MASS: f64 = 1e-3;
+/// The body's motion is followed to this share of the longest training curve.
+const REACH: f64 = 1.5;
+/// Bounds of an energy correction: beyond them level or crush is wrong, not the scale.
+const CORRECTION: (f64, f64) = (0.8, 1.25);
+/// A point stands alone if its force leaves the line between its neighbours by more than
+/// this factor of what any training curve does.
+const SPIKE: f64 = 1.05;
 
 /// What is asked of a model.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Query {
     pub speed_m_per_s: f64,
     /// Mass of the body, or of each body of a pair; the training runs' if absent.
     pub mass_kg: Option<f64>,
-    pub rule: MaxCrushRule,
+    /// How the maximal crush is found; the model's own way if absent.
+    pub rule: Option<MaxCrushRule>,
+    /// Values of the model's further parameters.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Scale the force so that the curve takes up the impact's energy.
+    pub energy_correct: bool,
+}
+
+impl Query {
+    /// The curve at a speed, everything else as the model has it.
+    pub fn at(speed_m_per_s: f64) -> Self {
+        Self {
+            speed_m_per_s,
+            mass_kg: None,
+            rule: None,
+            parameters: BTreeMap::new(),
+            energy_correct: false,
+        }
+    }
+
+    /// The same with a rule for the maximal crush.
+    pub fn with_rule(self, rule: MaxCrushRule) -> Self {
+        Self { rule: Some(rule), ..self }
+    }
 }
 
 /// A predicted curve: the master format of exports (JSON).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PredictedCurve {
     /// Loading branch from (0, 0) to the maximal crush.
     pub deflection_m: Vec<f64>,
@@ -35,8 +71,18 @@ pub struct PredictedCurve {
     pub force_low_n: Option<Vec<f64>>,
     #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub force_high_n: Option<Vec<f64>>,
+    /// The force that moves the body, where `force_N` is what the obstacle feels: mass that
+    /// the crush zone stops early is in the one and not in the other. It drives bodies of one
+    /// mass.
+    #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
+    pub body_force_n: Option<Vec<f64>>,
+    /// One stiffness for unloading from any deflection: at least the steepest rise of the
+    /// curve, so that no deflection creates energy.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: f64,
+    /// The rebound from the maximal crush.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rebound: Option<Rebound>,
     pub max_deflection_m: f64,
     pub speed_m_per_s: f64,
     pub speed_kind: SpeedKind,
@@ -50,8 +96,20 @@ pub struct PredictedCurve {
     pub provenance: Provenance,
 }
 
+/// How the bodies part after the maximal crush.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rebound {
+    /// In m/s; interpolated as a power of the impact speed, since the share that comes back
+    /// falls with it.
+    pub speed_m_per_s: f64,
+    /// Unloading stiffness from the maximal crush that gives this speed: `F²/(m v²)` with the
+    /// force and mass of the body.
+    #[serde(rename = "stiffness_N_per_m")]
+    pub stiffness_n_per_m: f64,
+}
+
 /// Where a predicted curve comes from and how it was checked.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Provenance {
     pub written_by: String,
     pub group: String,
@@ -68,14 +126,26 @@ pub struct Provenance {
     pub kinetic_energy_j: f64,
     /// Energy of the curve over the kinetic energy.
     pub energy_over_kinetic: f64,
+    /// The same for the body force, where it is another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_energy_over_kinetic: Option<f64>,
+    /// What the band around the force rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band: Option<Band>,
+    /// Values of the model's further parameters.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Parameter>,
 }
 
 /// The maximal crush by all rules, in m; `None` where a rule has no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaxCrush {
     pub spline_m: Option<f64>,
     pub monotone_m: Option<f64>,
     pub energy_m: Option<f64>,
+    /// Absent in files of earlier versions.
+    #[serde(default)]
+    pub motion_m: Option<f64>,
     /// Largest less smallest.
     pub spread_m: f64,
 }
@@ -89,6 +159,13 @@ pub enum PredictError {
         "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}"
     )]
     MaxCrush { rule: &'static str, found: String, other: &'static str },
+    #[error(
+        "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: not the scale is wrong; look at mass, speed and the rule for the maximal crush",
+        low = CORRECTION.0, high = CORRECTION.1
+    )]
+    Correction { factor: f64 },
+    #[error(transparent)]
+    Parameters(Box<DatasetError>),
     #[error("the predicted curve is no curve: {0}")]
     Envelope(#[from] EnvelopeError),
     #[error("{0}")]
@@ -98,48 +175,119 @@ pub enum PredictError {
 /// The curve of `model` at the speed of `query`, with its audit and warnings.
 ///
 /// # Errors
-/// [`PredictError`] if the speed is not above 0 or the rule gives no maximal crush.
+/// [`PredictError`] if the speed is not above 0, a parameter is missing, the rule gives no
+/// maximal crush, or an energy correction is out of bounds.
 pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictError> {
     let v = query.speed_m_per_s;
     if !(v > 0.0 && v.is_finite()) {
         return Err(PredictError::Speed { speed_m_per_s: v });
     }
+    let mut parameters = query.parameters.clone();
+    let other = match parameters.get(OTHER_MASS) {
+        Some(Parameter::Number(mass)) if *mass > 0.0 && mass.is_finite() => Some(*mass),
+        _ => None,
+    };
     let masses = match query.mass_kg {
-        Some(mass) => Masses { body_kg: mass, other_kg: model.other_mass_kg.map(|_| mass) },
+        Some(mass) => {
+            let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
+            Masses { body_kg: mass, other_kg }
+        }
         None => model.masses(),
     };
+    if let Some(mass) = query.mass_kg {
+        parameters.insert(MASS.into(), Parameter::Number(mass));
+    }
+    let features = feature_values(&model.features, &parameters)
+        .map_err(|e| PredictError::Parameters(Box::new(e)))?;
     let speed = Speed { m_per_s: v, kind: model.speed_kind };
+    let mass_kg = masses.effective_kg();
+    let at = At { speed_m_per_s: v, features: &features, mass_kg, closing_m_per_s: None };
     let kinetic_energy_j = masses.kinetic_energy_j(speed);
-    let crush = max_crush(model, v, kinetic_energy_j)?;
-    let end = chosen(&crush, query.rule)?;
-    let deflection_m: Vec<f64> = (0..=POINTS).map(|i| end * i as f64 / POINTS as f64).collect();
-    let force_n = forces(model, v, &deflection_m);
-    let envelope = Envelope::new(deflection_m, force_n)?;
-    let energy_over_kinetic = envelope.work() / kinetic_energy_j;
 
-    let mut warnings = model.warnings(v);
-    let unloading = unloading_stiffness(model, v);
+    // The motion first: crush and the speeds along it follow from the body's force.
+    let reach = REACH * model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
+    let along = grid(reach, POINTS);
+    let body_n = sound(model, &along, model.body_force_n(&at, &along), true);
+    let body = Envelope::new(along.clone(), body_n)?;
+    let closing_at = |&d: &f64| (v * v - 2.0 * body.work_to(d) / mass_kg).max(0.0).sqrt();
+    let declared_over = |deflection_m: &[f64]| {
+        if !model.has_body_force() {
+            return deflection_m.iter().map(|&d| body.force_at(d)).collect();
+        }
+        let closing: Vec<f64> = deflection_m.iter().map(closing_at).collect();
+        let force_n = model.force_n(&At { closing_m_per_s: Some(&closing), ..at }, deflection_m);
+        sound(model, deflection_m, force_n, false)
+    };
+    let declared = Envelope::new(along.clone(), declared_over(&along))?;
+    let crush = max_crush(model, v, &declared, &body, kinetic_energy_j);
+    let rule = query.rule.unwrap_or(model.max_crush_rule);
+    let end = chosen(&crush, rule)?;
+
+    let deflection_m: Vec<f64> = (0..=POINTS).map(|i| end * i as f64 / POINTS as f64).collect();
+    let force_n = declared_over(&deflection_m);
+    let body_n = deflection_m.iter().map(|&d| body.force_at(d)).collect();
+    let mut warnings = model.warnings(&at);
+    let corrected = |force_n: Vec<f64>, warn: bool, warnings: &mut Vec<Warning>| {
+        let envelope = Envelope::new(deflection_m.clone(), force_n)?;
+        if !query.energy_correct {
+            return Ok(envelope);
+        }
+        let factor = kinetic_energy_j / envelope.work();
+        if !(CORRECTION.0..=CORRECTION.1).contains(&factor) {
+            return Err(PredictError::Correction { factor });
+        }
+        if warn {
+            warnings.push(Warning::energy_corrected(factor));
+        }
+        let force_n = envelope.force_n().iter().map(|f| factor * f).collect();
+        Ok(Envelope::new(deflection_m.clone(), force_n)?)
+    };
+    let envelope = corrected(force_n, true, &mut warnings)?;
+    let body = match model.has_body_force() {
+        true => Some(corrected(body_n, false, &mut warnings)?),
+        false => None,
+    };
+    let energy_over_kinetic = envelope.work() / kinetic_energy_j;
+    let body_energy_over_kinetic = body.as_ref().map(|b| b.work() / kinetic_energy_j);
+
+    let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
     if unloading.is_none() {
         warnings.push(Warning::no_unloading());
     }
-    if (masses.body_kg / model.mass_kg - 1.0).abs() > SAME_MASS {
+    let mass_is_feature = model.features.iter().any(|f| f.parameter == MASS);
+    if !mass_is_feature && (masses.body_kg / model.mass_kg - 1.0).abs() > SAME_MASS {
         warnings.push(Warning::other_mass(masses.body_kg, model.mass_kg));
     }
-    if (energy_over_kinetic - 1.0).abs() > EnergyAudit::TOLERANCE {
-        warnings.push(Warning::energy_mismatch(energy_over_kinetic));
+    let worst = body_energy_over_kinetic
+        .filter(|e| (e - 1.0).abs() > (energy_over_kinetic - 1.0).abs())
+        .unwrap_or(energy_over_kinetic);
+    if (worst - 1.0).abs() > EnergyAudit::TOLERANCE {
+        warnings.push(Warning::energy_mismatch(worst));
     }
+    let top = body.as_ref().unwrap_or(&envelope).force_at(end);
+    let rebound = rebound_speed(model, v)
+        .map(|speed_m_per_s| Rebound {
+            speed_m_per_s,
+            stiffness_n_per_m: top * top / (mass_kg * speed_m_per_s * speed_m_per_s),
+        })
+        .filter(|r| r.stiffness_n_per_m > 0.0 && r.stiffness_n_per_m.is_finite());
     let (low, high) = model.range_m_per_s();
     let nearest =
         model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
+    let band = model.leave_one_out.as_ref().and_then(|v| v.band);
+    let (force_low_n, force_high_n) = band.map(|b| b.around(envelope.force_n())).unzip();
+    parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
     Ok(PredictedCurve {
         // A softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),
+        rebound,
         max_deflection_m: end,
         energy_j: envelope.work(),
         deflection_m: envelope.deflection_m().to_vec(),
         force_n: envelope.force_n().to_vec(),
-        force_low_n: None,
-        force_high_n: None,
+        force_low_n,
+        force_high_n,
+        body_force_n: body.map(|b| b.force_n().to_vec()),
         speed_m_per_s: v,
         speed_kind: model.speed_kind,
         mass_kg: masses.body_kg,
@@ -154,74 +302,128 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
             in_range: (low..=high).contains(&v),
             nearest_training_speed_m_per_s: nearest,
             distance_to_nearest_m_per_s: (nearest - v).abs(),
-            max_crush_rule: query.rule,
+            max_crush_rule: rule,
             max_crush: crush,
             kinetic_energy_j,
             energy_over_kinetic,
+            body_energy_over_kinetic,
+            band,
+            parameters,
         },
     })
 }
 
-/// Forces of a physical loading branch: 0 at 0, never negative.
-fn forces(model: &Model, v: f64, deflection_m: &[f64]) -> Vec<f64> {
-    let mut force_n = model.force_n(v, deflection_m);
-    force_n.iter_mut().for_each(|f| *f = f.max(0.0));
+/// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands
+/// alone as none of a training curve does.
+fn sound(model: &Model, deflection_m: &[f64], force_n: Vec<f64>, of_body: bool) -> Vec<f64> {
+    let mut force_n: Vec<f64> = force_n.into_iter().map(|f| f.max(0.0)).collect();
+    let step = deflection_m[1] - deflection_m[0];
+    let (declared, body) = model.curves();
+    let curves = if of_body && !body.is_empty() { body } else { declared };
+    // How far a point may lie off the middle of its neighbours.
+    let stands_out = |before: f64, at: f64, after: f64| (at - 0.5 * (before + after)).abs();
+    let mut most = 0.0_f64;
+    for curve in curves {
+        let mut d = step;
+        while d < curve.end_m() - step {
+            let [a, b, c] = [d - step, d, d + step].map(|d| curve.force_at(d));
+            most = most.max(stands_out(a, b, c));
+            d += 0.5 * step;
+        }
+    }
+    if most > 0.0 {
+        for i in 2..force_n.len() - 1 {
+            let (before, after) = (force_n[i - 1], force_n[i + 1]);
+            if stands_out(before, force_n[i], after) > SPIKE * most {
+                force_n[i] = 0.5 * (before + after);
+            }
+        }
+    }
     force_n[0] = 0.0;
     force_n
 }
 
-fn max_crush(model: &Model, v: f64, kinetic_j: f64) -> Result<MaxCrush, PredictError> {
-    let points: Vec<(f64, f64)> = model
-        .cases
-        .iter()
-        .filter(|c| !c.truncated)
-        .map(|c| (c.speed_m_per_s, c.max_deflection_m))
-        .collect();
-    let reach = model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
-    let steps = (reach / GRID_M).ceil().clamp(2.0, 1e6) as usize;
-    let grid: Vec<f64> = (0..=steps).map(|i| reach * i as f64 / steps as f64).collect();
-    let force = forces(model, v, &grid);
+fn max_crush(
+    model: &Model,
+    v: f64,
+    declared: &Envelope,
+    body: &Envelope,
+    kinetic_j: f64,
+) -> MaxCrush {
+    // Crush over speed is a function only if nothing else differs.
+    let points: Vec<(f64, f64)> = match model.features.is_empty() {
+        true => {
+            let whole = model.cases.iter().filter(|c| !c.truncated);
+            whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect()
+        }
+        false => Vec::new(),
+    };
     let spline_m = max_crush::spline(&points, v);
     let monotone_m = max_crush::monotone(&points, v);
-    let energy_m = max_crush::energy(&Envelope::new(grid, force)?, kinetic_j);
-    let all = || [spline_m, monotone_m, energy_m].into_iter().flatten();
+    let energy_m = max_crush::energy(declared, kinetic_j);
+    let motion_m = max_crush::energy(body, kinetic_j);
+    let all = || [spline_m, monotone_m, energy_m, motion_m].into_iter().flatten();
     let spread_m = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
-    Ok(MaxCrush { spline_m, monotone_m, energy_m, spread_m: spread_m.max(0.0) })
+    MaxCrush { spline_m, monotone_m, energy_m, motion_m, spread_m: spread_m.max(0.0) }
+}
+
+impl MaxCrush {
+    /// The answer of one rule.
+    pub fn by(&self, rule: MaxCrushRule) -> Option<f64> {
+        match rule {
+            MaxCrushRule::Spline => self.spline_m,
+            MaxCrushRule::Monotone => self.monotone_m,
+            MaxCrushRule::Energy => self.energy_m,
+            MaxCrushRule::Motion => self.motion_m,
+        }
+    }
 }
 
 fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, PredictError> {
-    let (found, other) = match rule {
-        MaxCrushRule::Spline => (crush.spline_m, "monotone"),
-        MaxCrushRule::Monotone => (crush.monotone_m, "energy"),
-        MaxCrushRule::Energy => (crush.energy_m, "monotone"),
-    };
-    match found {
+    match crush.by(rule) {
         Some(end) if end > 0.0 && end.is_finite() => Ok(end),
-        _ => Err(PredictError::MaxCrush {
+        found => Err(PredictError::MaxCrush {
             rule: rule.name(),
             found: found.map_or("not defined for these cases".into(), |d| format!("{d} m")),
-            other,
+            other: match rule {
+                MaxCrushRule::Monotone => "energy",
+                _ => "monotone",
+            },
         }),
     }
 }
 
-/// The unloading stiffness interpolated linearly in speed, held at both ends, in N/m.
-fn unloading_stiffness(model: &Model, v: f64) -> Option<f64> {
-    let known: Vec<(f64, f64)> = model
-        .cases
-        .iter()
-        .filter_map(|c| Some((c.speed_m_per_s, c.unloading_stiffness_n_per_m?)))
-        .collect();
-    let (first, last) = (known.first()?, known.last()?);
-    if v <= first.0 {
-        return Some(first.1);
+/// The speed of separation, as a power of the impact speed between training speeds, and
+/// the outermost share of it beyond them.
+fn rebound_speed(model: &Model, v: f64) -> Option<f64> {
+    let logarithm = |c: &ModelCase| Some((c.rebound_speed_m_per_s? / c.speed_m_per_s).ln());
+    let share = over_speed_by(model, v.ln(), |c| Some((c.speed_m_per_s.ln(), logarithm(c)?)))?;
+    Some(v * share.exp())
+}
+
+/// A value of the cases interpolated linearly in speed, held at both ends; the mean of
+/// cases of equal speed.
+fn over_speed(model: &Model, v: f64, value: impl Fn(&ModelCase) -> Option<f64>) -> Option<f64> {
+    over_speed_by(model, v, |c| Some((c.speed_m_per_s, value(c)?)))
+}
+
+fn over_speed_by(
+    model: &Model,
+    x: f64,
+    point: impl Fn(&ModelCase) -> Option<(f64, f64)>,
+) -> Option<f64> {
+    let mut known: Vec<(f64, f64, f64)> = Vec::new();
+    for (x, y) in model.cases.iter().filter_map(point) {
+        match known.last_mut() {
+            Some(last) if last.0 == x => {
+                last.1 += y;
+                last.2 += 1.0;
+            }
+            _ => known.push((x, y, 1.0)),
+        }
     }
-    if v >= last.0 {
-        return Some(last.1);
-    }
-    let i = known.partition_point(|k| k.0 <= v);
-    let (a, b) = (known[i - 1], known[i]);
-    Some(a.1 + (b.1 - a.1) * (v - a.0) / (b.0 - a.0))
+    let points: Vec<(f64, f64)> = known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect();
+    interpolate_held(&points, x)
 }
 
 impl PredictedCurve {
@@ -236,9 +438,11 @@ impl PredictedCurve {
                 "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
             )));
         }
-        for (name, band) in
-            [("force_low_N", &self.force_low_n), ("force_high_N", &self.force_high_n)]
-        {
+        for (name, band) in [
+            ("force_low_N", &self.force_low_n),
+            ("force_high_N", &self.force_high_n),
+            ("body_force_N", &self.body_force_n),
+        ] {
             if let Some(band) = band
                 && band.len() != self.force_n.len()
             {
@@ -255,6 +459,18 @@ impl PredictedCurve {
                 "force_N of point {point} is below 0: an interface only pushes"
             ))),
             None => Ok(envelope),
+        }
+    }
+
+    /// The curve that moves a body of one mass: the body force, or the only force there is.
+    ///
+    /// # Errors
+    /// As [`envelope`](Self::envelope).
+    pub fn driving_envelope(&self) -> Result<Envelope, PredictError> {
+        let declared = self.envelope()?;
+        match &self.body_force_n {
+            Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),
+            None => Ok(declared),
         }
     }
 }

@@ -1,18 +1,21 @@
 //! Warnings of a prediction: the same codes in text and JSON.
 
+use std::fmt;
+
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::km_per_h;
 
 /// Something to know before trusting a predicted curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     pub code: WarningCode,
     pub message: String,
 }
 
 /// Kinds of warnings; in snake case the codes of the JSON.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
     /// The speed lies outside the training speeds.
@@ -27,6 +30,38 @@ pub enum WarningCode {
     NoUnloading,
     /// The mass differs from the training runs'.
     OtherMass,
+    /// The speed lies between training speeds that are far apart.
+    FarFromTraining,
+    /// The collapse changes its mode between the neighbouring training speeds.
+    ModeSwitch,
+    /// Too few curves to say how good the model is.
+    TooFewCurves,
+    /// The force was scaled so that the curve takes up the impact's energy.
+    EnergyCorrected,
+}
+
+impl WarningCode {
+    /// As in the JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OutOfRange => "out_of_range",
+            Self::NearSplitMidpoint => "near_split_midpoint",
+            Self::EnergyMismatch => "energy_mismatch",
+            Self::TruncatedTrainingRun => "truncated_training_run",
+            Self::NoUnloading => "no_unloading",
+            Self::OtherMass => "other_mass",
+            Self::FarFromTraining => "far_from_training",
+            Self::ModeSwitch => "mode_switch",
+            Self::TooFewCurves => "too_few_curves",
+            Self::EnergyCorrected => "energy_corrected",
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} [{}]", self.message, self.code.name())
+    }
 }
 
 impl Warning {
@@ -56,6 +91,48 @@ impl Warning {
                 km_per_h(0.5 * (below + above)),
                 km_per_h(below),
                 km_per_h(above)
+            ),
+        }
+    }
+
+    pub fn far_from_training(speed_m_per_s: f64, nearest: f64) -> Self {
+        Self {
+            code: WarningCode::FarFromTraining,
+            message: format!(
+                "the nearest training speed is {}, {:.0} % from {}: an FE run between would tell more",
+                km_per_h(nearest),
+                (nearest / speed_m_per_s - 1.0).abs() * 100.0,
+                km_per_h(speed_m_per_s)
+            ),
+        }
+    }
+
+    pub fn mode_switch(below: f64, above: f64) -> Self {
+        Self {
+            code: WarningCode::ModeSwitch,
+            message: format!(
+                "peaks of the training curves jump between {} and {}: the collapse changes its mode there, and a curve between the two may be of either",
+                km_per_h(below),
+                km_per_h(above)
+            ),
+        }
+    }
+
+    pub fn too_few_curves(curves: usize) -> Self {
+        Self {
+            code: WarningCode::TooFewCurves,
+            message: format!(
+                "the model rests on {curves} training curve{}: with fewer than 3 no speed can be left out to see how good it is",
+                if curves == 1 { "" } else { "s" }
+            ),
+        }
+    }
+
+    pub fn energy_corrected(factor: f64) -> Self {
+        Self {
+            code: WarningCode::EnergyCorrected,
+            message: format!(
+                "the force was multiplied by {factor:.4}, so that the curve takes up the impact's kinetic energy"
             ),
         }
     }

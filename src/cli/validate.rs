@@ -1,0 +1,236 @@
+//! `crumple validate`: every model at every speed that is left out.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::database::Database;
+use crumple::dataset::TrainingSet;
+use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
+use crumple::unit::km_per_h;
+use crumple::validate::choose::{NextRun, next_run};
+use crumple::validate::{candidates, validate};
+use serde::Serialize;
+
+use super::output;
+use super::{CommandResult, Failure, Manners, Outcome};
+
+/// Leave every speed out in turn, predict it by every model, and compare with FE
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple validate curves.h5
+  crumple validate curves.h5 --group lead-car-wall --next
+  crumple validate curves.h5 --json
+Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE;
+peaks are the first two of FE's curve (force and place); v and a are velocity and acceleration
+(CFC 60; in brackets not filtered) of a multi-body run of one mass, driven by the model's body
+force, sum|p-r|/sum|r| to 30 ms after FE's largest crush. The means are over inner speeds; the
+ends of the range are extrapolation and stand apart. forest is the reference method (DDTCM),
+nearest is FDRM.")]
+pub struct Args {
+    /// Curve database
+    database: PathBuf,
+    /// Group to validate (default: all)
+    #[arg(long)]
+    group: Option<String>,
+    /// Propose the speed whose FE run would help most
+    #[arg(long)]
+    next: bool,
+    /// Seed of the forests
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Serialize)]
+struct Document {
+    groups: Vec<GroupDocument>,
+}
+
+#[derive(Serialize)]
+struct GroupDocument {
+    #[serde(flatten)]
+    validation: Validation,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_run: Option<NextRun>,
+}
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    let database = Database::read(&args.database)?;
+    let groups: Vec<&str> = match &args.group {
+        Some(group) => vec![group],
+        None => database.groups().collect(),
+    };
+    if groups.is_empty() {
+        return Err(Failure::Usage(format!(
+            "{} has no groups: build a study into it",
+            args.database.display()
+        )));
+    }
+    let mut document = Document { groups: Vec::new() };
+    for group in groups {
+        let cases = database.group(&args.database, group)?;
+        let validation = validate(group, cases, &candidates(args.seed), None)?;
+        let next_run = match args.next {
+            true => next_run(&TrainingSet::new(group, cases)?, &validation),
+            false => None,
+        };
+        for note in &validation.notes {
+            manners.warn(&format!("{group}: {note}"));
+        }
+        document.groups.push(GroupDocument { validation, next_run });
+    }
+    let warned = document.groups.iter().any(|g| !g.validation.notes.is_empty());
+    if manners.json {
+        output::print_json(&document)?;
+    } else {
+        output::print(|out| {
+            for (i, group) in document.groups.iter().enumerate() {
+                if i > 0 {
+                    writeln!(out)?;
+                }
+                print_group(out, group)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+}
+
+fn percent(error: f64) -> String {
+    format!("{:.1} %", error * 100.0)
+}
+
+fn signed(error: f64) -> String {
+    format!("{:+.1} %", error * 100.0)
+}
+
+fn print_group(out: &mut dyn Write, group: &GroupDocument) -> io::Result<()> {
+    let validation = &group.validation;
+    print_means(out, validation)?;
+    for (inner, title) in [
+        (true, "every inner speed left out"),
+        (false, "the ends of the range left out: extrapolation"),
+    ] {
+        let rows: Vec<Vec<String>> = validation
+            .rows
+            .iter()
+            .filter(|r| r.inner == inner)
+            .map(|r| row(r, &validation.chosen))
+            .chain(validation.floors.iter().filter(|f| f.inner == inner).map(floor))
+            .collect();
+        if !rows.is_empty() {
+            writeln!(out, "\n{}: {title}", validation.group)?;
+            let heading = [
+                "model", "speed", "force", "energy", "crush", "peak 1", "peak 2", "v", "a",
+                "in band",
+            ];
+            output::table(out, &heading, &rows)?;
+        }
+    }
+    if let Some(next) = &group.next_run {
+        writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+    }
+    Ok(())
+}
+
+fn row(row: &LeftOut, chosen: &str) -> Vec<String> {
+    let mark = if row.model == chosen { " *" } else { "" };
+    let peak = |k: usize| row.peaks.get(k).map_or("-".into(), peak);
+    vec![
+        format!("{}{mark}", row.model),
+        km_per_h(row.speed_m_per_s),
+        percent(row.force_l1),
+        signed(row.energy_error),
+        signed(row.max_crush_error),
+        peak(0),
+        peak(1),
+        percent(row.velocity_l1),
+        acceleration(row.acceleration_l1, row.acceleration_unfiltered_l1),
+        row.coverage.map_or("-".into(), percent),
+    ]
+}
+
+fn acceleration(filtered: f64, unfiltered: f64) -> String {
+    format!("{} ({:.1})", percent(filtered), unfiltered * 100.0)
+}
+
+fn peak(peak: &PeakError) -> String {
+    match (peak.force_error, peak.shift_m) {
+        (Some(force), Some(shift)) => format!("{} {:+.0} mm", signed(force), shift * 1e3),
+        _ => "missing".into(),
+    }
+}
+
+fn floor(floor: &Floor) -> Vec<String> {
+    let mut cells = vec![format!("FE's own, {}", floor.force), km_per_h(floor.speed_m_per_s)];
+    cells.extend(["-"; 5].map(String::from));
+    cells.push(percent(floor.velocity_l1));
+    cells.push(acceleration(floor.acceleration_l1, floor.acceleration_unfiltered_l1));
+    cells.push("-".into());
+    cells
+}
+
+/// The means over the inner speeds, the floors beside them, and the choice.
+pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
+    let group = &validation.group;
+    if let Some(first) = validation.means.first() {
+        let speeds = first.speeds;
+        writeln!(out, "{group}: means over {speeds} inner speeds left out in turn")?;
+        let heading = ["model", "force", "energy", "crush", "by", "v", "a"];
+        let rows: Vec<Vec<String>> = validation
+            .means
+            .iter()
+            .map(|m| means(m, &validation.chosen))
+            .chain(["contact", "body"].iter().filter_map(|f| mean_floor(validation, f)))
+            .collect();
+        output::table(out, &heading, &rows)?;
+    }
+    writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
+    if let Some(band) = &validation.band {
+        let coverage = match band.coverage {
+            Some(share) => {
+                format!("covers {} of the points of the others left out", percent(share))
+            }
+            None => "one curve cannot be checked against others".into(),
+        };
+        writeln!(
+            out,
+            "{group}: band ±{} of the local force, empirical range for {:.0} %, from {} curve{}; {coverage}",
+            percent(band.pointwise_share),
+            band.level * 100.0,
+            band.curves,
+            if band.curves == 1 { "" } else { "s" }
+        )?;
+    }
+    Ok(())
+}
+
+fn means(means: &Means, chosen: &str) -> Vec<String> {
+    let mark = if means.model == chosen { " *" } else { "" };
+    vec![
+        format!("{}{mark}", means.model),
+        percent(means.force_l1),
+        percent(means.energy_error),
+        percent(means.max_crush_error),
+        means.max_crush_rule.name().into(),
+        percent(means.velocity_l1),
+        acceleration(means.acceleration_l1, means.acceleration_unfiltered_l1),
+    ]
+}
+
+/// FE's own curves over the inner speeds.
+fn mean_floor(validation: &Validation, force: &str) -> Option<Vec<String>> {
+    let inner: Vec<&Floor> =
+        validation.floors.iter().filter(|f| f.inner && f.force == force).collect();
+    let mean =
+        |of: fn(&Floor) -> f64| inner.iter().map(|f| of(f)).sum::<f64>() / inner.len() as f64;
+    (!inner.is_empty()).then(|| {
+        let mut cells = vec![format!("FE's own, {force}")];
+        cells.extend(["-"; 4].map(String::from));
+        cells.push(percent(mean(|f| f.velocity_l1)));
+        cells.push(acceleration(
+            mean(|f| f.acceleration_l1),
+            mean(|f| f.acceleration_unfiltered_l1),
+        ));
+        cells
+    })
+}

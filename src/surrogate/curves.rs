@@ -1,0 +1,177 @@
+//! The training curves of a model, one force of each case, and how they are blended.
+
+use crate::curve::{Envelope, EnvelopeError};
+
+/// One force of one training case over its loading branch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaseCurve {
+    pub speed_m_per_s: f64,
+    /// Values of the further features.
+    pub features: Vec<f64>,
+    envelope: Envelope,
+    /// Closing speed at the envelope's deflections, in m/s; empty if it is not known.
+    closing_m_per_s: Vec<f64>,
+}
+
+impl CaseCurve {
+    /// # Errors
+    /// [`EnvelopeError`] if the columns are no envelope; closing speeds must be as many.
+    pub fn new(
+        speed_m_per_s: f64,
+        features: Vec<f64>,
+        deflection_m: Vec<f64>,
+        force_n: Vec<f64>,
+        closing_m_per_s: Vec<f64>,
+    ) -> Result<Self, EnvelopeError> {
+        let (deflections, forces) = (deflection_m.len(), closing_m_per_s.len());
+        if forces != 0 && forces != deflections {
+            return Err(EnvelopeError::Lengths { deflections, forces });
+        }
+        let envelope = Envelope::new(deflection_m, force_n)?;
+        Ok(Self { speed_m_per_s, features, envelope, closing_m_per_s })
+    }
+
+    pub fn envelope(&self) -> &Envelope {
+        &self.envelope
+    }
+
+    /// Force in N; the last one beyond the end.
+    pub fn force_at(&self, deflection_m: f64) -> f64 {
+        self.envelope.force_at(deflection_m)
+    }
+
+    /// Largest deflection, in m.
+    pub fn end_m(&self) -> f64 {
+        self.envelope.end_m()
+    }
+
+    pub fn reaches(&self, deflection_m: f64) -> bool {
+        deflection_m <= self.end_m()
+    }
+
+    /// Closing speed in m/s; 0 beyond the end, and the impact speed where it is not known.
+    pub fn closing_at(&self, deflection_m: f64) -> f64 {
+        if self.closing_m_per_s.is_empty() {
+            return self.speed_m_per_s;
+        }
+        if deflection_m >= self.end_m() {
+            return 0.0;
+        }
+        let d = self.envelope.deflection_m();
+        let i = d.partition_point(|&x| x <= deflection_m).clamp(1, d.len() - 1);
+        let share = ((deflection_m - d[i - 1]) / (d[i] - d[i - 1])).clamp(0.0, 1.0);
+        let (a, b) = (self.closing_m_per_s[i - 1], self.closing_m_per_s[i]);
+        (a + share * (b - a)).max(0.0)
+    }
+}
+
+/// The two neighbours of `v` among increasing speeds and the share of the second, 0 to 1:
+/// beyond the ends the outermost alone.
+pub fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
+    let above = speeds.partition_point(|&s| s <= v);
+    match above {
+        0 => (0, 0, 0.0),
+        n if n == speeds.len() => (n - 1, n - 1, 0.0),
+        n => (n - 1, n, (v - speeds[n - 1]) / (speeds[n] - speeds[n - 1])),
+    }
+}
+
+/// Linear interpolation over points of increasing abscissa, held beyond the ends; `None`
+/// without points.
+pub fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
+    let (first, last) = (points.first()?, points.last()?);
+    if x <= first.0 {
+        return Some(first.1);
+    }
+    if x >= last.0 {
+        return Some(last.1);
+    }
+    let i = points.partition_point(|p| p.0 <= x);
+    let (a, b) = (points[i - 1], points[i]);
+    Some(a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0))
+}
+
+/// Coefficients of the polynomial of `degree` (0, 1 or 2) with the least squares, constant
+/// first, over centred and scaled abscissae; `None` if the points do not determine it.
+pub fn least_squares(points: &[(f64, f64)], degree: usize) -> Option<Polynomial> {
+    let n = points.len();
+    if n <= degree || degree > 2 {
+        return None;
+    }
+    let centre = points.iter().map(|p| p.0).sum::<f64>() / n as f64;
+    let scale = points.iter().map(|p| (p.0 - centre).abs()).fold(0.0, f64::max).max(1e-300);
+    let size = degree + 1;
+    let mut m = [[0.0; 4]; 3];
+    for &(x, y) in points {
+        let t = (x - centre) / scale;
+        let powers = [1.0, t, t * t];
+        for r in 0..size {
+            for c in 0..size {
+                m[r][c] += powers[r] * powers[c];
+            }
+            m[r][3] += powers[r] * y;
+        }
+    }
+    // Gauss with pivoting on at most three equations.
+    for k in 0..size {
+        let pivot = (k..size).max_by(|&a, &b| m[a][k].abs().total_cmp(&m[b][k].abs()))?;
+        m.swap(k, pivot);
+        if m[k][k].abs() < 1e-10 * n as f64 {
+            return None;
+        }
+        for r in 0..size {
+            if r != k {
+                let factor = m[r][k] / m[k][k];
+                let row = m[k];
+                m[r].iter_mut().zip(row).skip(k).for_each(|(x, p)| *x -= factor * p);
+            }
+        }
+    }
+    let mut coefficients = [0.0; 3];
+    for (k, c) in coefficients.iter_mut().enumerate().take(size) {
+        *c = m[k][3] / m[k][k];
+    }
+    Some(Polynomial { centre, scale, coefficients })
+}
+
+/// A polynomial of up to second degree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polynomial {
+    centre: f64,
+    scale: f64,
+    coefficients: [f64; 3],
+}
+
+impl Polynomial {
+    pub fn at(&self, x: f64) -> f64 {
+        let t = (x - self.centre) / self.scale;
+        let [a, b, c] = self.coefficients;
+        a + t * (b + t * c)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn least_squares_repeats_its_polynomial() {
+        let f = |x: f64| 3.0 - 2.0 * x + 0.5 * x * x;
+        let points: Vec<(f64, f64)> = [1.0, 2.0, 4.0, 7.0].map(|x| (x, f(x))).to_vec();
+        let fit = least_squares(&points, 2).unwrap();
+        assert!((fit.at(5.5) - f(5.5)).abs() < 1e-10);
+        assert!(least_squares(&points[..2], 2).is_none());
+        let line = least_squares(&[(0.0, 0.0), (1.0, 3.0), (2.0, 0.0)], 1).unwrap();
+        assert!((line.at(9.0) - 1.0).abs() < 1e-12, "the mean, as the slope is 0");
+        assert!(least_squares(&[(1.0, 0.0), (1.0, 3.0)], 1).is_none());
+    }
+
+    #[test]
+    fn neighbours_hold_the_outermost() {
+        let speeds = [1.0, 2.0, 4.0];
+        assert_eq!(neighbours(&speeds, 0.5), (0, 0, 0.0));
+        assert_eq!(neighbours(&speeds, 3.0), (1, 2, 0.5));
+        assert_eq!(neighbours(&speeds, 2.0), (1, 2, 0.0));
+        assert_eq!(neighbours(&speeds, 9.0), (2, 2, 0.0));
+    }
+}

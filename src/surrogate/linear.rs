@@ -1,0 +1,24 @@
+//! `linear`: the force at equal deflection interpolated linearly in speed.
+
+use super::curves::interpolate_held;
+use super::{At, CaseCurve, Surrogate};
+
+/// Interpolates over the cases that reach a deflection; holds the outermost beyond them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linear;
+
+impl Surrogate for Linear {
+    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+        let furthest = cases.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
+        let at_deflection = |&d: &f64| {
+            let d = d.min(furthest);
+            let points: Vec<(f64, f64)> = cases
+                .iter()
+                .filter(|c| c.reaches(d))
+                .map(|c| (c.speed_m_per_s, c.force_at(d)))
+                .collect();
+            interpolate_held(&points, at.speed_m_per_s).unwrap_or(f64::NAN)
+        };
+        deflection_m.iter().map(at_deflection).collect()
+    }
+}

@@ -1,0 +1,161 @@
+//! The choice among models that were validated, and the run that would help most.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::dataset::TrainingSet;
+use crate::surrogate::leave_one_out::{Means, Validation};
+use crate::unit::km_per_h;
+
+/// Models from simple to elaborate: of about equal ones the first is taken.
+const SIMPLICITY: [&str; 7] = ["linear", "rate", "registered", "extra", "forest", "gp", "nearest"];
+/// What a choice must not be worse than, in force and in velocity.
+const BASELINES: [&str; 3] = ["nearest", "linear", "forest"];
+/// Mean errors that differ by less are a tie: three to five speeds say no more.
+const TIE: f64 = 0.10;
+
+/// The chosen model and why; `None` without means.
+///
+/// Of the models that are, in the mean over the inner speeds, at or below every baseline in
+/// force and in velocity error, those within 10 % of the smallest force error tie, and the
+/// simplest of them is taken. If none keeps to all baselines, the one whose worst ratio to
+/// them is smallest.
+pub fn choose(means: &[Means]) -> Option<(String, String)> {
+    let baselines = || means.iter().filter(|m| BASELINES.contains(&m.model.as_str()));
+    let least = |of: fn(&Means) -> f64| baselines().map(of).fold(f64::INFINITY, f64::min);
+    let (force, velocity) = (least(|m| m.force_l1), least(|m| m.velocity_l1));
+    let keeps = |m: &&Means| m.force_l1 <= force && m.velocity_l1 <= velocity;
+    let simplicity =
+        |m: &Means| SIMPLICITY.iter().position(|s| *s == m.model).unwrap_or(SIMPLICITY.len());
+    let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
+    let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
+    if let Some(chosen) = tied.min_by_key(|m| simplicity(m)) {
+        let reason = format!(
+            "mean force error {:.2} %, the smallest is {:.2} %; of those within 10 % the simplest",
+            chosen.force_l1 * 100.0,
+            best * 100.0
+        );
+        return Some((chosen.model.clone(), reason));
+    }
+    let worst = |m: &Means| (m.force_l1 / force).max(m.velocity_l1 / velocity);
+    let chosen = means.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
+    let reason = format!(
+        "no model is at or below nearest, linear and forest in both force and velocity; this one comes nearest (force {:.2} %, velocity {:.2} %)",
+        chosen.force_l1 * 100.0,
+        chosen.velocity_l1 * 100.0
+    );
+    Some((chosen.model.clone(), reason))
+}
+
+/// The speed whose FE run would help most.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NextRun {
+    pub speed_m_per_s: f64,
+    /// Training speeds that it lies between.
+    pub between_m_per_s: (f64, f64),
+    /// Force error expected there now, from the errors at the speeds that were left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_force_l1: Option<f64>,
+    pub reason: String,
+}
+
+/// Proposes the middle of the gap with the largest expected error.
+///
+/// A left-out speed is predicted over the gap that its absence leaves; the error expected
+/// in the middle of a gap is that of the speeds at its ends, in ratio of the gaps. Gaps at
+/// the ends of the range have one such speed. `None` for fewer than two speeds.
+pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
+    let mut speeds: Vec<f64> = set.cases.iter().map(|c| c.speed_m_per_s).collect();
+    speeds.dedup();
+    let error_at = |v: f64| {
+        let rows = validation.rows.iter();
+        let of_chosen = rows.filter(|r| r.model == validation.chosen && r.inner);
+        let errors: Vec<f64> =
+            of_chosen.filter(|r| r.speed_m_per_s == v).map(|r| r.force_l1).collect();
+        (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
+    };
+    let expected = |i: usize| -> Option<f64> {
+        let gap = speeds[i + 1] - speeds[i];
+        let from = |k: usize| {
+            let whole = speeds.get(k + 1)? - speeds[k.checked_sub(1)?];
+            Some(error_at(speeds[k])? * gap / whole)
+        };
+        let ends: Vec<f64> = [from(i), from(i + 1)].into_iter().flatten().collect();
+        (!ends.is_empty()).then(|| ends.iter().sum::<f64>() / ends.len() as f64)
+    };
+    let score = |i: usize| match expected(i) {
+        Some(error) => (1, error),
+        // Without errors the widest gap in ratio to its speed.
+        None => (0, speeds[i + 1] / speeds[i]),
+    };
+    let gaps = 0..speeds.len().saturating_sub(1);
+    let i = gaps.max_by(|&a, &b| {
+        let (a, b) = (score(a), score(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    })?;
+    let (low, high) = (speeds[i], speeds[i + 1]);
+    let reason = match expected(i) {
+        Some(error) => format!(
+            "of all gaps between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), judged by the speeds at its ends when they were left out",
+            km_per_h(low),
+            km_per_h(high),
+            error * 100.0
+        ),
+        None => format!(
+            "the gap from {} to {} is the widest in ratio to its speeds, and there are too few speeds to leave one out",
+            km_per_h(low),
+            km_per_h(high)
+        ),
+    };
+    Some(NextRun {
+        speed_m_per_s: 0.5 * (low + high),
+        between_m_per_s: (low, high),
+        expected_force_l1: expected(i),
+        reason,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surrogate::max_crush::MaxCrushRule;
+
+    fn means(model: &str, force_l1: f64, velocity_l1: f64) -> Means {
+        Means {
+            model: model.into(),
+            speeds: 3,
+            force_l1,
+            velocity_l1,
+            energy_error: 0.0,
+            max_crush_error: 0.0,
+            max_crush_rule: MaxCrushRule::Energy,
+            acceleration_l1: 0.0,
+            acceleration_unfiltered_l1: 0.0,
+        }
+    }
+
+    #[test]
+    fn ties_go_to_the_simpler_model() {
+        let chosen = |of: &[Means]| choose(of).unwrap().0;
+        let (nearest, forest) = (means("nearest", 0.2, 0.2), means("forest", 0.1, 0.1));
+        let linear = means("linear", 0.05, 0.03);
+        let rate = means("rate", 0.048, 0.02);
+        let all = |rate: Means| [nearest.clone(), linear.clone(), forest.clone(), rate];
+        assert_eq!(chosen(&all(rate)), "linear");
+        assert_eq!(chosen(&all(means("rate", 0.040, 0.02))), "rate");
+        assert_eq!(chosen(&all(means("rate", 0.040, 0.031))), "linear", "worse in velocity");
+        assert!(choose(&[]).is_none());
+    }
+
+    /// Where linear wins in force and the forest in velocity, neither is chosen blindly.
+    #[test]
+    fn no_baseline_wins_in_both() {
+        let of = [
+            means("nearest", 0.2, 0.2),
+            means("linear", 0.050, 0.030),
+            means("forest", 0.09, 0.028),
+            means("gp", 0.051, 0.0281),
+        ];
+        assert_eq!(choose(&of).unwrap().0, "gp");
+    }
+}

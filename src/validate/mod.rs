@@ -1,0 +1,434 @@
+//! Validation: every model at every speed that is left out, and the model that is chosen.
+
+pub mod choose;
+pub mod motion;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::curve::rating::{l1_ratio, peaks};
+use crate::curve::{Case, Envelope, ForceKind, Parameter};
+use crate::dataset::{DatasetError, OTHER_MASS, TrainingCase, TrainingSet, grid};
+use crate::surrogate::band::{self, Band, Residuals};
+use crate::surrogate::forest::ForestOptions;
+use crate::surrogate::landmarks::PROMINENCE;
+use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::PredictError;
+use crate::surrogate::{Model, ModelError, Options, PredictedCurve, Query, predict};
+use choose::choose;
+use motion::{Driver, MotionError, MotionErrors, Reference};
+
+/// Peaks of FE's curve that are looked for in the prediction.
+const PEAKS: usize = 2;
+/// A predicted peak matches if it lies no further off than this share of the crush.
+const MATCH: f64 = 0.1;
+/// Fewest steps along FE's crush at which forces are compared.
+const STEPS: usize = 400;
+
+/// Why there is no validation or no model.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidateError {
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+}
+
+/// The models that `auto` chooses among; `forest` is the reference method's.
+pub fn candidates(seed: u64) -> Vec<Options> {
+    vec![
+        Options::Nearest,
+        Options::Linear,
+        Options::Rate,
+        Options::Registered,
+        Options::Extra(ForestOptions { seed, ..ForestOptions::extra() }),
+        Options::Forest(ForestOptions { seed, ..ForestOptions::paper() }),
+        Options::Gp,
+    ]
+}
+
+/// Which model to train.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Choice {
+    /// The one that leave-one-speed-out chooses; seed of the forests.
+    Auto { seed: u64 },
+    /// This one; it is validated beside `nearest` and `linear`.
+    Options(Options),
+}
+
+/// Fits the chosen model to a group, with its validation.
+///
+/// # Errors
+/// [`ValidateError`] if the cases are no training set, or too few for the model.
+pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, ValidateError> {
+    let set = TrainingSet::new(group, cases)?;
+    let (options, validation) = match choice {
+        Choice::Auto { seed } => {
+            let candidates = candidates(seed);
+            let validation = validate(group, cases, &candidates, None)?;
+            let chosen = candidates.into_iter().find(|o| o.name() == validation.chosen);
+            (chosen.unwrap_or(Options::Nearest), validation)
+        }
+        Choice::Options(options) => {
+            // What the model itself refuses is said before it is validated.
+            Model::fit(&set, options)?;
+            let mut candidates = vec![Options::Nearest, Options::Linear, options];
+            candidates.dedup();
+            if options == Options::Nearest {
+                candidates.truncate(2);
+            }
+            (options, validate(group, cases, &candidates, Some(options.name()))?)
+        }
+    };
+    let mut model = Model::fit(&set, options)?;
+    if let Some(means) = validation.means.iter().find(|m| m.model == options.name()) {
+        model.max_crush_rule = means.max_crush_rule;
+    }
+    model.leave_one_out = Some(validation);
+    Ok(model)
+}
+
+/// Leaves every speed out in turn and predicts it by every candidate.
+///
+/// Models that cannot be fitted to the group are noted with the reason. `keep` names the
+/// model that counts as chosen, whatever its errors.
+///
+/// # Errors
+/// [`ValidateError`] if the cases are no training set.
+pub fn validate(
+    group: &str,
+    cases: &[Case],
+    candidates: &[Options],
+    keep: Option<&str>,
+) -> Result<Validation, ValidateError> {
+    let set = TrainingSet::new(group, cases)?;
+    let mut speeds = set.speeds_m_per_s();
+    speeds.dedup();
+    let mut notes = Vec::new();
+    let mut fitting = Vec::new();
+    for options in candidates {
+        match Model::fit(&set, *options) {
+            Ok(_) => fitting.push(*options),
+            Err(error) => notes.push(format!("{}: {error}", options.name())),
+        }
+    }
+    let mut left_out = Vec::new();
+    if speeds.len() < 3 {
+        let found = speeds.len();
+        notes.push(format!("the group has {found} speeds: leaving one out needs at least 3"));
+    } else {
+        left_out = (0..set.cases.len())
+            .filter_map(|i| Held::new(&set, cases, &speeds, i, &mut notes))
+            .collect();
+    }
+    let floors: Vec<Floor> =
+        left_out.iter().map(Held::floors).collect::<Result<Vec<_>, _>>()?.concat();
+    let pairs: Vec<(&Options, &Held)> =
+        fitting.iter().flat_map(|o| left_out.iter().map(move |h| (o, h))).collect();
+    let trials: Vec<Trial> = pairs
+        .par_iter()
+        .map(|(options, held)| held.trial(options))
+        .collect::<Result<Vec<_>, ValidateError>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+
+    let (mut rows, mut means, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
+    for options in &fitting {
+        let model = options.name();
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.model == model).collect();
+        let Some(rule) = best_rule(options, &own) else { continue };
+        let own_residuals: Vec<Residuals> =
+            own.iter().filter(|t| t.inner).filter_map(|t| t.residuals(rule)).collect();
+        let mut inner = 0;
+        let mut own_rows = Vec::new();
+        for trial in &own {
+            let Some(mut row) = trial.row(rule) else { continue };
+            if trial.inner {
+                row.coverage = band::coverage(&own_residuals, inner);
+                inner += 1;
+            }
+            own_rows.push(row);
+        }
+        means.extend(mean(model, rule, &own_rows));
+        residuals.insert(model, own_residuals);
+        rows.extend(own_rows);
+    }
+    let (chosen, reason) = match keep {
+        Some(model) => (model.to_string(), "asked for".into()),
+        None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
+    };
+    let band = residuals.get(chosen.as_str()).and_then(|r| Band::of(r));
+    Ok(Validation { group: group.into(), chosen, reason, rows, means, floors, band, notes })
+}
+
+/// With too few speeds to leave one out.
+fn without_validation(fitting: &[Options]) -> (String, String) {
+    let reason = "too few speeds to leave one out";
+    let linear = fitting.contains(&Options::Linear);
+    (if linear { "linear" } else { "nearest" }.into(), reason.into())
+}
+
+/// A case that is left out, and what is left.
+struct Held<'a> {
+    own: &'a TrainingCase,
+    case: &'a Case,
+    rest: TrainingSet,
+    inner: bool,
+    reference: Reference,
+}
+
+impl<'a> Held<'a> {
+    /// Leaves out all cases of the speed of case `i`; `None`, with a note, if it cannot be
+    /// compared with.
+    fn new(
+        set: &'a TrainingSet,
+        cases: &'a [Case],
+        speeds: &[f64],
+        i: usize,
+        notes: &mut Vec<String>,
+    ) -> Option<Self> {
+        let own = &set.cases[i];
+        let case = cases.iter().find(|c| c.name == own.name)?;
+        if own.truncated {
+            notes.push(format!("case \"{}\" ended while loading: not left out", own.name));
+            return None;
+        }
+        let reference = match Reference::of(case) {
+            Ok(reference) => reference,
+            Err(error) => {
+                notes.push(error.to_string());
+                return None;
+            }
+        };
+        if own.envelope.work() <= 0.0 {
+            notes.push(format!("case \"{}\" has no energy to compare with", own.name));
+            return None;
+        }
+        let v = own.speed_m_per_s;
+        let mut rest = set.clone();
+        rest.cases.retain(|c| c.speed_m_per_s != v);
+        let inner = speeds[0] < v && v < speeds[speeds.len() - 1];
+        Some(Self { own, case, rest, inner, reference })
+    }
+
+    /// FE's own curves in the multi-body model.
+    fn floors(&self) -> Result<Vec<Floor>, MotionError> {
+        let contact = (ForceKind::Contact, &self.own.envelope);
+        let body = (ForceKind::Body, &self.own.motion.force);
+        let forces = match self.rest.force_kind {
+            ForceKind::Contact => vec![contact, body],
+            ForceKind::Body => vec![(ForceKind::Body, &self.own.envelope)],
+        };
+        forces
+            .into_iter()
+            .map(|(kind, envelope)| {
+                let driver = Driver::rebounding(
+                    envelope.clone(),
+                    self.own.effective_mass_kg,
+                    self.own.motion.rebound_speed_m_per_s,
+                    self.own.unloading_stiffness_n_per_m,
+                );
+                let errors = self.reference.errors(&self.reference.run(&driver)?)?;
+                Ok(Floor {
+                    force: kind.name().into(),
+                    case: self.own.name.clone(),
+                    speed_m_per_s: self.own.speed_m_per_s,
+                    inner: self.inner,
+                    velocity_l1: errors.velocity_l1,
+                    acceleration_l1: errors.acceleration_l1,
+                    acceleration_unfiltered_l1: errors.acceleration_unfiltered_l1,
+                })
+            })
+            .collect()
+    }
+
+    /// Predicts the case by one model; `None` if what is left is too little for it.
+    fn trial(&self, options: &Options) -> Result<Option<Trial>, ValidateError> {
+        let model = match Model::fit(&self.rest, *options) {
+            Ok(model) => model,
+            Err(ModelError::OneCurve { .. }) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        let mut predictions = BTreeMap::new();
+        for rule in MaxCrushRule::ALL {
+            let query = Query {
+                mass_kg: Some(self.case.masses.body_kg),
+                parameters: self.parameters(),
+                ..Query::at(self.own.speed_m_per_s)
+            };
+            match predict(&model, &query.with_rule(rule)) {
+                Ok(curve) => {
+                    predictions.insert(rule, self.judged(curve)?);
+                }
+                // A rule may have no answer; a category may only be in the case left out.
+                Err(PredictError::MaxCrush { .. } | PredictError::Parameters(_)) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(Some(Trial {
+            model: options.name(),
+            case: self.own.name.clone(),
+            speed_m_per_s: self.own.speed_m_per_s,
+            inner: self.inner,
+            predictions,
+        }))
+    }
+
+    fn parameters(&self) -> BTreeMap<String, Parameter> {
+        let mut parameters = self.case.parameters.clone();
+        if let Some(other) = self.case.masses.other_kg {
+            parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
+        }
+        parameters
+    }
+
+    fn judged(&self, curve: PredictedCurve) -> Result<Judged, ValidateError> {
+        let envelope = curve.envelope()?;
+        let end = self.own.envelope.end_m();
+        let along = grid(end, STEPS);
+        let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
+        let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
+        let driven = |envelope: Envelope| -> Result<MotionErrors, MotionError> {
+            let driver = Driver {
+                envelope,
+                stiffness_n_per_m: curve
+                    .rebound
+                    .map(|r| r.stiffness_n_per_m)
+                    .or(Some(curve.unloading_stiffness_n_per_m)),
+            };
+            self.reference.errors(&self.reference.run(&driver)?)
+        };
+        Ok(Judged {
+            force_l1: l1_ratio(&reference, &predicted),
+            energy_error: curve.energy_j / self.own.envelope.work() - 1.0,
+            max_crush_error: curve.max_deflection_m / end - 1.0,
+            peaks: peak_errors(&along, &reference, &predicted),
+            residuals: band::residuals(&reference, &predicted),
+            body: driven(curve.driving_envelope()?)?,
+            contact: match curve.body_force_n {
+                Some(_) => Some(driven(envelope)?),
+                None => None,
+            },
+        })
+    }
+}
+
+/// Errors of one prediction.
+struct Judged {
+    force_l1: f64,
+    energy_error: f64,
+    max_crush_error: f64,
+    peaks: Vec<PeakError>,
+    residuals: Residuals,
+    body: MotionErrors,
+    contact: Option<MotionErrors>,
+}
+
+/// One model at one case, by every rule that has an answer.
+struct Trial {
+    model: &'static str,
+    case: String,
+    speed_m_per_s: f64,
+    inner: bool,
+    predictions: BTreeMap<MaxCrushRule, Judged>,
+}
+
+impl Trial {
+    fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
+        Some(self.predictions.get(&rule)?.residuals.clone())
+    }
+
+    fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
+        let by_rule = self.predictions.get(&rule)?;
+        let crush = |(rule, judged): (&MaxCrushRule, &Judged)| (*rule, judged.max_crush_error);
+        Some(LeftOut {
+            model: self.model.into(),
+            case: self.case.clone(),
+            speed_m_per_s: self.speed_m_per_s,
+            inner: self.inner,
+            force_l1: by_rule.force_l1,
+            energy_error: by_rule.energy_error,
+            max_crush_error: by_rule.max_crush_error,
+            max_crush_errors: self.predictions.iter().map(crush).collect(),
+            peaks: by_rule.peaks.clone(),
+            velocity_l1: by_rule.body.velocity_l1,
+            acceleration_l1: by_rule.body.acceleration_l1,
+            acceleration_unfiltered_l1: by_rule.body.acceleration_unfiltered_l1,
+            contact_velocity_l1: by_rule.contact.map(|c| c.velocity_l1),
+            contact_acceleration_l1: by_rule.contact.map(|c| c.acceleration_l1),
+            coverage: None,
+        })
+    }
+}
+
+/// The rule with the smallest mean error of the crush over the inner speeds; the reference
+/// method keeps its spline.
+fn best_rule(options: &Options, trials: &[&Trial]) -> Option<MaxCrushRule> {
+    let mean = |rule: &MaxCrushRule| -> Option<f64> {
+        let inner = trials.iter().filter(|t| t.inner);
+        let errors: Vec<f64> = inner
+            .map(|t| t.predictions.get(rule).map(|j| j.max_crush_error.abs()))
+            .collect::<Option<_>>()?;
+        (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
+    };
+    let is_paper = matches!(options, Options::Forest(f) if ForestOptions { seed: f.seed, ..ForestOptions::paper() } == *f);
+    if is_paper && mean(&MaxCrushRule::Spline).is_some() {
+        return Some(MaxCrushRule::Spline);
+    }
+    MaxCrushRule::ALL
+        .into_iter()
+        .filter_map(|rule| Some((rule, mean(&rule)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(rule, _)| rule)
+}
+
+/// The first two peaks of FE's force and the predicted peaks nearest to them.
+fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakError> {
+    let prominent =
+        |force: &[f64]| peaks(force, PROMINENCE * force.iter().copied().fold(0.0, f64::max));
+    let found = prominent(predicted);
+    let near = MATCH * along[along.len() - 1];
+    prominent(reference)
+        .into_iter()
+        .take(PEAKS)
+        .map(|peak| {
+            let shift = |&i: &usize| along[i] - along[peak];
+            let matched = found
+                .iter()
+                .filter(|i| shift(i).abs() <= near)
+                .min_by(|a, b| shift(a).abs().total_cmp(&shift(b).abs()));
+            PeakError {
+                deflection_m: along[peak],
+                force_n: reference[peak],
+                force_error: matched.map(|&i| predicted[i] / reference[peak] - 1.0),
+                shift_m: matched.map(shift),
+            }
+        })
+        .collect()
+}
+
+/// Means over the inner speeds; `None` without any.
+fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
+    let inner: Vec<&LeftOut> = rows.iter().filter(|r| r.inner).collect();
+    let over = |of: fn(&LeftOut) -> f64| {
+        inner.iter().map(|r| of(r).abs()).sum::<f64>() / inner.len() as f64
+    };
+    (!inner.is_empty()).then(|| Means {
+        model: model.into(),
+        speeds: inner.len(),
+        force_l1: over(|r| r.force_l1),
+        energy_error: over(|r| r.energy_error),
+        max_crush_error: over(|r| r.max_crush_error),
+        max_crush_rule: rule,
+        velocity_l1: over(|r| r.velocity_l1),
+        acceleration_l1: over(|r| r.acceleration_l1),
+        acceleration_unfiltered_l1: over(|r| r.acceleration_unfiltered_l1),
+    })
+}

@@ -1,0 +1,155 @@
+//! Motion of a case against a multi-body run of one mass: the errors of a curve in use.
+
+use crate::curve::body::filtered;
+use crate::curve::rating::l1_ratio;
+use crate::curve::resample::interpolate;
+use crate::curve::{Case, Envelope};
+use crate::history::derivative;
+use crate::multibody::integrator::DEFAULT_STEP_S;
+use crate::multibody::{
+    Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
+    Unloading, simulate,
+};
+
+/// The comparison ends this long after FE's largest deflection, so that rebound counts.
+const AFTER_MAX_CRUSH_S: f64 = 0.030;
+/// The record is followed so much longer that the filter does not see its end.
+const FOR_FILTER_S: f64 = 0.050;
+
+/// FE's motion over the window of the comparison, and a little longer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    case: String,
+    mass_kg: f64,
+    speed_m_per_s: f64,
+    time_s: Vec<f64>,
+    /// States inside the window.
+    inside: usize,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+    /// CFC 60.
+    acceleration_filtered: Vec<f64>,
+}
+
+/// Why a motion cannot be compared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    #[error("case \"{case}\": only {states} states lie in the window: at least 3 are needed")]
+    TooShort { case: String, states: usize },
+    #[error("case \"{case}\": the multi-body run is shorter than the window")]
+    RunTooShort { case: String },
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+/// Errors of a multi-body run against FE, from contact to 30 ms after FE's largest
+/// deflection, as `Σ|p − r|/Σ|r|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionErrors {
+    pub velocity_l1: f64,
+    /// CFC 60 on both sides.
+    pub acceleration_l1: f64,
+    /// Central differences over two sampling intervals on both sides.
+    pub acceleration_unfiltered_l1: f64,
+}
+
+/// A curve and how it unloads from its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Driver {
+    pub envelope: Envelope,
+    pub stiffness_n_per_m: Option<f64>,
+}
+
+impl Driver {
+    /// The stiffness with which a body of `mass_kg` leaves the envelope's end at
+    /// `rebound_m_per_s`; `other` if that is not known.
+    pub fn rebounding(
+        envelope: Envelope,
+        mass_kg: f64,
+        rebound_m_per_s: Option<f64>,
+        other: Option<f64>,
+    ) -> Self {
+        let top = envelope.force_at(envelope.end_m());
+        let stiffness = rebound_m_per_s.map(|v| top * top / (mass_kg * v * v));
+        let stiffness_n_per_m = stiffness.filter(|&k| k > 0.0 && k.is_finite()).or(other);
+        Self { envelope, stiffness_n_per_m }
+    }
+}
+
+impl Reference {
+    /// # Errors
+    /// [`MotionError::TooShort`] for a record of fewer than three states.
+    pub fn of(case: &Case) -> Result<Self, MotionError> {
+        let end_s = case.original.time_s()[case.loading_end()] + AFTER_MAX_CRUSH_S;
+        let upto = |end_s: f64| case.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
+        let (inside, all) = (upto(end_s), upto(end_s + FOR_FILTER_S));
+        if inside < 3 {
+            return Err(MotionError::TooShort { case: case.name.clone(), states: inside });
+        }
+        let time_s = case.sampled.time_s()[..all].to_vec();
+        let velocity = case.closing_speed_m_per_s[..all].to_vec();
+        let acceleration = derivative(&time_s, &velocity);
+        Ok(Self {
+            case: case.name.clone(),
+            mass_kg: case.masses.effective_kg(),
+            speed_m_per_s: case.speed.m_per_s,
+            acceleration_filtered: filtered(&time_s, acceleration.clone()),
+            time_s,
+            inside,
+            velocity,
+            acceleration,
+        })
+    }
+
+    /// Length of the window in s.
+    pub fn window_s(&self) -> f64 {
+        self.time_s[self.inside - 1]
+    }
+
+    /// Runs one body of the case's effective mass against a wall with the driver's curve.
+    ///
+    /// # Errors
+    /// [`MotionError`] if the curve makes no run.
+    pub fn run(&self, driver: &Driver) -> Result<Run, MotionError> {
+        let body =
+            Body { name: "body".into(), mass_kg: self.mass_kg, speed_m_per_s: self.speed_m_per_s };
+        let envelope = driver.envelope.clone();
+        let stiffness_n_per_m = driver.stiffness_n_per_m.unwrap_or_else(|| envelope.max_slope());
+        let unloading = match stiffness_n_per_m > 0.0 {
+            true => Unloading::Memory { stiffness_n_per_m },
+            // A curve that never rises has no line to unload on.
+            false => Unloading::Elastic,
+        };
+        let interface = Interface {
+            name: "body|wall".into(),
+            law: ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold),
+            gap_m: 0.0,
+        };
+        let chain = Chain::new(vec![body], vec![interface])?;
+        let output_interval_s = self.time_s[1] - self.time_s[0];
+        // One output more than is compared, so that rounding cannot make it too short.
+        let duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
+        let settings = RunSettings { duration_s, output_interval_s, step_s: DEFAULT_STEP_S };
+        Ok(simulate(&chain, &settings)?)
+    }
+
+    /// Errors of a run's first body.
+    ///
+    /// # Errors
+    /// [`MotionError::RunTooShort`] if the run ends before the window.
+    pub fn errors(&self, run: &Run) -> Result<MotionErrors, MotionError> {
+        let velocity = interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s)
+            .map_err(|_| MotionError::RunTooShort { case: self.case.clone() })?;
+        let acceleration = derivative(&self.time_s, &velocity);
+        let smooth = filtered(&self.time_s, acceleration.clone());
+        let inside =
+            |values: &[f64], other: &[f64]| l1_ratio(&values[..self.inside], &other[..self.inside]);
+        Ok(MotionErrors {
+            velocity_l1: inside(&self.velocity, &velocity),
+            acceleration_l1: inside(&self.acceleration_filtered, &smooth),
+            acceleration_unfiltered_l1: inside(&self.acceleration, &acceleration),
+        })
+    }
+}
