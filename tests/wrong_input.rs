@@ -257,7 +257,7 @@ fn files_that_are_not_ours() {
     t(
         here,
         &["predict", "m2.model", "--speed", "50km/h"],
-        "version 9 is newer than this program reads (1)",
+        "version 9 is newer than this program reads (2)",
     );
 }
 

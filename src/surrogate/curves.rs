@@ -54,7 +54,7 @@ impl CaseCurve {
         if self.closing_m_per_s.is_empty() {
             return self.speed_m_per_s;
         }
-        if deflection_m >= self.end_m() {
+        if deflection_m > self.end_m() {
             return 0.0;
         }
         let d = self.envelope.deflection_m();

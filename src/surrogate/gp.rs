@@ -122,26 +122,29 @@ fn standardised(cases: &[CaseCurve], at: &At<'_>) -> (Array2<f64>, Array2<f64>) 
     (inputs, query)
 }
 
-/// Prediction of one score; its trend is a plane where the cases can carry one.
+/// Prediction of one score. Its trend is a plane where the cases can carry one, else a
+/// constant: the columns of categories add up to one and leave no plane to determine.
 fn process(inputs: &Array2<f64>, scores: &Array1<f64>, query: &Array2<f64>) -> Option<f64> {
     let data = Dataset::new(inputs.clone(), scores.clone());
-    let corr = SquaredExponentialCorr::default();
-    let predicted = if inputs.nrows() >= SAMPLES_PER_UNKNOWN * (inputs.ncols() + 1) {
-        GaussianProcess::<f64, LinearMean, SquaredExponentialCorr>::params(
-            LinearMean::default(),
-            corr,
-        )
-        .fit(&data)
-        .ok()?
-        .predict(query)
-    } else {
-        GaussianProcess::<f64, ConstantMean, SquaredExponentialCorr>::params(
-            ConstantMean::default(),
-            corr,
-        )
-        .fit(&data)
-        .ok()?
-        .predict(query)
+    let correlation = SquaredExponentialCorr::default;
+    let first = |values: Array1<f64>| values.first().copied().filter(|s| s.is_finite());
+    let plane = || {
+        let mean = LinearMean::default();
+        let process =
+            GaussianProcess::<f64, LinearMean, SquaredExponentialCorr>::params(mean, correlation());
+        first(process.fit(&data).ok()?.predict(query).ok()?)
     };
-    predicted.ok()?.first().copied().filter(|s| s.is_finite())
+    let constant = || {
+        let mean = ConstantMean::default();
+        let process = GaussianProcess::<f64, ConstantMean, SquaredExponentialCorr>::params(
+            mean,
+            correlation(),
+        );
+        first(process.fit(&data).ok()?.predict(query).ok()?)
+    };
+    if inputs.nrows() >= SAMPLES_PER_UNKNOWN * (inputs.ncols() + 1) {
+        plane().or_else(constant)
+    } else {
+        constant()
+    }
 }

@@ -166,6 +166,8 @@ pub enum PredictError {
     Correction { factor: f64 },
     #[error(transparent)]
     Parameters(Box<DatasetError>),
+    #[error("the {model} model has no answer at this speed: train another one")]
+    NoAnswer { model: &'static str },
     #[error("the predicted curve is no curve: {0}")]
     Envelope(#[from] EnvelopeError),
     #[error("{0}")]
@@ -207,24 +209,24 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
     // The motion first: crush and the speeds along it follow from the body's force.
     let reach = REACH * model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
     let along = grid(reach, POINTS);
-    let body_n = sound(model, &along, model.body_force_n(&at, &along), true);
+    let body_n = sound(model, &along, model.body_force_n(&at, &along), true)?;
     let body = Envelope::new(along.clone(), body_n)?;
     let closing_at = |&d: &f64| (v * v - 2.0 * body.work_to(d) / mass_kg).max(0.0).sqrt();
     let declared_over = |deflection_m: &[f64]| {
         if !model.has_body_force() {
-            return deflection_m.iter().map(|&d| body.force_at(d)).collect();
+            return Ok(deflection_m.iter().map(|&d| body.force_at(d)).collect());
         }
         let closing: Vec<f64> = deflection_m.iter().map(closing_at).collect();
         let force_n = model.force_n(&At { closing_m_per_s: Some(&closing), ..at }, deflection_m);
         sound(model, deflection_m, force_n, false)
     };
-    let declared = Envelope::new(along.clone(), declared_over(&along))?;
+    let declared = Envelope::new(along.clone(), declared_over(&along)?)?;
     let crush = max_crush(model, v, &declared, &body, kinetic_energy_j);
     let rule = query.rule.unwrap_or(model.max_crush_rule);
     let end = chosen(&crush, rule)?;
 
     let deflection_m: Vec<f64> = (0..=POINTS).map(|i| end * i as f64 / POINTS as f64).collect();
-    let force_n = declared_over(&deflection_m);
+    let force_n = declared_over(&deflection_m)?;
     let body_n = deflection_m.iter().map(|&d| body.force_at(d)).collect();
     let mut warnings = model.warnings(&at);
     let corrected = |force_n: Vec<f64>, warn: bool, warnings: &mut Vec<Warning>| {
@@ -315,7 +317,15 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
 
 /// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands
 /// alone as none of a training curve does.
-fn sound(model: &Model, deflection_m: &[f64], force_n: Vec<f64>, of_body: bool) -> Vec<f64> {
+fn sound(
+    model: &Model,
+    deflection_m: &[f64],
+    force_n: Vec<f64>,
+    of_body: bool,
+) -> Result<Vec<f64>, PredictError> {
+    if force_n.iter().any(|f| !f.is_finite()) {
+        return Err(PredictError::NoAnswer { model: model.options.name() });
+    }
     let mut force_n: Vec<f64> = force_n.into_iter().map(|f| f.max(0.0)).collect();
     let step = deflection_m[1] - deflection_m[0];
     let (declared, body) = model.curves();
@@ -340,7 +350,7 @@ fn sound(model: &Model, deflection_m: &[f64], force_n: Vec<f64>, of_body: bool) 
         }
     }
     force_n[0] = 0.0;
-    force_n
+    Ok(force_n)
 }
 
 fn max_crush(

@@ -183,11 +183,6 @@ mod tests {
         let exact = Rate { sensitivity: 0.06 };
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
-        println!(
-            "{:?} {:?}",
-            exact.levels(&cases),
-            cases.iter().map(CaseCurve::end_m).collect::<Vec<_>>()
-        );
         let at = At { speed_m_per_s: 15.0, features: &[], mass_kg: 24e3, closing_m_per_s: None };
         let force = exact.force_n(&cases, &at, d);
         // Not to the very end: there the speed falls to 0 within one step.

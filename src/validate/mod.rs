@@ -267,8 +267,13 @@ impl<'a> Held<'a> {
                 Ok(curve) => {
                     predictions.insert(rule, self.judged(curve)?);
                 }
-                // A rule may have no answer; a category may only be in the case left out.
-                Err(PredictError::MaxCrush { .. } | PredictError::Parameters(_)) => {}
+                // A rule or model may have no answer; a category may only be in the case left
+                // out.
+                Err(
+                    PredictError::MaxCrush { .. }
+                    | PredictError::NoAnswer { .. }
+                    | PredictError::Parameters(_),
+                ) => {}
                 Err(error) => return Err(error.into()),
             }
         }

@@ -1,0 +1,507 @@
+//! Models of the force over speed and deflection: few cases, many parameters, left-out speeds.
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::{build_fixture, crumple_in, crumple_ok, root};
+use crumple::curve::energy::audit;
+use crumple::curve::loading::unloading_stiffness;
+use crumple::curve::{Case, Curve, ForceKind, Masses, Parameter};
+use crumple::database::Database;
+use crumple::dataset::TrainingSet;
+use crumple::surrogate::forest::ForestOptions;
+use crumple::surrogate::max_crush::MaxCrushRule;
+use crumple::surrogate::{At, Model, Options, PredictedCurve, Query, predict};
+use crumple::unit::{Speed, SpeedKind};
+use crumple::validate::{Choice, candidates, train, validate};
+use serde_json::Value;
+
+const GROUPS: [&str; 3] = ["lead-car-pair", "lead-car-wall", "vehicle-pair"];
+
+/// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and thrown back on a line of
+/// 100 MN/m; 400 states each 0.75 ms.
+fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Case {
+    let (mut d, mut speed, mut largest) = (0.0_f64, v, 0.0_f64);
+    let (mut time, mut deflection, mut forces, mut speeds) = (vec![], vec![], vec![], vec![]);
+    let step = 0.75e-3 / 150.0;
+    let top = std::cell::Cell::new(0.0);
+    for i in 0..400 * 150 {
+        let f = if d >= largest {
+            largest = d;
+            top.set(force(d, speed.max(0.0)));
+            top.get()
+        } else {
+            (top.get() - 100e6 * (largest - d)).max(0.0)
+        };
+        if i % 150 == 0 {
+            time.push(i as f64 * step);
+            deflection.push(d);
+            forces.push(f);
+            speeds.push(speed);
+        }
+        speed -= f / mass_kg * step;
+        d += speed * step;
+    }
+    let curve = Curve::new(time, deflection, forces).unwrap();
+    let masses = Masses { body_kg: mass_kg, other_kg: None };
+    let speed = Speed { m_per_s: v, kind: SpeedKind::Wall };
+    Case {
+        study: "made".into(),
+        group: "made".into(),
+        name: name.into(),
+        speed,
+        masses,
+        parameters: BTreeMap::new(),
+        force_kind: ForceKind::Contact,
+        sampled: curve.clone(),
+        closing_speed_m_per_s: speeds,
+        contact_time_s: 0.0,
+        unloading_stiffness_n_per_m: unloading_stiffness(&curve),
+        audit: audit(&curve, masses, speed),
+        original: curve,
+        recipe: "{}".into(),
+        fingerprint: format!("{name} {v}"),
+        sources: vec![],
+        notes: vec![],
+        warnings: vec![],
+    }
+}
+
+/// Rises in 0.1 m, then a hump; stronger at speed.
+fn law(d: f64, speed: f64) -> f64 {
+    let hump = (-((d - 0.4) / 0.08).powi(2)).exp();
+    (2e6 * (d / 0.1).min(1.0) + 1e6 * hump) * (1.0 + 0.01 * speed)
+}
+
+fn family(speeds: &[f64]) -> Vec<Case> {
+    speeds.iter().map(|&v| case(&format!("v{v}"), v, 24e3, &law)).collect()
+}
+
+fn all_options() -> Vec<Options> {
+    let small = |options: ForestOptions| ForestOptions { trees: 20, ..options };
+    candidates(0)
+        .into_iter()
+        .map(|o| match o {
+            Options::Extra(f) => Options::Extra(small(f)),
+            Options::Forest(f) => Options::Forest(small(f)),
+            other => other,
+        })
+        .collect()
+}
+
+fn databases() -> &'static Database {
+    static DATABASE: std::sync::OnceLock<Database> = std::sync::OnceLock::new();
+    DATABASE.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut database = Database::default();
+        for group in GROUPS {
+            let study = root().join("fixtures/fe").join(group).join("study.toml");
+            let path = folder.path().join("curves.h5");
+            database = crumple::build::build(&study, &path, |_| {}).unwrap().database;
+        }
+        database
+    })
+}
+
+fn curve(model: &Model, v: f64) -> PredictedCurve {
+    predict(model, &Query::at(v)).unwrap()
+}
+
+/// What issue and README promise of the bundled FE runs, with the real candidates.
+#[test]
+fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
+    for group in GROUPS {
+        let found = validate(group, databases().cases(group), &candidates(0), None).unwrap();
+        let of = |model: &str| found.means.iter().find(|m| m.model == model).unwrap();
+        let chosen = of(&found.chosen);
+        for baseline in ["nearest", "linear", "forest"] {
+            let other = of(baseline);
+            assert!(
+                chosen.force_l1 <= other.force_l1,
+                "{group}: {} against {baseline}",
+                found.chosen
+            );
+            assert!(chosen.velocity_l1 <= other.velocity_l1, "{group}: against {baseline}");
+        }
+        assert!(chosen.acceleration_l1 <= 0.08, "{group}: {}", chosen.acceleration_l1);
+        assert!(chosen.max_crush_error <= 0.02, "{group}: {}", chosen.max_crush_error);
+        let band = found.band.unwrap();
+        let coverage = band.coverage.unwrap();
+        assert!((0.8..=1.0).contains(&coverage), "{group}: {coverage}");
+        // The floors: FE's own body force repeats the motion, its contact force does not.
+        let floor = |force: &str| {
+            let own = found.floors.iter().filter(|f| f.inner && f.force == force);
+            let velocities: Vec<f64> = own.map(|f| f.velocity_l1).collect();
+            velocities.iter().sum::<f64>() / velocities.len() as f64
+        };
+        assert!(floor("body") < 0.01 && floor("contact") > 0.01, "{group}");
+    }
+}
+
+/// Exact case 8: midpoint thresholds jump at 48 km/h, random ones do not.
+#[test]
+fn forests_at_a_midpoint() {
+    let cases: Vec<Case> =
+        databases().cases("lead-car-wall").iter().filter(|c| c.name != "48kmh").cloned().collect();
+    let set = TrainingSet::new("lead-car-wall", &cases).unwrap();
+    let d: Vec<f64> = (0..1_200).map(|i| f64::from(i) * 1e-3).collect();
+    let step = |options: Options| {
+        let model = Model::fit(&set, options).unwrap();
+        let at = |km_per_h: f64| {
+            let at = At {
+                speed_m_per_s: km_per_h / 3.6,
+                features: &[],
+                mass_kg: 24e3,
+                closing_m_per_s: None,
+            };
+            model.force_n(&at, &d)
+        };
+        let (below, above) = (at(47.99), at(48.01));
+        let largest = below.iter().copied().fold(0.0, f64::max);
+        let steps = below.iter().zip(&above).map(|(a, b)| (a - b).abs());
+        steps.fold(0.0, f64::max) / largest
+    };
+    assert!(step(Options::Forest(ForestOptions::default())) > 0.05);
+    assert!(step(Options::Extra(ForestOptions::extra())) <= 0.01);
+}
+
+#[test]
+fn a_monotone_family_gives_a_monotone_crush() {
+    let cases = family(&[7.0, 10.0, 13.0, 17.0, 20.0]);
+    let set = TrainingSet::new("made", &cases).unwrap();
+    for options in all_options() {
+        let model = Model::fit(&set, options).unwrap();
+        let rules = match options {
+            // A step function of speed: only crush over speed is smooth.
+            Options::Nearest | Options::Forest(_) => &[MaxCrushRule::Monotone][..],
+            _ => &[MaxCrushRule::Monotone, MaxCrushRule::Motion],
+        };
+        for &rule in rules {
+            let crush = |v: f64| predict(&model, &Query::at(v).with_rule(rule)).unwrap();
+            let crush: Vec<f64> =
+                (0..40).map(|i| crush(6.0 + 0.4 * f64::from(i)).max_deflection_m).collect();
+            let rises = crush.windows(2).all(|w| w[0] < w[1]);
+            assert!(rises, "{} by {}: {crush:?}", options.name(), rule.name());
+        }
+    }
+}
+
+/// The made family is rate dependent; the rate model must find crush and motion.
+#[test]
+fn left_out_speeds_of_a_made_family() {
+    let cases = family(&[7.0, 10.0, 13.0, 17.0, 20.0]);
+    let found = validate("made", &cases, &all_options(), None).unwrap();
+    let rate = found.means.iter().find(|m| m.model == "rate").unwrap();
+    // Half of the sensitivity is taken, so the motion is not found exactly.
+    assert!(rate.max_crush_error < 0.01 && rate.velocity_l1 < 0.015, "{rate:?}");
+    assert!(rate.energy_error < 0.015 && rate.force_l1 < 0.03, "{rate:?}");
+    let nearest = found.means.iter().find(|m| m.model == "nearest").unwrap();
+    let linear = found.means.iter().find(|m| m.model == "linear").unwrap();
+    assert!(linear.velocity_l1 > rate.velocity_l1 && nearest.velocity_l1 > 3.0 * rate.velocity_l1);
+}
+
+#[test]
+fn order_and_names_of_cases_change_nothing() {
+    let cases = family(&[7.0, 10.0, 13.0, 17.0]);
+    let mut other: Vec<Case> = cases.iter().rev().cloned().collect();
+    other.swap(0, 2);
+    for (i, case) in other.iter_mut().enumerate() {
+        case.name = format!("{i}");
+    }
+    for options in all_options() {
+        let choice = Choice::Options(options);
+        let [a, b] = [&cases, &other].map(|c| curve(&train("made", c, choice).unwrap(), 12.0));
+        assert_eq!(a.force_n, b.force_n, "{}", options.name());
+        assert_eq!(a.body_force_n, b.body_force_n, "{}", options.name());
+        assert_eq!(a.force_low_n, b.force_low_n, "{}", options.name());
+    }
+}
+
+#[test]
+fn one_to_five_curves() {
+    let speeds = [7.0, 10.0, 13.0, 17.0, 20.0];
+    for n in 1..=5 {
+        let cases = family(&speeds[..n]);
+        for options in all_options() {
+            let result = train("made", &cases, Choice::Options(options));
+            if n == 1 && options != Options::Nearest {
+                let error = result.unwrap_err().to_string();
+                assert!(error.contains("at least 2 curves, the group has 1"), "{error}");
+                continue;
+            }
+            let model = result.unwrap();
+            let predicted = curve(&model, 9.0);
+            assert_eq!((predicted.deflection_m[0], predicted.force_n[0]), (0.0, 0.0));
+            assert!(predicted.force_n.iter().all(|f| f.is_finite() && *f >= 0.0));
+            let few = predicted.warnings.iter().any(|w| w.code.name() == "too_few_curves");
+            assert_eq!(few, n < 3, "{} on {n}", options.name());
+            let validation = model.leave_one_out.unwrap();
+            assert_eq!(validation.means.is_empty(), n < 3);
+            assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));
+        }
+        let auto = train("made", &cases, Choice::Auto { seed: 0 }).unwrap();
+        let expected = ["nearest", "linear"];
+        if n < 3 {
+            assert_eq!(auto.options.name(), expected[n - 1]);
+        }
+        curve(&auto, 12.0);
+    }
+}
+
+#[test]
+fn several_parameters() {
+    // Force over speed and angle; what the cases share is no feature.
+    let make = |v: f64, angle: f64, obstacle: &str| {
+        let factor = (1.0 - 0.02 * angle) * if obstacle == "pole" { 0.7 } else { 1.0 };
+        let mut made =
+            case(&format!("{v} {angle} {obstacle}"), v, 24e3, &|d, u| factor * law(d, u));
+        made.parameters = BTreeMap::from([
+            ("angle_deg".into(), Parameter::Number(angle)),
+            ("obstacle".into(), Parameter::Category(obstacle.into())),
+            ("temperature_K".into(), Parameter::Number(293.0)),
+        ]);
+        made
+    };
+    let mut cases = Vec::new();
+    for v in [8.0, 12.0, 16.0] {
+        for angle in [0.0, 10.0] {
+            for obstacle in ["wall", "pole"] {
+                cases.push(make(v, angle, obstacle));
+            }
+        }
+    }
+    let set = TrainingSet::new("made", &cases).unwrap();
+    let names: Vec<String> = set.features.iter().map(|f| f.name()).collect();
+    assert_eq!(names, ["angle_deg", "obstacle=pole", "obstacle=wall"]);
+    for options in all_options() {
+        if matches!(options, Options::Linear | Options::Rate | Options::Registered) {
+            let error = Model::fit(&set, options).unwrap_err().to_string();
+            assert!(error.contains("sees only the speed, but the cases also differ in angle_deg"));
+            continue;
+        }
+        let model = train("made", &cases, Choice::Options(options)).unwrap();
+        let ask = |angle: f64, obstacle: &str| Query {
+            parameters: BTreeMap::from([
+                ("angle_deg".into(), Parameter::Number(angle)),
+                ("obstacle".into(), Parameter::Category(obstacle.into())),
+            ]),
+            ..Query::at(12.0)
+        };
+        let peak = |angle: f64, obstacle: &str| {
+            let curve = predict(&model, &ask(angle, obstacle)).unwrap();
+            curve.force_n.iter().copied().fold(0.0, f64::max)
+        };
+        // At the cases themselves the models must tell them apart.
+        let (wall, pole, tilted) = (peak(0.0, "wall"), peak(0.0, "pole"), peak(10.0, "wall"));
+        assert!((pole / wall - 0.7).abs() < 0.06, "{}: {}", options.name(), pole / wall);
+        assert!((tilted / wall - 0.8).abs() < 0.06, "{}: {}", options.name(), tilted / wall);
+        let error = predict(&model, &Query::at(12.0)).unwrap_err().to_string();
+        assert_eq!(error, "the model needs angle_deg as a finite number: give it with the query");
+        let error = predict(&model, &ask(0.0, "deer")).unwrap_err().to_string();
+        assert_eq!(error, "the model needs obstacle, one of pole, wall: give it with the query");
+        let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
+        assert!(predict(&model, &crush).unwrap_err().to_string().contains("try --max-crush"));
+    }
+    let auto = train("made", &cases, Choice::Auto { seed: 0 }).unwrap();
+    let notes = auto.leave_one_out.unwrap().notes;
+    assert!(notes.iter().any(|n| n.starts_with("linear: ")), "{notes:?}");
+}
+
+/// Masses that differ become a parameter by themselves.
+#[test]
+fn masses_are_a_parameter_where_they_differ() {
+    let cases: Vec<Case> = [(8.0, 20e3), (8.0, 30e3), (12.0, 20e3), (12.0, 30e3)]
+        .map(|(v, m)| case(&format!("{v} {m}"), v, m, &law))
+        .to_vec();
+    let model = train("made", &cases, Choice::Options(Options::Gp)).unwrap();
+    assert_eq!(model.features[0].name(), "mass_kg");
+    let ask = |mass| Query { mass_kg: mass, ..Query::at(10.0) };
+    assert!(predict(&model, &ask(None)).unwrap_err().to_string().contains("needs mass_kg"));
+    let crush = |mass| predict(&model, &ask(Some(mass))).unwrap().max_deflection_m;
+    assert!(crush(20e3) < crush(25e3) && crush(25e3) < crush(30e3));
+}
+
+#[test]
+fn cases_that_are_no_training_set() {
+    fn t(cases: &[Case], expected: &str) {
+        let error = train("made", cases, Choice::Auto { seed: 0 }).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}\nlacks: {expected}");
+    }
+    t(&[], "the group is empty");
+    let two = || vec![case("a", 8.0, 24e3, &law), case("b", 8.0, 24e3, &law)];
+    t(&two(), "cases \"a\" and \"b\" have the same speed 28.8 km/h: keep one of them, or tell");
+    let mut same = two();
+    let angle = || BTreeMap::from([("angle_deg".to_string(), Parameter::Number(3.0))]);
+    same[0].parameters = angle();
+    t(&same, "case \"b\" has no parameter \"angle_deg\", which case \"a\" has");
+    same[1].parameters = angle();
+    t(&same, "have the same speed 28.8 km/h: keep one");
+    let name = || Parameter::Category("steep".into());
+    same[1].parameters = BTreeMap::from([("angle_deg".into(), name())]);
+    t(&same, "\"angle_deg\" is a number in case \"a\" and a category in case \"b\"");
+    let mut kinds = two();
+    kinds[1].speed.kind = SpeedKind::Closing;
+    t(&kinds, "mix wall and closing speeds");
+    // One state, or a number that is none, cannot even become a curve.
+    let one = Curve::new(vec![0.0], vec![0.0], vec![0.0]).unwrap_err().to_string();
+    assert_eq!(one, "a curve needs at least 2 states, found 1");
+    let nan = Curve::new(vec![0.0, 1.0], vec![0.0, f64::NAN], vec![0.0; 2]).unwrap_err();
+    assert!(nan.to_string().contains("deflection of state 2 is NaN"));
+    let mut still = two();
+    let standing = Curve::new(vec![0.0, 1.0], vec![0.0, 0.0], vec![0.0, 1.0]).unwrap();
+    still[0].original = standing.clone();
+    still[0].sampled = standing;
+    still[0].closing_speed_m_per_s = vec![0.0; 2];
+    t(&still[..1], "case \"a\": ");
+}
+
+#[test]
+fn energy_correction_has_bounds() {
+    let model = train("made", &family(&[8.0, 12.0, 16.0]), Choice::Options(Options::Rate)).unwrap();
+    let ask = |mass| Query {
+        mass_kg: Some(mass),
+        rule: Some(MaxCrushRule::Monotone),
+        energy_correct: true,
+        ..Query::at(11.0)
+    };
+    let curve = predict(&model, &ask(25e3)).unwrap();
+    assert!((curve.provenance.energy_over_kinetic - 1.0).abs() < 1e-12);
+    assert!((curve.provenance.body_energy_over_kinetic.unwrap() - 1.0).abs() < 1e-12);
+    assert!(curve.warnings.iter().any(|w| w.code.name() == "energy_corrected"));
+    // The crush by speed is that of 24 t: twice the mass is not a matter of scale.
+    let error = predict(&model, &ask(48e3)).unwrap_err().to_string();
+    assert!(error.contains("outside 0.8 to 1.25"), "{error}");
+}
+
+/// Another mass: the rate model's crush follows the motion.
+#[test]
+fn other_masses_come_by_themselves() {
+    let model = train("made", &family(&[8.0, 12.0, 16.0]), Choice::Options(Options::Rate)).unwrap();
+    let truth = case("heavy", 12.0, 30e3, &law).max_deflection_m();
+    let query = Query { mass_kg: Some(30e3), ..Query::at(12.0) };
+    let found = predict(&model, &query.with_rule(MaxCrushRule::Motion)).unwrap();
+    assert!((found.max_deflection_m / truth - 1.0).abs() < 0.02, "{}", found.max_deflection_m);
+}
+
+#[test]
+fn jumps_of_the_collapse_are_warned_of() {
+    let place = |v: f64| if v < 15.0 { 0.25 + 0.001 * v } else { 0.36 + 0.001 * v };
+    let humps = |v: f64| {
+        move |d: f64, _: f64| {
+            2e6 * (d / 0.05).min(1.0) + 2e6 * (-((d - place(v)) / 0.04).powi(2)).exp()
+        }
+    };
+    let cases: Vec<Case> = [11.0, 12.0, 13.0, 14.0, 16.0, 17.0]
+        .map(|v| case(&format!("{v}"), v, 40e3, &humps(v)))
+        .to_vec();
+    let model = train("made", &cases, Choice::Options(Options::Registered)).unwrap();
+    let codes =
+        |v: f64| -> Vec<&str> { curve(&model, v).warnings.iter().map(|w| w.code.name()).collect() };
+    assert!(codes(15.0).contains(&"mode_switch"), "{:?}", model.mode_switches_m_per_s);
+    assert!(!codes(12.5).contains(&"mode_switch"));
+    assert!(codes(8.0).contains(&"out_of_range"));
+}
+
+/// Files of the first version, written by hand as that version wrote them.
+#[test]
+fn model_files_of_version_1_are_read() {
+    let case = |v: f64, force: f64| {
+        serde_json::json!({"name": format!("{v}"), "speed_m_per_s": v, "max_deflection_m": 0.5,
+            "truncated": false, "unloading_stiffness_N_per_m": 1e8,
+            "curve": {"speed_m_per_s": v, "deflection_m": [0.0, 0.1, 0.5], "force_N": [0.0, force, force]}})
+    };
+    let cases = [case(8.0, 1e6), case(12.0, 2e6)];
+    let curves: Vec<Value> = cases.iter().map(|c| c["curve"].clone()).collect();
+    let model = serde_json::json!({"format": "crumple model", "version": 1,
+        "written_by": "crumple 0.1.0", "group": "made", "speed_kind": "wall",
+        "force_kind": "contact", "mass_kg": 24e3, "other_mass_kg": null,
+        "training_hash": "0", "cases": cases, "options": {"model": "nearest"},
+        "validation": [], "fitted": {"nearest": {"curves": curves}}});
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.model");
+    std::fs::write(&path, model.to_string()).unwrap();
+    let model = Model::read(&path).unwrap();
+    let curve = predict(&model, &Query::at(11.0)).unwrap();
+    assert_eq!(curve.force_n[400], 2e6);
+    assert!(curve.body_force_n.is_none());
+}
+
+/// Parameters stand in the manifest, the database, the model and the prediction.
+#[test]
+fn parameters_through_the_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let source = root().join("fixtures/fe/lead-car-wall");
+    let manifest = std::fs::read_to_string(source.join("study.toml")).unwrap();
+    let mut text = manifest.replace("path  = \"", &format!("path = \"{}/", source.display()));
+    let mut angle = 0;
+    while let Some(at) = text.find("\"24t\"\n").or_else(|| text.find("\"24t\"")) {
+        text.replace_range(
+            at..at + 5,
+            &format!(
+                "\"24.0t\"\nname = \"r{angle}\"\nparameters = {{ angle_deg = {} }}",
+                angle % 3
+            ),
+        );
+        angle += 1;
+    }
+    assert!(angle >= 5, "{text}");
+    std::fs::write(here.join("study.toml"), &text).unwrap();
+    crumple_ok(here, &["build", "study.toml", "-o", "more.h5"]);
+    let database = Database::read(&here.join("more.h5")).unwrap();
+    let first = &database.cases("lead-car-wall")[1];
+    assert!(first.parameters.contains_key("angle_deg"));
+    crumple_ok(here, &["train", "more.h5", "--group", "lead-car-wall", "--model", "gp", "-o", "m"]);
+    let ask = ["predict", "m", "--speed", "50km/h", "--json", "--parameter"];
+    let curve: Value =
+        serde_json::from_str(&crumple_ok(here, &[&ask[..], &["angle_deg=1"]].concat())).unwrap();
+    assert_eq!(curve["provenance"]["parameters"]["angle_deg"], 1.0);
+    let refused = |value: &str| {
+        let output = crumple_in(here, &[&ask[..], &[value]].concat());
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(refused("angle_deg").0, Some(2));
+    let (code, message) = refused("height_m=1");
+    assert_eq!(code, Some(1));
+    assert!(message.contains("the model needs angle_deg as a finite number"), "{message}");
+    let train = ["train", "more.h5", "--group", "lead-car-wall", "--model", "linear", "-o", "m2"];
+    let output = crumple_in(here, &train);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!here.join("m2").exists());
+}
+
+#[test]
+fn validate_prints_and_tells_what_to_run_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let arguments = ["validate", "curves.h5", "--group", "lead-car-wall", "--next"];
+    let text = crumple_ok(here, &arguments);
+    for expected in
+        ["means over 3 inner speeds", "extrapolation", "FE's own, body", "next run: ", "band ±"]
+    {
+        assert!(text.contains(expected), "{text}\nlacks {expected}");
+    }
+    let found: Value =
+        serde_json::from_str(&crumple_ok(here, &[&arguments[..], &["--json"]].concat())).unwrap();
+    let group = &found["groups"][0];
+    assert_eq!(group["group"], "lead-car-wall");
+    let rows = group["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 7 * 5, "every model at every speed");
+    for row in rows {
+        for key in ["force_l1", "energy_error", "max_crush_error", "velocity_l1", "acceleration_l1"]
+        {
+            assert!(row[key].is_f64(), "{key} of {row}");
+        }
+        let v = row["speed_m_per_s"].as_f64().unwrap();
+        assert_eq!(row["inner"], (7.0..19.9).contains(&v), "{v}");
+        assert_eq!(row["max_crush_errors"].as_object().unwrap().len(), 4);
+    }
+    let next = group["next_run"]["speed_m_per_s"].as_f64().unwrap();
+    assert!((25.0 / 3.6..20.0).contains(&next));
+    let output = crumple_in(here, &["validate", "curves.h5", "--group", "x"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("there is no group \"x\""));
+}
