@@ -21,10 +21,12 @@
 mod criterion;
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
+mod grow;
 mod params;
 mod splitter;
 mod stream;
 mod tree;
+mod walk;
 
 pub use forest::{OutOfBag, RegressionForest};
 pub use params::{
