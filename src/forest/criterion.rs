@@ -44,15 +44,8 @@ impl Sums {
     /// `(s_l w − s w_l)² / (w w_l w_r)`: no difference of large numbers is left.
     #[inline]
     pub fn gain(&self, left_weight: f64, left_target: f64) -> f64 {
-        let (square, product) = self.gain_as_ratio(left_weight, left_target);
-        square / (self.weight * product)
-    }
-
-    /// `(s_l w − s w_l)²` and `w_l w_r`, so that gains compare without a division.
-    #[inline]
-    pub fn gain_as_ratio(&self, left_weight: f64, left_target: f64) -> (f64, f64) {
         let difference = left_target * self.weight - self.target * left_weight;
-        (difference * difference, left_weight * (self.weight - left_weight))
+        difference * difference / (self.weight * left_weight * (self.weight - left_weight))
     }
 }
 

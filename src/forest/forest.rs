@@ -122,7 +122,7 @@ where
             importance: importance(&gains),
         };
         if self.out_of_bag {
-            forest.out_of_bag = Some(out_of_bag(&forest, &table));
+            forest.out_of_bag = Some(out_of_bag(&forest, dataset.records().view(), &table));
         }
         Ok(forest)
     }
@@ -160,23 +160,22 @@ fn table<F: Float>(
         return Err(ForestError::TargetNotFinite { row, value: as_f64(value) });
     }
     let offset = targets.iter().map(|&t| as_f64(t)).sum::<f64>() / samples as f64;
-    let rows = order(records.column(0).iter().copied());
+    let (_, rows) = sort(records.column(0).iter().copied());
     let targets = rows.iter().map(|&row| as_f64(targets[row as usize]) - offset).collect();
-    let columns: Vec<Vec<F>> = records
+    let (columns, orders) = records
         .axis_iter(Axis(1))
         .into_par_iter()
-        .map(|column| rows.iter().map(|&row| column[row as usize]).collect())
-        .collect();
-    let orders = columns.par_iter().map(|column| order(column.iter().copied())).collect();
-    Ok(Table { columns, targets, offset, orders })
+        .map(|column| sort(rows.iter().map(|&row| column[row as usize])))
+        .unzip();
+    Ok(Table { columns, orders, targets, offset, rows })
 }
 
-/// Numbers of the values in increasing order; of equal values the lower number first.
-fn order<F: Float>(values: impl Iterator<Item = F>) -> Vec<u32> {
+/// The values in increasing order, and their numbers; of equal values the lower number first.
+fn sort<F: Float>(values: impl Iterator<Item = F>) -> (Vec<F>, Vec<u32>) {
     let mut numbered: Vec<(F, u32)> = values.zip(0..).collect();
     // Values are finite, so the comparison always answers.
     numbered.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
-    numbered.into_iter().map(|(_, number)| number).collect()
+    numbered.into_iter().unzip()
 }
 
 /// How often each sample is drawn for a tree: N draws with replacement, or all once.
@@ -191,7 +190,11 @@ fn draw(samples: usize, bootstrap: bool, stream: &mut Stream) -> Vec<u32> {
     times
 }
 
-fn out_of_bag<F: Float>(forest: &RegressionForest<F>, table: &Table<F>) -> OutOfBag {
+fn out_of_bag<F: Float>(
+    forest: &RegressionForest<F>,
+    records: ArrayView2<'_, F>,
+    table: &Table<F>,
+) -> OutOfBag {
     let samples = table.targets.len();
     let mut sums = vec![(0.0, 0u32); samples];
     let mut walk = Walk::new();
@@ -202,11 +205,8 @@ fn out_of_bag<F: Float>(forest: &RegressionForest<F>, table: &Table<F>) -> OutOf
         let batches = sums.par_chunks_mut(BATCH).zip(times.par_chunks(BATCH));
         batches.enumerate().for_each(|(batch, (sums, times))| {
             let unseen: Vec<usize> = (0..sums.len()).filter(|&at| times[at] == 0).collect();
-            let sample = |at: usize| batch * BATCH + at;
-            let rows: Vec<F> = unseen
-                .iter()
-                .flat_map(|&at| table.columns.iter().map(move |column| column[sample(at)]))
-                .collect();
+            let row = |&at: &usize| records.row(table.rows[batch * BATCH + at] as usize);
+            let rows: Vec<F> = unseen.iter().flat_map(|at| row(at).into_iter().copied()).collect();
             walk.leaves(&rows, forest.features, |row, leaf| {
                 let (sum, trees) = &mut sums[unseen[row]];
                 *sum += as_f64(walk.value(leaf)) - table.offset;

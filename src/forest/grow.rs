@@ -1,10 +1,12 @@
 //! Growing one tree over ranges of samples that stay sorted by every feature.
 
+use std::ops::Range;
+
 use linfa::Float;
 
 use super::criterion::{Sums, stops};
 use super::params::ForestValidParams;
-use super::splitter::{self, Drawn, Rules};
+use super::splitter::{self, Drawn, Room, Rules};
 use super::stream::Stream;
 use super::tree::Tree;
 
@@ -13,18 +15,20 @@ use super::tree::Tree;
 /// Samples are numbered by increasing value of the first feature, so that those of a node
 /// lie near each other in memory.
 pub struct Table<F> {
-    /// Feature values: `columns[feature][sample]`.
+    /// By feature: its values in increasing order.
     pub columns: Vec<Vec<F>>,
-    /// Targets, centred on their mean.
+    /// By feature: the samples of these values; of equal values the lower sample first.
+    pub orders: Vec<Vec<u32>>,
+    /// Targets by sample, centred on their mean.
     pub targets: Vec<f64>,
     /// Mean that was taken off the targets.
     pub offset: f64,
-    /// Samples by increasing value of each feature, ties by sample.
-    pub orders: Vec<Vec<u32>>,
+    /// By sample: its row in the records.
+    pub rows: Vec<u32>,
 }
 
-/// Distinct samples from which on a node's values are copied to a place of their own, where
-/// they stay in the second-level cache until its last leaf.
+/// Distinct samples up to which a node's samples are numbered anew, so that what is noted by
+/// sample lies in the first-level cache until the node's last leaf.
 const LOCAL: usize = 4096;
 
 /// A tree that grows.
@@ -39,14 +43,14 @@ struct Grower<'a, F> {
     tree: Tree<F>,
     /// What the splits on each feature gained.
     gains: Vec<f64>,
-    orders: Vec<Vec<Drawn>>,
+    orders: Vec<Vec<Drawn<F>>>,
     open: Vec<Open>,
     /// By sample: whether it goes left at the present split.
     goes_left: Vec<bool>,
-    right: Vec<Drawn>,
-    /// By sample: its number among those of a node that is copied.
+    right: Vec<Drawn<F>>,
+    /// By sample: its new number.
     numbers: Vec<u32>,
-    untried: Vec<usize>,
+    room: Room,
 }
 
 /// A node that waits to be split.
@@ -67,18 +71,20 @@ pub fn grow<F: Float>(
     params: &ForestValidParams<F>,
     stream: &mut Stream,
 ) -> (Tree<F>, Vec<f64>) {
-    let samples: Vec<Drawn> = (0u32..)
-        .zip(times.iter().zip(&table.targets))
-        .map(|(sample, (&times, &target))| Drawn { target, sample, times })
-        .collect();
     let count = times.iter().filter(|&&t| t > 0).count();
-    let orders: Vec<Vec<Drawn>> = table
-        .orders
+    // Side by side, so that each of the jumps through a feature's order meets both.
+    let drawn: Vec<(f64, u32)> = table.targets.iter().copied().zip(times.iter().copied()).collect();
+    let orders: Vec<Vec<Drawn<F>>> = table
+        .columns
         .iter()
-        .map(|order| {
-            let mut drawn = Vec::with_capacity(count);
-            drawn.extend(order.iter().map(|&s| samples[s as usize]).filter(|d| d.times > 0));
-            drawn
+        .zip(&table.orders)
+        .map(|(values, order)| {
+            let mut samples = Vec::with_capacity(count);
+            samples.extend(values.iter().zip(order).filter_map(|(&value, &sample)| {
+                let (target, times) = drawn[sample as usize];
+                (times > 0).then_some(Drawn { target, value, sample, times })
+            }));
+            samples
         })
         .collect();
     let mut grower = Grower {
@@ -90,14 +96,14 @@ pub fn grow<F: Float>(
         gains: vec![0.0; table.columns.len()],
         open: Vec::new(),
         goes_left: vec![false; times.len()],
-        right: vec![Drawn::default(); count],
+        right: orders[0].clone(),
         numbers: vec![0; times.len()],
-        untried: Vec::new(),
+        room: Room::default(),
         orders,
     };
     let sums = sums(&grower.orders[0]);
     let node = grower.push(&sums);
-    grower.split_all(&table.columns, Open { start: 0, end: count, depth: 0, node, sums });
+    grower.split_all(Open { start: 0, end: count, depth: 0, node, sums });
     (grower.tree, grower.gains)
 }
 
@@ -114,56 +120,42 @@ impl<F: Float> Grower<'_, F> {
             || stops(self.params.stop, &open.sums, self.offset)
     }
 
-    /// Splits a node and all that come of it, left before right. The samples in its range
-    /// are rows of `columns`.
-    fn split_all(&mut self, columns: &[Vec<F>], root: Open) {
+    /// Splits a node and all that come of it, left before right.
+    fn split_all(&mut self, root: Open) {
         if self.is_leaf(&root) {
             return;
         }
-        let waiting = self.open.len();
         self.open.push(root);
-        while self.open.len() > waiting
-            && let Some(open) = self.open.pop()
-        {
-            let count = open.end - open.start;
-            if count <= LOCAL && columns[0].len() > LOCAL {
-                let columns = self.gather(columns, &open);
-                self.split_all(&columns, open);
-            } else {
-                self.split(columns, open);
+        let mut renumbered = 0..0;
+        while let Some(open) = self.open.pop() {
+            if open.end - open.start <= LOCAL && open.start >= renumbered.end {
+                renumbered = open.start..open.end;
+                self.renumber(renumbered.clone());
             }
+            self.split(open);
         }
     }
 
-    /// Copies the values of a node's samples and numbers them anew, in the first feature's
-    /// order.
-    fn gather(&mut self, columns: &[Vec<F>], open: &Open) -> Vec<Vec<F>> {
-        let range = open.start..open.end;
-        for (new, drawn) in (0u32..).zip(&self.orders[0][range.clone()]) {
+    /// Numbers the samples of a range anew, in the first feature's order.
+    fn renumber(&mut self, range: Range<usize>) {
+        for (new, drawn) in (0..).zip(&self.orders[0][range.clone()]) {
             self.numbers[drawn.sample as usize] = new;
         }
-        let numbers = &self.numbers;
-        let gather = |(column, order): (&Vec<F>, &mut Vec<Drawn>)| {
-            let mut values = vec![F::zero(); range.len()];
+        for order in &mut self.orders {
             for drawn in &mut order[range.clone()] {
-                let value = column[drawn.sample as usize];
-                drawn.sample = numbers[drawn.sample as usize];
-                values[drawn.sample as usize] = value;
+                drawn.sample = self.numbers[drawn.sample as usize];
             }
-            values
-        };
-        columns.iter().zip(&mut self.orders).map(gather).collect()
+        }
     }
 
-    fn split(&mut self, columns: &[Vec<F>], Open { start, end, depth, node, sums: all }: Open) {
+    fn split(&mut self, Open { start, end, depth, node, sums: all }: Open) {
         let found = splitter::best(
-            columns,
             &self.orders,
             (start, end),
             &all,
             &self.rules,
             self.stream,
-            &mut self.untried,
+            &mut self.room,
         );
         let Some(split) = found else { return };
         self.gains[split.feature] += split.gain;
@@ -215,7 +207,7 @@ impl<F: Float> Grower<'_, F> {
     }
 }
 
-fn sums(drawn: &[Drawn]) -> Sums {
+fn sums<F>(drawn: &[Drawn<F>]) -> Sums {
     let mut sums = Sums::default();
     for drawn in drawn {
         sums.add(drawn.weight(), drawn.target);

@@ -8,17 +8,19 @@ use super::stream::Stream;
 
 /// A drawn sample in a feature's order. What a scan reads stands side by side, so that it
 /// goes through memory in one direction.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Drawn {
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn<F> {
     /// Centred on the training mean.
     pub target: f64,
-    /// Row of the columns that belong to this order.
+    /// The feature's value.
+    pub value: F,
     pub sample: u32,
     /// How often it was drawn.
     pub times: u32,
 }
 
-impl Drawn {
+impl<F> Drawn<F> {
+    #[inline]
     pub fn weight(&self) -> f64 {
         f64::from(self.times)
     }
@@ -53,7 +55,8 @@ impl Rules {
     }
 
     fn large_enough(&self, node: &Sums, left_weight: f64) -> bool {
-        left_weight >= self.min_samples_leaf && node.weight - left_weight >= self.min_samples_leaf
+        let right_weight = node.weight - left_weight;
+        (left_weight >= self.min_samples_leaf) & (right_weight >= self.min_samples_leaf)
     }
 }
 
@@ -69,32 +72,34 @@ impl<F: Float> Split<F> {
     }
 }
 
+/// Room that searches share.
+#[derive(Default)]
+pub struct Room {
+    untried: Vec<usize>,
+    gains: Vec<f64>,
+}
+
 /// The best split of the node that owns the range `start..end` of every feature's order, or
-/// `None` if no split gains. `untried` is room for the features' numbers.
+/// `None` if no split gains.
 pub fn best<F: Float>(
-    columns: &[Vec<F>],
-    orders: &[Vec<Drawn>],
+    orders: &[Vec<Drawn<F>>],
     (start, end): (usize, usize),
     node: &Sums,
     rules: &Rules,
     stream: &mut Stream,
-    untried: &mut Vec<usize>,
+    Room { untried, gains }: &mut Room,
 ) -> Option<Split<F>> {
-    let features = columns.len();
+    let features = orders.len();
     let mut best: Option<Split<F>> = None;
     let mut consider = |feature: usize, stream: &mut Stream| {
-        let column = &columns[feature];
         let order = &orders[feature][start..end];
-        let value = |at: usize| column[order[at].sample as usize];
-        let (low, high) = (value(0), value(order.len() - 1));
+        let (low, high) = (order[0].value, order[order.len() - 1].value);
         if low >= high {
             return false; // constant in this node
         }
         let found = match rules.thresholds {
-            Thresholds::Midpoint => midpoints(column, feature, order, node, rules),
-            Thresholds::Random => {
-                at(column, feature, order, draw(low, high, stream), node, rules)
-            }
+            Thresholds::Midpoint => midpoints(feature, order, node, rules, gains),
+            Thresholds::Random => at(feature, order, draw(low, high, stream), node, rules),
         };
         if let Some(split) = found
             && split.beats(&best, rules.ties, node.rounding())
@@ -123,49 +128,47 @@ pub fn best<F: Float>(
     best
 }
 
-/// The best of all midpoints between consecutive distinct values that gain.
+/// The best of all midpoints between consecutive distinct values, if it gains.
+///
+/// Gains are noted first and searched then: a running best would branch on every gain, and
+/// in the small nodes that are most of a tree half of the branches go astray.
 fn midpoints<F: Float>(
-    column: &[F],
     feature: usize,
-    order: &[Drawn],
+    order: &[Drawn<F>],
     node: &Sums,
     rules: &Rules,
+    gains: &mut Vec<f64>,
 ) -> Option<Split<F>> {
     let (mut left_weight, mut left_target) = (0.0, 0.0);
-    let mut best = None;
-    // Times the node's weight: what the next gain must exceed.
-    let mut bar = node.rounding() * node.weight;
-    for (at, pair) in order.windows(2).enumerate() {
+    let mut most = 0.0;
+    gains.clear();
+    gains.extend(order.windows(2).map(|pair| {
         let weight = pair[0].weight();
         left_weight += weight;
         left_target += weight * pair[0].target;
-        let (square, product) = node.gain_as_ratio(left_weight, left_target);
-        // The values are read only for the few places that gain more than those before.
-        if square <= bar * product {
-            continue;
-        }
-        let (low, high) = (column[pair[0].sample as usize], column[pair[1].sample as usize]);
-        if low < high && rules.large_enough(node, left_weight) {
-            let gain = node.gain(left_weight, left_target);
-            bar = (gain + node.rounding()) * node.weight;
-            best = Some((at + 1, low, high, gain));
-        }
+        let allowed = (pair[0].value < pair[1].value) & rules.large_enough(node, left_weight);
+        let gain = if allowed { node.gain(left_weight, left_target) } else { 0.0 };
+        most = if gain > most { gain } else { most };
+        gain
+    }));
+    if most <= node.rounding() {
+        return None;
     }
-    let split = |(left, low, high, gain)| Split { feature, threshold: between(low, high), left, gain };
-    best.map(split)
+    let at = gains.iter().position(|&gain| gain >= most - node.rounding())?;
+    let threshold = between(order[at].value, order[at + 1].value);
+    Some(Split { feature, threshold, left: at + 1, gain: most })
 }
 
 /// The split at a given threshold, if it gains and both sides are large enough.
 fn at<F: Float>(
-    column: &[F],
     feature: usize,
-    order: &[Drawn],
+    order: &[Drawn<F>],
     threshold: F,
     node: &Sums,
     rules: &Rules,
 ) -> Option<Split<F>> {
     let (mut left, mut left_weight, mut left_target) = (0, 0.0, 0.0);
-    for drawn in order.iter().take_while(|d| column[d.sample as usize] < threshold) {
+    for drawn in order.iter().take_while(|d| d.value < threshold) {
         left += 1;
         left_weight += drawn.weight();
         left_target += drawn.weight() * drawn.target;
