@@ -66,9 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:<10} {:>12} {:>8} {:>8} {:>14} {:>8} {:>8} {:>10}",
         "50 trees", "fit", "CPU", "wall", "predict", "CPU", "wall", "rmse"
     );
-    let random = |rows, features, held_out| {
-        (smooth(rows, features, 0), smooth(held_out, features, 1))
-    };
+    let random =
+        |rows, features, held_out| (smooth(rows, features, 0), smooth(held_out, features, 1));
     // Name, tables to fit and to predict, ties, repeats; whether it runs unless named.
     type Make<'a> = &'a dyn Fn() -> (Table, Table);
     let rows: [(&str, Make, Ties, u32, bool); 6] = [

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::grow::{Table, grow};
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams};
+use super::quantiles::Members;
 use super::stream::Stream;
 use super::tree::{Tree, TreeError};
 use super::walk::{BATCH, Walk};
@@ -25,6 +26,8 @@ pub struct RegressionForest<F> {
     /// Empty in files of programs that did not know it.
     #[serde(default)]
     importance: Vec<f64>,
+    #[serde(default = "Option::default", skip_serializing_if = "Option::is_none")]
+    pub(super) members: Option<Members<F>>,
 }
 
 /// Error on the samples that the trees did not see.
@@ -60,7 +63,7 @@ impl<F: Float> RegressionForest<F> {
     /// mean over the trees of each tree's shares, as scikit-learn's `feature_importances_`
     /// (Breiman's mean decrease in impurity). `None` for a forest read from a file without it.
     pub fn feature_importance(&self) -> Option<ArrayView1<'_, f64>> {
-        (self.importance.len() == self.features).then(|| ArrayView1::from(&self.importance))
+        (!self.importance.is_empty()).then(|| ArrayView1::from(&self.importance))
     }
 
     /// Checks a forest that was read from a file.
@@ -71,7 +74,11 @@ impl<F: Float> RegressionForest<F> {
         if self.trees.is_empty() || self.features == 0 {
             return Err(TreeError::Lengths);
         }
-        self.trees.iter().try_for_each(|tree| tree.check(self.features))
+        self.trees.iter().try_for_each(|tree| tree.check(self.features))?;
+        if !self.importance.is_empty() && self.importance.len() != self.features {
+            return Err(TreeError::Importance);
+        }
+        self.members.as_ref().map_or(Ok(()), |members| members.check(&self.trees))
     }
 
     /// Mean over the trees for one record of [`features`](Self::features) values.
@@ -120,9 +127,14 @@ where
             trees,
             out_of_bag: None,
             importance: importance(&gains),
+            members: None,
         };
         if self.out_of_bag {
             forest.out_of_bag = Some(out_of_bag(&forest, dataset.records().view(), &table));
+        }
+        if self.quantiles {
+            let targets = targets.iter().copied();
+            forest.members = Some(members(&forest, dataset.records().view(), targets, &table));
         }
         Ok(forest)
     }
@@ -190,6 +202,11 @@ fn draw(samples: usize, bootstrap: bool, stream: &mut Stream) -> Vec<u32> {
     times
 }
 
+/// The draws of a tree of a fitted forest: its stream draws the samples first.
+fn drawn_again<F>(params: &ForestValidParams<F>, tree: usize, samples: usize) -> Vec<u32> {
+    draw(samples, params.bootstrap, &mut Stream::new(params.seed, tree as u64))
+}
+
 fn out_of_bag<F: Float>(
     forest: &RegressionForest<F>,
     records: ArrayView2<'_, F>,
@@ -199,8 +216,7 @@ fn out_of_bag<F: Float>(
     let mut sums = vec![(0.0, 0u32); samples];
     let mut walk = Walk::new();
     for (index, tree) in forest.trees.iter().enumerate() {
-        // The tree's stream draws its samples first, so they can be drawn again.
-        let times = draw(samples, true, &mut Stream::new(forest.params.seed, index as u64));
+        let times = drawn_again(&forest.params, index, samples);
         walk.take(tree);
         let batches = sums.par_chunks_mut(BATCH).zip(times.par_chunks(BATCH));
         batches.enumerate().for_each(|(batch, (sums, times))| {
@@ -224,6 +240,30 @@ fn out_of_bag<F: Float>(
     let count = f64::from(samples.max(1));
     let r2 = (spread > 0.0).then(|| 1.0 - error / spread);
     OutOfBag { rmse: (error / count).sqrt(), r2, samples: samples as usize }
+}
+
+/// The samples of every leaf: the training records walk each tree again.
+fn members<F: Float>(
+    forest: &RegressionForest<F>,
+    records: ArrayView2<'_, F>,
+    targets: impl Iterator<Item = F>,
+    table: &Table<F>,
+) -> Members<F> {
+    let (targets, by_target) = sort(targets);
+    let mut members = Members::new(targets);
+    let rows: Vec<F> = by_target.iter().flat_map(|&r| records.row(r as usize).to_vec()).collect();
+    let mut samples = vec![0; by_target.len()];
+    (0..).zip(&table.rows).for_each(|(sample, &row)| samples[row as usize] = sample);
+    let mut leaves = vec![0; by_target.len()];
+    let mut walk = Walk::new();
+    for (index, tree) in forest.trees.iter().enumerate() {
+        let times = drawn_again(&forest.params, index, by_target.len());
+        walk.take(tree);
+        walk.visit(&rows, forest.features, &mut leaves, |of_row, leaf| *of_row = leaf);
+        let times = by_target.iter().map(|&row| times[samples[row as usize] as usize]);
+        members.push(tree.nodes(), leaves.iter().copied().zip(times));
+    }
+    members
 }
 
 /// Mean over the trees that have a split of each feature's share in its gains.
@@ -274,11 +314,8 @@ where
         let mut rows: Vec<F> = x.iter().copied().collect();
         let order = (nodes > NODES_IN_CACHE).then(|| {
             walk.take(&self.trees[0]);
-            let mut leaves = vec![(0, 0); x.nrows()];
-            let batches = leaves.par_chunks_mut(BATCH).zip(rows.par_chunks(BATCH * self.features));
-            batches.enumerate().for_each(|(batch, (leaves, rows))| {
-                walk.leaves(rows, self.features, |at, leaf| leaves[at] = (leaf, batch * BATCH + at));
-            });
+            let mut leaves: Vec<(usize, usize)> = (0..x.nrows()).map(|row| (0, row)).collect();
+            walk.visit(&rows, self.features, &mut leaves, |(of_row, _), leaf| *of_row = leaf);
             leaves.par_sort_unstable();
             leaves
         });
@@ -289,10 +326,7 @@ where
         let mut sums = vec![F::zero(); x.nrows()];
         for tree in &self.trees {
             walk.take(tree);
-            let batches = sums.par_chunks_mut(BATCH).zip(rows.par_chunks(BATCH * self.features));
-            batches.for_each(|(sums, rows)| {
-                walk.leaves(rows, self.features, |row, leaf| sums[row] += walk.value(leaf));
-            });
+            walk.visit(&rows, self.features, &mut sums, |sum, leaf| *sum += walk.value(leaf));
         }
         let means = sums.into_iter().map(|sum| sum / trees);
         match order {

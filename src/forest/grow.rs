@@ -190,7 +190,8 @@ impl<F: Float> Grower<'_, F> {
         for drawn in &self.orders[feature][middle..end] {
             goes_left[drawn.sample as usize] = false;
         }
-        for (_, order) in self.orders.iter_mut().enumerate().filter(|(other, _)| *other != feature) {
+        for (_, order) in self.orders.iter_mut().enumerate().filter(|(other, _)| *other != feature)
+        {
             let range = &mut order[start..end];
             let (mut left, mut right) = (0, 0);
             for at in 0..range.len() {

@@ -22,13 +22,16 @@ mod criterion;
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
 mod grow;
+mod onnx;
 mod params;
+mod quantiles;
 mod splitter;
 mod stream;
 mod tree;
 mod walk;
 
 pub use forest::{OutOfBag, RegressionForest};
+pub use onnx::{OnnxDescription, OnnxError};
 pub use params::{
     FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds, Ties,
 };

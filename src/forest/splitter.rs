@@ -141,16 +141,16 @@ fn midpoints<F: Float>(
 ) -> Option<Split<F>> {
     let (mut left_weight, mut left_target) = (0.0, 0.0);
     let mut most = 0.0;
-    gains.clear();
-    gains.extend(order.windows(2).map(|pair| {
+    gains.resize(order.len() - 1, 0.0);
+    for (pair, gain) in order.windows(2).zip(gains.iter_mut()) {
         let weight = pair[0].weight();
         left_weight += weight;
         left_target += weight * pair[0].target;
         let allowed = (pair[0].value < pair[1].value) & rules.large_enough(node, left_weight);
-        let gain = if allowed { node.gain(left_weight, left_target) } else { 0.0 };
-        most = if gain > most { gain } else { most };
-        gain
-    }));
+        let found = node.gain(left_weight, left_target);
+        *gain = if allowed { found } else { 0.0 };
+        most = if *gain > most { *gain } else { most };
+    }
     if most <= node.rounding() {
         return None;
     }

@@ -17,7 +17,7 @@ pub struct Tree<F> {
     /// Left if the feature's value is below; 0 for a leaf.
     pub(super) threshold: Vec<F>,
     pub(super) left: Vec<u32>,
-    right: Vec<u32>,
+    pub(super) right: Vec<u32>,
     /// Mean target of the node's training samples.
     pub(super) value: Vec<F>,
 }
@@ -33,6 +33,10 @@ pub enum TreeError {
     Child { node: usize },
     #[error("node {node} holds a value that is not finite")]
     NotFinite { node: usize },
+    #[error("the samples of the leaves do not fit the trees")]
+    Members,
+    #[error("the shares of the features do not fit their number")]
+    Importance,
 }
 
 impl<F: Float> Tree<F> {
@@ -65,22 +69,27 @@ impl<F: Float> Tree<F> {
         self.right[node] = left as u32 + 1;
     }
 
-    /// The mean of the leaf that `record` falls into. NaN is never below a threshold and
-    /// goes right.
+    /// The mean of the leaf that `record` falls into.
     pub fn predict(&self, record: &ArrayView1<'_, F>) -> F {
+        self.value[self.leaf(record)]
+    }
+
+    /// The leaf that `record` falls into. NaN is never below a threshold and goes right.
+    pub(super) fn leaf(&self, record: &ArrayView1<'_, F>) -> usize {
         let mut node = 0;
-        loop {
-            let feature = self.feature[node];
-            if feature == LEAF {
-                return self.value[node];
-            }
-            let next = if record[feature as usize] < self.threshold[node] {
+        while !self.is_leaf(node) {
+            let next = if record[self.feature[node] as usize] < self.threshold[node] {
                 self.left[node]
             } else {
                 self.right[node]
             };
             node = next as usize;
         }
+        node
+    }
+
+    pub(super) fn is_leaf(&self, node: usize) -> bool {
+        self.feature[node] == LEAF
     }
 
     pub fn nodes(&self) -> usize {

@@ -44,7 +44,26 @@ impl<F: Float> Walk<F> {
                 left: tree.left[node],
             },
         };
-        (0..tree.nodes()).into_par_iter().with_min_len(BATCH).map(pack).collect_into_vec(&mut self.0);
+        (0..tree.nodes())
+            .into_par_iter()
+            .with_min_len(BATCH)
+            .map(pack)
+            .collect_into_vec(&mut self.0);
+    }
+
+    /// Calls `found` with the leaf of each of `rows` (row after row, `features` values each)
+    /// and the row's own `out`, on all threads.
+    pub fn visit<T: Send>(
+        &self,
+        rows: &[F],
+        features: usize,
+        out: &mut [T],
+        found: impl Fn(&mut T, usize) + Sync,
+    ) {
+        let batches = out.par_chunks_mut(BATCH).zip(rows.par_chunks(BATCH * features));
+        batches.for_each(|(out, rows)| {
+            self.leaves(rows, features, |row, leaf| found(&mut out[row], leaf));
+        });
     }
 
     /// Calls `found` with number and leaf of each of `rows` (row after row, `features`
