@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::grow::{Table, grow};
-use super::params::{FeaturesPerSplit, ForestError, ForestValidParams};
+use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
 use super::quantiles::Members;
 use super::stream::Stream;
 use super::tree::{Tree, TreeError};
-use super::walk::{BATCH, Walk};
+use super::walk::{BATCH, Walk, groups};
 
 /// A fitted regression forest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -159,7 +159,7 @@ fn table<F: Float>(
     if features == 0 {
         return Err(ForestError::NoFeatures);
     }
-    if samples > u32::MAX as usize {
+    if samples > MOST_SAMPLES {
         return Err(ForestError::TooManySamples { samples });
     }
     let finite = |v: &F| v.is_finite();
@@ -215,19 +215,36 @@ fn out_of_bag<F: Float>(
     let samples = table.targets.len();
     let mut sums = vec![(0.0, 0u32); samples];
     let mut walk = Walk::new();
-    for (index, tree) in forest.trees.iter().enumerate() {
-        let times = drawn_again(&forest.params, index, samples);
-        walk.take(tree);
-        let batches = sums.par_chunks_mut(BATCH).zip(times.par_chunks(BATCH));
-        batches.enumerate().for_each(|(batch, (sums, times))| {
-            let unseen: Vec<usize> = (0..sums.len()).filter(|&at| times[at] == 0).collect();
-            let row = |&at: &usize| records.row(table.rows[batch * BATCH + at] as usize);
-            let rows: Vec<F> = unseen.iter().flat_map(|at| row(at).into_iter().copied()).collect();
-            walk.leaves(&rows, forest.features, |row, leaf| {
-                let (sum, trees) = &mut sums[unseen[row]];
-                *sum += as_f64(walk.value(leaf)) - table.offset;
-                *trees += 1;
-            });
+    let mut streams = 0..;
+    for trees in groups(&forest.trees) {
+        let times: Vec<Vec<u32>> = trees
+            .iter()
+            .zip(&mut streams)
+            .map(|(_, tree)| drawn_again(&forest.params, tree, samples))
+            .collect();
+        walk.take(trees);
+        sums.par_chunks_mut(BATCH).enumerate().for_each(|(batch, sums)| {
+            let rows = &table.rows[batch * BATCH..][..sums.len()];
+            let records: Vec<F> = rows
+                .iter()
+                .flat_map(|&row| records.row(row as usize).into_iter())
+                .copied()
+                .collect();
+            let (mut unseen, mut walking) = (Vec::new(), Vec::new());
+            for (tree, times) in times.iter().enumerate() {
+                let times = &times[batch * BATCH..];
+                unseen.clear();
+                unseen.extend((0..sums.len()).filter(|&at| times[at] == 0));
+                walking.clear();
+                for at in &unseen {
+                    walking.extend_from_slice(&records[at * forest.features..][..forest.features]);
+                }
+                walk.leaves(tree, &walking, forest.features, |row, leaf| {
+                    let (sum, trees) = &mut sums[unseen[row]];
+                    *sum += as_f64(walk.value(leaf)) - table.offset;
+                    *trees += 1;
+                });
+            }
         });
     }
     let (mut error, mut spread, mut samples) = (0.0, 0.0, 0);
@@ -258,7 +275,7 @@ fn members<F: Float>(
     let mut walk = Walk::new();
     for (index, tree) in forest.trees.iter().enumerate() {
         let times = drawn_again(&forest.params, index, by_target.len());
-        walk.take(tree);
+        walk.take(std::slice::from_ref(tree));
         walk.visit(&rows, forest.features, &mut leaves, |of_row, leaf| *of_row = leaf);
         let times = by_target.iter().map(|&row| times[samples[row as usize] as usize]);
         members.push(tree.nodes(), leaves.iter().copied().zip(times));
@@ -313,7 +330,7 @@ where
         let mut walk = Walk::new();
         let mut rows: Vec<F> = x.iter().copied().collect();
         let order = (nodes > NODES_IN_CACHE).then(|| {
-            walk.take(&self.trees[0]);
+            walk.take(&self.trees[..1]);
             let mut leaves: Vec<(usize, usize)> = (0..x.nrows()).map(|row| (0, row)).collect();
             walk.visit(&rows, self.features, &mut leaves, |(of_row, _), leaf| *of_row = leaf);
             leaves.par_sort_unstable();
@@ -324,8 +341,8 @@ where
             rows = order.iter().flat_map(row).copied().collect();
         }
         let mut sums = vec![F::zero(); x.nrows()];
-        for tree in &self.trees {
-            walk.take(tree);
+        for trees in groups(&self.trees) {
+            walk.take(trees);
             walk.visit(&rows, self.features, &mut sums, |sum, leaf| *sum += walk.value(leaf));
         }
         let means = sums.into_iter().map(|sum| sum / trees);

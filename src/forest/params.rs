@@ -3,6 +3,9 @@
 use linfa::{Float, ParamGuard};
 use serde::{Deserialize, Serialize};
 
+/// Samples of which the nodes of a tree, twice as many, can still be numbered in 31 bits.
+pub(super) const MOST_SAMPLES: usize = 1 << 30;
+
 /// How thresholds are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -66,7 +69,7 @@ pub enum ForestError {
     NoSamples,
     #[error("there are no features to split on")]
     NoFeatures,
-    #[error("{samples} samples are more than a forest can index ({most})", most = u32::MAX)]
+    #[error("{samples} samples are more than a forest can index ({most})", most = MOST_SAMPLES)]
     TooManySamples { samples: usize },
     #[error("{records} records but {targets} targets")]
     Lengths { records: usize, targets: usize },

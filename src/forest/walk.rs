@@ -1,4 +1,4 @@
-//! Many rows through one tree: its nodes packed, several rows in step.
+//! Many rows through the trees: nodes packed, several rows in step.
 
 use linfa::Float;
 use rayon::prelude::*;
@@ -25,34 +25,58 @@ struct Node<F> {
 /// Marks a leaf in [`Node::left`].
 const STAYS: u32 = 1 << 31;
 
-/// A tree packed for walking. It is packed when it is needed: a packed forest beside the
-/// other would take more than half as much memory again.
-pub struct Walk<F>(Vec<Node<F>>);
+/// Trees packed for walking: as many as a second-level cache likes, or one. A packed forest
+/// beside the other would take more than half as much memory again.
+pub struct Walk<F> {
+    nodes: Vec<Node<F>>,
+    roots: Vec<usize>,
+}
+
+/// Nodes up to which trees are packed together, so that small ones do not each wait for all
+/// threads.
+const TOGETHER: usize = 1 << 16;
+
+/// The trees in groups to be packed together.
+pub fn groups<F: Float>(trees: &[Tree<F>]) -> impl Iterator<Item = &[Tree<F>]> {
+    let mut nodes = 0;
+    trees.chunk_by(move |tree, next| {
+        nodes += tree.nodes();
+        let fits = nodes + next.nodes() <= TOGETHER;
+        nodes = if fits { nodes } else { 0 };
+        fits
+    })
+}
 
 impl<F: Float> Walk<F> {
     pub fn new() -> Self {
-        Self(Vec::new())
+        Self { nodes: Vec::new(), roots: Vec::new() }
     }
 
-    /// Packs a tree in place of the one before.
-    pub fn take(&mut self, tree: &Tree<F>) {
-        let pack = |node: usize| match tree.feature[node] {
-            LEAF => Node { threshold: tree.value[node], feature: 0, left: node as u32 | STAYS },
-            feature => Node {
-                threshold: tree.threshold[node],
-                feature: feature as u32,
-                left: tree.left[node],
-            },
-        };
-        (0..tree.nodes())
-            .into_par_iter()
-            .with_min_len(BATCH)
-            .map(pack)
-            .collect_into_vec(&mut self.0);
+    /// Packs trees in place of those before.
+    pub fn take(&mut self, trees: &[Tree<F>]) {
+        self.nodes.clear();
+        self.roots.clear();
+        for tree in trees {
+            let root = self.nodes.len();
+            let pack = |node: usize| match tree.feature[node] {
+                LEAF => {
+                    let left = (root + node) as u32 | STAYS;
+                    Node { threshold: tree.value[node], feature: 0, left }
+                }
+                feature => Node {
+                    threshold: tree.threshold[node],
+                    feature: feature as u32,
+                    left: root as u32 + tree.left[node],
+                },
+            };
+            let nodes = (0..tree.nodes()).into_par_iter().with_min_len(TOGETHER);
+            self.nodes.par_extend(nodes.map(pack));
+            self.roots.push(root);
+        }
     }
 
     /// Calls `found` with the leaf of each of `rows` (row after row, `features` values each)
-    /// and the row's own `out`, on all threads.
+    /// in each tree in turn and the row's own `out`, on all threads.
     pub fn visit<T: Send>(
         &self,
         rows: &[F],
@@ -62,36 +86,50 @@ impl<F: Float> Walk<F> {
     ) {
         let batches = out.par_chunks_mut(BATCH).zip(rows.par_chunks(BATCH * features));
         batches.for_each(|(out, rows)| {
-            self.leaves(rows, features, |row, leaf| found(&mut out[row], leaf));
+            for tree in 0..self.roots.len() {
+                self.leaves(tree, rows, features, |row, leaf| found(&mut out[row], leaf));
+            }
         });
     }
 
-    /// Calls `found` with number and leaf of each of `rows` (row after row, `features`
-    /// values each). NaN is never below a threshold and goes right.
-    pub fn leaves(&self, rows: &[F], features: usize, mut found: impl FnMut(usize, usize)) {
+    /// Calls `found` with number and leaf of each of `rows` in a tree of those taken. NaN is
+    /// never below a threshold and goes right.
+    pub fn leaves(
+        &self,
+        tree: usize,
+        rows: &[F],
+        features: usize,
+        mut found: impl FnMut(usize, usize),
+    ) {
+        let root = self.roots[tree];
         let lanes = rows.chunks_exact(LANES * features);
         let rest = lanes.remainder().chunks_exact(features);
         let whole = lanes.len() * LANES;
         for (lane, rows) in lanes.enumerate() {
-            for (at, leaf) in self.in_step::<LANES>(rows, features).into_iter().enumerate() {
+            for (at, leaf) in self.in_step([root; LANES], rows, features).into_iter().enumerate() {
                 found(lane * LANES + at, leaf);
             }
         }
         for (at, row) in rest.enumerate() {
-            found(whole + at, self.in_step::<1>(row, features)[0]);
+            found(whole + at, self.in_step([root], row, features)[0]);
         }
     }
 
+    /// What a leaf predicts.
     pub fn value(&self, leaf: usize) -> F {
-        self.0[leaf].threshold
+        self.nodes[leaf].threshold
     }
 
-    fn in_step<const ROWS: usize>(&self, rows: &[F], features: usize) -> [usize; ROWS] {
-        let mut at = [0usize; ROWS];
+    fn in_step<const ROWS: usize>(
+        &self,
+        mut at: [usize; ROWS],
+        rows: &[F],
+        features: usize,
+    ) -> [usize; ROWS] {
         loop {
             let mut moved = 0;
             for (row, at) in at.iter_mut().enumerate() {
-                let Node { threshold, feature, left } = self.0[*at];
+                let Node { threshold, feature, left } = self.nodes[*at];
                 let below = rows[row * features + feature as usize] < threshold;
                 let goes = 1 - (left >> 31);
                 moved |= goes;
