@@ -14,7 +14,7 @@ use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPL
 use super::quantiles::Members;
 use super::stream::Stream;
 use super::tree::{Tree, TreeError};
-use super::walk::{BATCH, Walk, groups};
+use super::walk::{BATCH, Rows, Walk, groups};
 
 /// A fitted regression forest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -239,7 +239,7 @@ fn out_of_bag<F: Float>(
                 for at in &unseen {
                     walking.extend_from_slice(&records[at * forest.features..][..forest.features]);
                 }
-                walk.leaves(tree, &walking, forest.features, |row, leaf| {
+                walk.leaves(tree, &Rows::new(&walking, forest.features), |row, leaf| {
                     let (sum, trees) = &mut sums[unseen[row]];
                     *sum += as_f64(walk.value(leaf)) - table.offset;
                     *trees += 1;
@@ -302,10 +302,10 @@ fn importance(gains: &[Vec<f64>]) -> Vec<f64> {
 /// Nodes that are packed in the time that a row walks.
 const NODES_PACKED_AS_ROW_WALKS: usize = 16;
 
-/// Nodes of a packed tree that a first-level cache holds. In larger ones, rows walk in the
-/// order of the first tree's leaves: neighbours take nearly the same ways in all trees, so
-/// that their nodes are in the cache.
-const NODES_IN_CACHE: usize = 2048;
+/// Trees from which on rows walk in the order of the first tree's leaves, which costs about
+/// as much as four trees: neighbours take nearly the same ways in all trees, so that those in
+/// step arrive together and their nodes are in the cache.
+const TREES_WORTH_ORDERING: usize = 8;
 
 impl<F, D> PredictInplace<ArrayBase<D, Ix2>, Array1<F>> for RegressionForest<F>
 where
@@ -329,7 +329,7 @@ where
         }
         let mut walk = Walk::new();
         let mut rows: Vec<F> = x.iter().copied().collect();
-        let order = (nodes > NODES_IN_CACHE).then(|| {
+        let order = (self.trees.len() >= TREES_WORTH_ORDERING).then(|| {
             walk.take(&self.trees[..1]);
             let mut leaves: Vec<(usize, usize)> = (0..x.nrows()).map(|row| (0, row)).collect();
             walk.visit(&rows, self.features, &mut leaves, |(of_row, _), leaf| *of_row = leaf);
