@@ -27,7 +27,7 @@ pub struct RegressionForest<F> {
     #[serde(default)]
     importance: Vec<f64>,
     #[serde(default = "Option::default", skip_serializing_if = "Option::is_none")]
-    pub(super) members: Option<Members<F>>,
+    pub(super) members: Option<Box<Members<F>>>,
 }
 
 /// Error on the samples that the trees did not see.
@@ -134,7 +134,8 @@ where
         }
         if self.quantiles {
             let targets = targets.iter().copied();
-            forest.members = Some(members(&forest, dataset.records().view(), targets, &table));
+            forest.members =
+                Some(Box::new(members(&forest, dataset.records().view(), targets, &table)));
         }
         Ok(forest)
     }
