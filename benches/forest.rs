@@ -16,13 +16,13 @@ fn main() {
 
 #[divan::bench(args = [1_600, 10_000, 100_000], sample_count = 5)]
 fn fit(bencher: Bencher, rows: usize) {
-    let data = smooth(rows);
+    let data = smooth(rows, 2, 0);
     bencher.bench(|| ForestParams::new(50).fit(black_box(&data)));
 }
 
 #[divan::bench(args = [1_600, 100_000], sample_count = 5)]
 fn predict(bencher: Bencher, rows: usize) {
-    let data = smooth(rows);
+    let data = smooth(rows, 2, 0);
     let forest = ForestParams::new(50).fit(&data).expect("the table is fit for a forest");
     bencher.bench(|| -> Array1<f64> { forest.predict(black_box(data.records())) });
 }

@@ -1,4 +1,5 @@
-//! Outside judges: h5py reads our HDF5, scikit-learn's forest is as accurate as ours.
+//! Outside judges: h5py reads our HDF5, ONNX Runtime our forests, scikit-learn's forest is as
+//! accurate as ours.
 //!
 //! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, as
 //! tests/run sets it.
@@ -12,6 +13,7 @@ use common::{build_fixture, crumple_ok, fixture, python, root};
 use crumple::database::Database;
 use crumple::dataset::{TableKind, TrainingSet};
 use crumple::forest::{ForestParams, Ties};
+use crumple::surrogate::{Fitted, Model};
 use linfa::Dataset;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2, Axis};
@@ -149,6 +151,15 @@ fn our_rmse(records: &Array2<f64>, targets: &Array1<f64>, ties: Ties) -> f64 {
     (0..SEEDS).map(rmse).sum::<f64>() / SEEDS as f64
 }
 
+/// Each feature's share in what the splits gain: mean over the seeds, fitted to all rows.
+fn our_importance(records: &Array2<f64>, targets: &Array1<f64>) -> Array1<f64> {
+    let data = Dataset::new(records.clone(), targets.clone());
+    let fit = |seed| ForestParams::new(50).seed(seed).ties(Ties::Random).fit(&data).unwrap();
+    let zero = Array1::zeros(records.ncols());
+    let sum = (0..SEEDS).fold(zero, |sum, seed| sum + fit(seed).feature_importance().unwrap());
+    sum / SEEDS as f64
+}
+
 /// Same settings on both sides, which includes random ties: scikit-learn has no others.
 fn agrees_with_scikit_learn(name: &str, records: &Array2<f64>, targets: &Array1<f64>) {
     let folder = tempfile::tempdir().unwrap();
@@ -156,6 +167,12 @@ fn agrees_with_scikit_learn(name: &str, records: &Array2<f64>, targets: &Array1<
     write_csv(&path, records, targets);
     let arguments = [path.to_str().unwrap(), &SEEDS.to_string(), &SPLITS.to_string()];
     let Some(theirs) = run_python("forest.py", &arguments) else { return };
+    for (ours, theirs) in
+        our_importance(records, targets).iter().zip(theirs["importance"].as_array().unwrap())
+    {
+        let theirs = theirs.as_f64().unwrap();
+        assert!((ours - theirs).abs() < 0.005, "{name}: importance {ours} against {theirs}");
+    }
     let theirs = theirs["rmse"].as_f64().unwrap();
     let ratio = our_rmse(records, targets, Ties::Random) / theirs;
     let lowest = our_rmse(records, targets, Ties::LowestFeature) / theirs;
@@ -188,4 +205,58 @@ fn forest_is_as_accurate_as_scikit_learn_on_a_smooth_function() {
     });
     let targets = records.map_axis(Axis(1), |r| (6.0 * r[0]).sin() + r[1] * r[1] * r[0]);
     agrees_with_scikit_learn("smooth function", &records, &targets);
+}
+
+/// Records that fall on thresholds or just below them, and others between, as raw doubles.
+fn records_at_thresholds(model: &Value) -> Array2<f64> {
+    let trees = model["fitted"]["forest"]["forest"]["trees"].as_array().unwrap();
+    let column = |tree: &Value, name: &str| -> Vec<f64> {
+        tree[name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+    };
+    let mut records = Vec::new();
+    for tree in trees.iter().take(5) {
+        let nodes = column(tree, "feature").into_iter().zip(column(tree, "threshold"));
+        for (node, (feature, threshold)) in nodes.filter(|(feature, _)| *feature >= 0.0).enumerate()
+        {
+            let other = |range: f64| (0.5 + 0.754_877_666 * node as f64).fract() * range;
+            for value in [threshold, threshold.next_down()] {
+                records.extend(match feature {
+                    0.0 => [value, other(0.8)],
+                    _ => [other(25.0), value],
+                });
+            }
+        }
+    }
+    Array2::from_shape_vec((records.len() / 2, 2), records).unwrap()
+}
+
+/// A float has 24 bits: the rounded output is off by half of the last.
+#[test]
+fn onnx_runtime_predicts_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    for choice in ["--paper", "--model=forest"] {
+        crumple_ok(here, &["train", "curves.h5", "--group", "lead-car-wall", choice, "-o", "m"]);
+        crumple_ok(here, &["export", "m", "--to", "onnx", "-o", "m.onnx"]);
+        let text = std::fs::read_to_string(here.join("m")).unwrap();
+        let records = records_at_thresholds(&serde_json::from_str(&text).unwrap());
+        assert!(records.nrows() > 1000);
+        let bytes: Vec<u8> = records.iter().flat_map(|v| v.to_le_bytes()).collect();
+        std::fs::write(here.join("records"), bytes).unwrap();
+        let paths = ["m.onnx", "records"].map(|name| here.join(name).display().to_string());
+        let Some(theirs) = run_python("onnx_model.py", &[&paths[0], &paths[1]]) else { return };
+        assert_eq!(theirs["metadata"]["features"], "speed_m_per_s,deflection_m");
+        assert_eq!(theirs["metadata"]["target"], "force_N");
+        assert_eq!(theirs["producer"], concat!("crumple ", env!("CARGO_PKG_VERSION")));
+        let model = Model::read(&here.join("m")).unwrap();
+        let Fitted::Forest(forest) = model.fitted() else { panic!("a forest was trained") };
+        let ours: Array1<f64> = forest.forest().predict(&records);
+        let theirs = theirs["predicted"].as_array().unwrap();
+        assert_eq!(theirs.len(), ours.len());
+        for ((ours, theirs), record) in ours.iter().zip(theirs).zip(records.rows()) {
+            let difference = (theirs.as_f64().unwrap() - ours).abs();
+            assert!(difference <= ours.abs() * 6e-8, "{record}: {ours} against {theirs}");
+        }
+    }
 }

@@ -40,6 +40,24 @@ fn cross_validation() {
     assert!((r2[4] - r2[3]).abs() < 0.02, "out-of-bag agrees with cross-validation: {text}");
 }
 
+/// What no feature tells is uniform, with the second feature as its width: at 0.9, 90 % lie
+/// between 0.495 and 1.305, and its root mean square is 1/6.
+#[test]
+fn forest() {
+    let text = example("forest", &[]);
+    let lines: Vec<&str> = text.lines().collect();
+    let numbers = |line: usize| -> Vec<f64> {
+        lines[line].split([' ', ',', '[', ']', ':']).filter_map(|w| w.parse().ok()).collect()
+    };
+    let [.., predicted, _, low, high] = numbers(1)[..] else { panic!("{text}") };
+    for (found, expected) in [(predicted, 0.9), (low, 0.495), (high, 1.305)] {
+        assert!((found - expected).abs() < 0.08, "{text}");
+    }
+    let importance = numbers(3);
+    assert!(importance[0] > 0.9 && importance[2] < 0.01, "{text}");
+    assert!((numbers(4)[0] * 6.0 - 1.0).abs() < 0.05, "{text}");
+}
+
 #[test]
 fn wall_impact() {
     let text = example("wall_impact", &[]);

@@ -4,7 +4,7 @@ use crumple::forest::{
     FeaturesPerSplit, ForestError, ForestParams, RegressionForest, StopRule, Thresholds,
 };
 use linfa::prelude::*;
-use ndarray::{Array1, Array2, array};
+use ndarray::{Array1, Array2, ArrayView1, array};
 
 /// A smooth function with a bend and a jump, 300 points.
 fn data() -> Dataset<f64, f64, ndarray::Ix1> {
@@ -45,6 +45,70 @@ fn splits_by_hand() {
     let forest = fit(array![[0.0, 9.0], [1.0, 8.0], [2.0, 7.0]], array![0.0, 1.0, 0.0]);
     let p: Array1<f64> = forest.predict(&array![[0.4, 0.0], [0.6, 100.0]]);
     assert_eq!(p, array![0.0, 0.5]);
+}
+
+/// The tree by its definition, on the rows given: the node's prediction for `record`.
+fn by_definition(
+    data: &Dataset<f64, f64, ndarray::Ix1>,
+    rows: &[usize],
+    record: ArrayView1<f64>,
+) -> f64 {
+    let (x, y) = (data.records(), data.targets());
+    let mean = |rows: &[usize]| rows.iter().map(|&r| y[r]).sum::<f64>() / rows.len() as f64;
+    let squares = |rows: &[usize]| {
+        let mean = mean(rows);
+        rows.iter().map(|&r| (y[r] - mean).powi(2)).sum::<f64>()
+    };
+    let all = squares(rows);
+    let mut best: Option<(f64, usize, f64)> = None;
+    for feature in 0..x.ncols() {
+        let mut values: Vec<f64> = rows.iter().map(|&r| x[[r, feature]]).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        for pair in values.windows(2) {
+            let threshold = 0.5 * pair[0] + 0.5 * pair[1];
+            let (left, right): (Vec<usize>, Vec<usize>) =
+                rows.iter().partition(|&&r| x[[r, feature]] < threshold);
+            let gain = all - squares(&left) - squares(&right);
+            if gain > best.map_or(0.0, |best| best.0) + 1e-11 {
+                best = Some((gain, feature, threshold));
+            }
+        }
+    }
+    let Some((_, feature, threshold)) = best else { return mean(rows) };
+    let below = record[feature] < threshold;
+    let side: Vec<usize> =
+        rows.iter().copied().filter(|&r| (x[[r, feature]] < threshold) == below).collect();
+    by_definition(data, &side, record)
+}
+
+/// Values that repeat, in every feature, so that there are ties of all kinds.
+#[test]
+fn trees_are_those_of_the_definition() {
+    let mut data = data();
+    data.records.mapv_inplace(|v| (v * 20.0).floor());
+    let forest = ForestParams::new(1).bootstrap(false).fit(&data).unwrap();
+    let rows: Vec<usize> = (0..300).collect();
+    for row in 0..60 {
+        let record = array![row as f64 / 3.0, (row * 7 % 20) as f64, (row * 11 % 20) as f64];
+        let expected = by_definition(&data, &rows, record.view());
+        let found = forest.predict_one(&record.view());
+        assert!((found - expected).abs() < 1e-12, "{record}: {found} against {expected}");
+    }
+}
+
+/// Larger than what is numbered anew: every sample is still found where it belongs.
+#[test]
+fn large_trees_repeat_their_data() {
+    let x = Array2::from_shape_fn((20_000, 3), |(i, k)| {
+        (0.5 + i as f64 * [0.819_172_5, 0.671_043_6, 0.549_700_5][k]).fract()
+    });
+    let y = x.map_axis(ndarray::Axis(1), |r| (50.0 * r[0]).sin() * r[1] + (90.0 * r[2]).cos());
+    let data = Dataset::new(x, y);
+    let forest = ForestParams::new(1).bootstrap(false).fit(&data).unwrap();
+    assert_eq!(forest.trees()[0].nodes(), 2 * 20_000 - 1);
+    let p: Array1<f64> = forest.predict(data.records());
+    assert!(p.iter().zip(data.targets()).all(|(p, y)| (p - y).abs() < 1e-12));
 }
 
 /// Targets that are equal are one leaf, whatever rounding says of their variance.
@@ -172,13 +236,139 @@ fn columns_in_any_memory_order_give_the_same() {
     assert_eq!(p, predicted(&forest));
 }
 
+/// Few rows, whole batches, and trees so large that rows walk in another order.
 #[test]
 fn batches_and_single_rows_agree() {
-    let x = Array2::from_shape_fn((1_300, 3), |(i, k)| ((i * 7 + k * 13) % 100) as f64 / 100.0);
-    let forest = fit(ForestParams::new(9));
-    let p: Array1<f64> = forest.predict(&x);
-    for (row, p) in x.rows().into_iter().zip(&p) {
-        assert_eq!(forest.predict_one(&row), *p);
+    let x = Array2::from_shape_fn((5_000, 3), |(i, k)| ((i * 7 + k * 13) % 4_999) as f64 / 4_999.0);
+    let y = x.map_axis(ndarray::Axis(1), |r| (50.0 * r[0]).sin() + r[1] * r[2]);
+    let large = ForestParams::new(9).fit(&Dataset::new(x.clone(), y)).unwrap();
+    for forest in [fit(ForestParams::new(9)), large] {
+        for rows in [3, 1_300, 5_000] {
+            let mut x = x.slice(ndarray::s![..rows, ..]).to_owned();
+            x[[1, 0]] = f64::NAN;
+            x[[2, 1]] = f64::INFINITY;
+            let p: Array1<f64> = forest.predict(&x);
+            for (row, p) in x.rows().into_iter().zip(&p) {
+                assert_eq!(forest.predict_one(&row), *p);
+            }
+        }
+    }
+}
+
+/// The squares about the mean fall from 104 to 4 by the first split, to 0 by the two below.
+#[test]
+fn importance_by_hand() {
+    let x = array![[0.0, 0.0, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]];
+    let fit = |y| {
+        let data = Dataset::new(x.clone(), y);
+        ForestParams::new(3).bootstrap(false).fit(&data).unwrap()
+    };
+    let forest = fit(array![0.0, 2.0, 10.0, 12.0]);
+    let share = forest.feature_importance().unwrap();
+    let expected = array![100.0 / 104.0, 4.0 / 104.0, 0.0];
+    assert!((&share - &expected).iter().all(|d: &f64| d.abs() < 1e-14), "{share}");
+    assert_eq!(
+        fit(array![1.0, 1.0, 1.0, 1.0]).feature_importance().unwrap(),
+        array![0.0, 0.0, 0.0]
+    );
+}
+
+/// The weights spelled out: each tree's leaf is known by its mean.
+#[test]
+fn quantiles_by_definition() {
+    let all = data();
+    let params = ForestParams::new(7).bootstrap(false).thresholds(Thresholds::Random);
+    let forest = fit(params.min_samples_leaf(8).quantiles(true));
+    let levels = [0.0, 0.1, 0.5, 0.83, 1.0];
+    let records = Array2::from_shape_fn((40, 3), |(i, k)| ((i * 7 + k * 13) % 40) as f64 / 40.0);
+    let found = forest.quantiles(records.view(), &levels).unwrap();
+    for (record, found) in records.rows().into_iter().zip(found.rows()) {
+        let mut weighted: Vec<(f64, f64)> = all.targets().iter().map(|&y| (y, 0.0)).collect();
+        for tree in forest.trees() {
+            let value = tree.predict(&record);
+            let rows = all.records().rows().into_iter();
+            let leaf: Vec<usize> = rows
+                .enumerate()
+                .filter_map(|(row, x)| (tree.predict(&x) == value).then_some(row))
+                .collect();
+            leaf.iter().for_each(|&row| weighted[row].1 += 1.0 / (7 * leaf.len()) as f64);
+        }
+        weighted.retain(|(_, weight)| *weight > 0.0);
+        weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (&level, &found) in levels.iter().zip(found) {
+            let mut sum = 0.0;
+            let reaches = |(_, weight): &&(f64, f64)| {
+                sum += weight;
+                sum >= level - 1e-9
+            };
+            assert_eq!(found, weighted.iter().find(reaches).unwrap().0, "level {level}");
+        }
+    }
+}
+
+/// Over all levels alike, quantiles have the prediction as their mean: samples count as
+/// often as they were drawn.
+#[test]
+fn mean_of_quantiles_is_the_prediction() {
+    let forest = fit(ForestParams::new(5).min_samples_leaf(3).quantiles(true));
+    let levels: Vec<f64> = (0..20_000).map(|k| (f64::from(k) + 0.5) / 20_000.0).collect();
+    let records = data().records.slice(ndarray::s![..20, ..]).to_owned();
+    let found = forest.quantiles(records.view(), &levels).unwrap();
+    let p: Array1<f64> = forest.predict(&records);
+    for (p, quantiles) in p.iter().zip(found.rows()) {
+        assert!((p - quantiles.mean().unwrap()).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn wrong_quantiles_are_refused() {
+    let t = |forest: &RegressionForest<f64>, features: usize, level: f64, expected: &str| {
+        let error = forest.quantiles(Array2::zeros((1, features)).view(), &[level]).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    };
+    let without = "the forest has not kept the samples of its leaves: fit it with quantiles(true)";
+    t(&fit(ForestParams::new(1)), 3, 0.5, without);
+    let forest = fit(ForestParams::new(1).quantiles(true));
+    t(&forest, 2, 0.5, "the records have 2 features, the forest was fitted to 3");
+    t(&forest, 3, 1.5, "the level of a quantile must be between 0 and 1, found 1.5");
+    t(&forest, 3, f64::NAN, "the level of a quantile must be between 0 and 1, found NaN");
+}
+
+/// Files of programs that knew neither importance nor quantiles are read, and files whose
+/// parts do not fit are not trusted.
+#[test]
+fn stored_forests() {
+    let forest = fit(ForestParams::new(3).quantiles(true));
+    let stored = serde_json::to_value(&forest).unwrap();
+    let read = |value| serde_json::from_value::<RegressionForest<f64>>(value).unwrap();
+    assert_eq!(read(stored.clone()), forest);
+    assert!(forest.check().is_ok());
+    let mut old = stored.clone();
+    for (part, key) in [("", "importance"), ("", "members"), ("/params", "quantiles")] {
+        assert!(old.pointer_mut(part).unwrap().as_object_mut().unwrap().remove(key).is_some());
+    }
+    let old = read(old);
+    assert!(old.check().is_ok());
+    assert_eq!(old.feature_importance(), None);
+    assert_eq!(predicted(&old), predicted(&forest));
+    for (part, wrong, expected) in [
+        ("/members/trees/0/first/1", 9.into(), "the samples of the leaves do not fit the trees"),
+        (
+            "/members/trees/1/members/0",
+            300.into(),
+            "the samples of the leaves do not fit the trees",
+        ),
+        ("/importance", vec![1.0].into(), "the shares of the features do not fit their number"),
+        (
+            "/trees/2/right/0",
+            3.into(),
+            "node 0 has children that do not stand side by side after it",
+        ),
+    ] {
+        let mut damaged = stored.clone();
+        let wrong: serde_json::Value = wrong;
+        *damaged.pointer_mut(part).unwrap() = wrong;
+        assert_eq!(read(damaged).check().unwrap_err().to_string(), expected, "{part}");
     }
 }
 

@@ -25,7 +25,7 @@ const MAY_NAME: [(&str, &[&str]); 17] = [
     ("dataset", &["curve", "unit"]),
     ("surrogate", &["dataset", "forest", "curve", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
-    ("export", &["surrogate", "curve", "unit"]),
+    ("export", &["surrogate", "forest", "curve", "unit"]),
     ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
     ("validate", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
     ("compare", &["validate", "surrogate", "dataset", "curve", "unit"]),

@@ -237,6 +237,21 @@ fn files_that_are_not_ours() {
         "curves.h5: line 1, column 1: this is no model file",
     );
     t(here, &["export", "m.model", "--to", "csv"], "m.model: this is no predicted curve");
+    t(
+        here,
+        &["export", "curves.h5", "--to", "onnx"],
+        "curves.h5: line 1, column 1: this is no model",
+    );
+    t(
+        here,
+        &["export", "m.model", "--to", "onnx"],
+        "onnx takes forest models, this is of --model nearest",
+    );
+    t(
+        here,
+        &["predict", "m.model", "--speed", "50km/h", "-o", "m.onnx"],
+        "onnx takes a model: crumple export MODEL --to onnx",
+    );
     t(here, &["inspect", "curves.h5"], "this is an HDF5 file: the readers take nodout, rcforc");
     t(here, &["inspect", "text.h5"], "no solver output is recognised in it");
     t(
@@ -275,13 +290,13 @@ fn command_lines() {
     t(&["predict", "m", "--speed", "36km/h", "--mass", "24"], "mass \"24\" has no unit");
     t(
         &["predict", "m", "--speed", "36km/h", "-o", "a.xyz"],
-        "use one of .json, .csv, .k, .key, .dyn",
+        "use one of .json, .csv, .k, .key, .dyn, .onnx",
     );
     t(
         &["export", "m", "--to", "xyz"],
-        "there is no export format \"xyz\": use one of json, csv, lsdyna",
+        "there is no export format \"xyz\": use one of json, csv, lsdyna, onnx",
     );
-    t(&["export", "m"], "name the format with --to (json, csv, lsdyna)");
+    t(&["export", "m"], "name the format with --to (json, csv, lsdyna, onnx)");
     t(&["histories", "f", "--id", "x"], "\"x\" is not an id: write for example 900001 or 3:surfa");
     t(&["histories", "f", "-o", "a.parquet"], "histories are written as .csv, .h5 or .hdf5");
     t(&["train", "d", "--group", "g", "-o", "m", "--paper", "--trees", "3"], "cannot be used with");
@@ -363,6 +378,7 @@ fn outputs_do_not_destroy_inputs() {
         "train curves.h5 --group lead-car-wall -o ./curves.h5",
         "histories fe/lead-car-wall/36kmh/rwforc -o fe/lead-car-wall/36kmh/rwforc",
         "export lead50.json --to csv -o lead50.json",
+        "export lead.model --to onnx -o lead.model",
         "simulate scenario.toml -o scenario.toml",
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();

@@ -1,25 +1,30 @@
-//! `crumple export`: one curve as a file for another tool.
+//! `crumple export`: one curve or model as a file for another tool.
 
 use std::path::{Path, PathBuf};
 
 use crumple::export::{self, ExportError, FORMATS, Format, Options};
 use crumple::file::write_whole;
+use crumple::surrogate::Model;
 use crumple::unit::UnitSystem;
 use serde::Serialize;
 
 use super::output;
 use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
-/// Write a predicted curve for another tool
+/// Write a predicted curve, or a forest model, for another tool
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
   crumple export lead50.json --to csv
-  crumple export --list")]
+  crumple export lead.model --to onnx -o lead.onnx
+  crumple export --list
+
+ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m; output is force_N, float,
+N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
 pub struct Args {
-    /// Predicted curve (JSON made by crumple predict)
+    /// Predicted curve (JSON made by crumple predict); for onnx a model (made by crumple train)
     #[arg(required_unless_present = "list")]
-    curve: Option<PathBuf>,
+    input: Option<PathBuf>,
     /// List the formats
     #[arg(long)]
     list: bool,
@@ -97,17 +102,22 @@ struct Document {
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
-    let Some(curve) = args.curve.as_ref().filter(|_| !args.list) else {
+    let Some(input) = args.input.as_ref().filter(|_| !args.list) else {
         return list(manners);
     };
     let format = args.target.format(args.output.as_deref())?;
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     if let Some(output) = output {
-        keep_input(curve, output)?;
+        keep_input(input, output)?;
     }
-    let curve = export::json::read(curve)?;
-    let bytes = format.encode(&curve, &args.target.options()?)?;
+    let bytes = match format.takes_model() {
+        true => format.encode_model(&Model::read(input)?)?,
+        false => format.encode(&export::json::read(input)?, &args.target.options()?)?,
+    };
     match output {
+        None if manners.json && format.takes_model() => {
+            return Err(Failure::Usage(format!("{} is binary: name a file with -o", format.name)));
+        }
         None if manners.json => {
             let text = String::from_utf8_lossy(&bytes).into_owned();
             output::print_json(&Text { format: format.name, text })?;

@@ -1,12 +1,14 @@
-//! Exports: a predicted curve as a file for another tool. One file per target.
+//! Exports: a predicted curve or a model as a file for another tool. One file per target.
 
 pub mod csv;
 pub mod json;
 pub mod lsdyna;
+pub mod onnx;
 
 use std::path::Path;
 
-use crate::surrogate::PredictedCurve;
+use crate::forest::OnnxError;
+use crate::surrogate::{Model, PredictedCurve};
 use crate::unit::UnitSystem;
 
 /// One target: its name, its file extensions, how it is written.
@@ -15,7 +17,13 @@ pub struct Format {
     /// Without the dot; the first is the usual one.
     pub extensions: &'static [&'static str],
     pub description: &'static str,
-    write: fn(&PredictedCurve, &Options) -> Result<Vec<u8>, ExportError>,
+    write: Write,
+}
+
+/// What a target is made of.
+enum Write {
+    Curve(fn(&PredictedCurve, &Options) -> Result<Vec<u8>, ExportError>),
+    Model(fn(&Model) -> Result<Vec<u8>, ExportError>),
 }
 
 /// Every format we write. To add one: write its module, add its line here.
@@ -24,19 +32,25 @@ pub const FORMATS: &[Format] = &[
         name: "json",
         extensions: &["json"],
         description: "predicted curve with everything known of it, SI (master format)",
-        write: json::write,
+        write: Write::Curve(json::write),
     },
     Format {
         name: "csv",
         extensions: &["csv"],
         description: "columns d_m,force_N with # header lines, SI",
-        write: csv::write,
+        write: Write::Curve(csv::write),
     },
     Format {
         name: "lsdyna",
         extensions: &["k", "key", "dyn"],
         description: "LS-DYNA *DEFINE_CURVE_TITLE, in the deck's units (--units)",
-        write: lsdyna::write,
+        write: Write::Curve(lsdyna::write),
+    },
+    Format {
+        name: "onnx",
+        extensions: &["onnx"],
+        description: "forest model (of crumple train) as ONNX, SI; splits double, output float",
+        write: Write::Model(onnx::write),
     },
 ];
 
@@ -55,7 +69,7 @@ impl Default for Options {
     }
 }
 
-/// Why a curve cannot be exported.
+/// Why a curve or a model cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     #[error("there is no export format \"{name}\": use one of {known}")]
@@ -66,6 +80,8 @@ pub enum ExportError {
     NoSuchExtension { path: String, known: String },
     #[error("{format} takes {needs}")]
     Unfit { format: &'static str, needs: String },
+    #[error(transparent)]
+    Onnx(#[from] OnnxError),
     #[error("cannot encode the curve: {0}")]
     Encode(#[from] serde_json::Error),
 }
@@ -74,7 +90,27 @@ pub enum ExportError {
 pub const MIN_POINTS: usize = 4;
 
 impl Format {
-    /// The file's bytes.
+    /// Whether it is made of a model, not of a curve.
+    pub fn takes_model(&self) -> bool {
+        matches!(self.write, Write::Model(_))
+    }
+
+    /// The file's bytes, made of a model.
+    ///
+    /// # Errors
+    /// [`ExportError::Unfit`] if the target cannot take the model.
+    pub fn encode_model(&self, model: &Model) -> Result<Vec<u8>, ExportError> {
+        match self.write {
+            Write::Model(write) => write(model),
+            Write::Curve(_) => Err(self.unfit("a curve made by crumple predict")),
+        }
+    }
+
+    fn unfit(&self, needs: impl Into<String>) -> ExportError {
+        ExportError::Unfit { format: self.name, needs: needs.into() }
+    }
+
+    /// The file's bytes, made of a curve.
     ///
     /// # Errors
     /// [`ExportError::Unfit`] if the target cannot take the curve.
@@ -83,13 +119,14 @@ impl Format {
         curve: &PredictedCurve,
         options: &Options,
     ) -> Result<Vec<u8>, ExportError> {
-        if curve.deflection_m.len() < MIN_POINTS {
-            return Err(ExportError::Unfit {
-                format: self.name,
-                needs: format!("{MIN_POINTS} points or more, found {}", curve.deflection_m.len()),
-            });
+        let Write::Curve(write) = self.write else {
+            return Err(self.unfit("a model: crumple export MODEL --to onnx"));
+        };
+        let points = curve.deflection_m.len();
+        if points < MIN_POINTS {
+            return Err(self.unfit(format!("{MIN_POINTS} points or more, found {points}")));
         }
-        (self.write)(curve, options)
+        write(curve, options)
     }
 }
 

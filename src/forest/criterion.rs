@@ -8,30 +8,25 @@ pub struct Sums {
     pub weight: f64,
     pub target: f64,
     pub target_squared: f64,
-    /// Whether all targets so far are equal, and to what.
-    equal: Option<Option<f64>>,
 }
 
 impl Sums {
+    #[inline]
     pub fn add(&mut self, weight: f64, target: f64) {
         self.weight += weight;
         self.target += weight * target;
         self.target_squared += weight * target * target;
-        self.equal = match self.equal {
-            None => Some(Some(target)),
-            Some(Some(before)) if before == target => Some(Some(target)),
-            Some(_) => Some(None),
-        };
-    }
-
-    /// Whether all targets are equal. The variance would say so only up to rounding.
-    pub fn is_pure(&self) -> bool {
-        !matches!(self.equal, Some(None))
     }
 
     /// Difference of gains that is rounding and not gain.
     pub fn rounding(&self) -> f64 {
         1e-13 * self.target_squared
+    }
+
+    /// Whether no split can gain more than rounding: none gains more than the squares about
+    /// the mean.
+    pub fn is_pure(&self) -> bool {
+        self.target_squared - self.target * self.target / self.weight <= self.rounding()
     }
 
     pub fn mean(&self) -> f64 {
@@ -41,15 +36,17 @@ impl Sums {
     pub fn variance(&self) -> f64 {
         (self.target_squared / self.weight - self.mean() * self.mean()).max(0.0)
     }
-}
 
-/// What a split gains, up to terms that are equal for all splits of a node.
-///
-/// With `s`, `w` sums of targets and weights left and right,
-/// `I_p − (N_l/N_p) I_l − (N_r/N_p) I_r = (s_l²/w_l + s_r²/w_r − s²/w) / w`.
-#[inline]
-pub fn proxy(left_target: f64, left_weight: f64, right_target: f64, right_weight: f64) -> f64 {
-    left_target * left_target / left_weight + right_target * right_target / right_weight
+    /// What a split gains: the fall of the squares about the means, which is the node's
+    /// weight times `I_p − (N_l/N_p) I_l − (N_r/N_p) I_r`.
+    ///
+    /// With `s`, `w` sums of targets and weights, `s_l²/w_l + s_r²/w_r − s²/w` is
+    /// `(s_l w − s w_l)² / (w w_l w_r)`: no difference of large numbers is left.
+    #[inline]
+    pub fn gain(&self, left_weight: f64, left_target: f64) -> f64 {
+        let difference = left_target * self.weight - self.target * left_weight;
+        difference * difference / (self.weight * left_weight * (self.weight - left_weight))
+    }
 }
 
 /// Whether the stop rule keeps a node from being split. `offset` is the training mean
@@ -77,13 +74,17 @@ mod tests {
     }
 
     #[test]
-    fn proxy_is_the_variance_reduction() {
+    fn gain_is_the_variance_reduction() {
         let (left, right, all) =
             (sums(&[1.0, 2.0]), sums(&[5.0, 9.0, 4.0]), sums(&[1.0, 2.0, 5.0, 9.0, 4.0]));
         let direct = all.variance() - 0.4 * left.variance() - 0.6 * right.variance();
-        let by_proxy =
-            (proxy(left.target, 2.0, right.target, 3.0) - all.target * all.target / 5.0) / 5.0;
-        assert!((direct - by_proxy).abs() < 1e-12);
+        assert!((direct - all.gain(2.0, left.target) / 5.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn equal_targets_are_pure() {
+        assert!(sums(&[0.1; 37]).is_pure());
+        assert!(!sums(&[0.1, 0.1 + 1e-6]).is_pure());
     }
 
     #[test]

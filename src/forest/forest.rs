@@ -1,16 +1,20 @@
 //! The forest: trees grown in parallel, predictions as their mean.
 
+use std::cmp::Ordering;
+
 use linfa::Float;
 use linfa::dataset::{AsSingleTargets, DatasetBase};
 use linfa::traits::{Fit, PredictInplace};
-use ndarray::{Array1, ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2};
+use ndarray::{Array1, ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2, Zip};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::params::{FeaturesPerSplit, ForestError, ForestValidParams};
-use super::splitter::{Samples, Table};
+use super::grow::{Table, grow};
+use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
+use super::quantiles::Members;
 use super::stream::Stream;
 use super::tree::{Tree, TreeError};
+use super::walk::{BATCH, Rows, Walk, groups};
 
 /// A fitted regression forest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +23,11 @@ pub struct RegressionForest<F> {
     params: ForestValidParams<F>,
     trees: Vec<Tree<F>>,
     out_of_bag: Option<OutOfBag>,
+    /// Empty in files of programs that did not know it.
+    #[serde(default)]
+    importance: Vec<f64>,
+    #[serde(default = "Option::default", skip_serializing_if = "Option::is_none")]
+    pub(super) members: Option<Box<Members<F>>>,
 }
 
 /// Error on the samples that the trees did not see.
@@ -50,6 +59,13 @@ impl<F: Float> RegressionForest<F> {
         self.out_of_bag
     }
 
+    /// Share of each feature in what all splits gained, 1 in sum (0 if no tree has a split):
+    /// mean over the trees of each tree's shares, as scikit-learn's `feature_importances_`
+    /// (Breiman's mean decrease in impurity). `None` for a forest read from a file without it.
+    pub fn feature_importance(&self) -> Option<ArrayView1<'_, f64>> {
+        (!self.importance.is_empty()).then(|| ArrayView1::from(&self.importance))
+    }
+
     /// Checks a forest that was read from a file.
     ///
     /// # Errors
@@ -58,7 +74,11 @@ impl<F: Float> RegressionForest<F> {
         if self.trees.is_empty() || self.features == 0 {
             return Err(TreeError::Lengths);
         }
-        self.trees.iter().try_for_each(|tree| tree.check(self.features))
+        self.trees.iter().try_for_each(|tree| tree.check(self.features))?;
+        if !self.importance.is_empty() && self.importance.len() != self.features {
+            return Err(TreeError::Importance);
+        }
+        self.members.as_ref().map_or(Ok(()), |members| members.check(&self.trees))
     }
 
     /// Mean over the trees for one record of [`features`](Self::features) values.
@@ -87,27 +107,42 @@ where
     ) -> Result<RegressionForest<F>, ForestError> {
         let targets = dataset.targets().as_single_targets();
         let table = table(dataset.records().view(), targets)?;
-        let features = table.columns.len();
+        let (samples, features) = dataset.records().dim();
         if let FeaturesPerSplit::Count(count) = self.features_per_split
             && count > features
         {
             return Err(ForestError::TooManyFeaturesPerSplit { count, features });
         }
-        let trees: Vec<Tree<F>> = (0..self.trees)
+        let (trees, gains): (Vec<Tree<F>>, Vec<Vec<f64>>) = (0..self.trees)
             .into_par_iter()
             .map(|tree| {
                 let mut stream = Stream::new(self.seed, tree as u64);
-                let samples = draw(&table, self.bootstrap, &mut stream);
-                Tree::grow(&table, samples, self, &mut stream)
+                let times = draw(samples, self.bootstrap, &mut stream);
+                grow(&table, &times, self, &mut stream)
             })
-            .collect();
-        let mut forest =
-            RegressionForest { features, params: self.clone(), trees, out_of_bag: None };
+            .unzip();
+        let mut forest = RegressionForest {
+            features,
+            params: self.clone(),
+            trees,
+            out_of_bag: None,
+            importance: importance(&gains),
+            members: None,
+        };
         if self.out_of_bag {
             forest.out_of_bag = Some(out_of_bag(&forest, dataset.records().view(), &table));
         }
+        if self.quantiles {
+            let targets = targets.iter().copied();
+            forest.members =
+                Some(Box::new(members(&forest, dataset.records().view(), targets, &table)));
+        }
         Ok(forest)
     }
+}
+
+fn as_f64<F: Float>(value: F) -> f64 {
+    value.to_f64().unwrap_or(f64::NAN)
 }
 
 /// Columns, centred targets and the order of every feature; checks the data once.
@@ -125,51 +160,52 @@ fn table<F: Float>(
     if features == 0 {
         return Err(ForestError::NoFeatures);
     }
-    if samples > u32::MAX as usize {
+    if samples > MOST_SAMPLES {
         return Err(ForestError::TooManySamples { samples });
     }
-    let as_f64 = |v: F| v.to_f64().unwrap_or(f64::NAN);
-    for ((row, feature), &value) in records.indexed_iter() {
-        if !value.is_finite() {
-            return Err(ForestError::RecordNotFinite { row, feature, value: as_f64(value) });
-        }
+    let finite = |v: &F| v.is_finite();
+    if !records.iter().all(finite)
+        && let Some(((row, feature), &value)) = records.indexed_iter().find(|(_, v)| !finite(v))
+    {
+        return Err(ForestError::RecordNotFinite { row, feature, value: as_f64(value) });
     }
-    if let Some((row, &value)) = targets.indexed_iter().find(|(_, v)| !v.is_finite()) {
+    if let Some((row, &value)) = targets.indexed_iter().find(|(_, v)| !finite(v)) {
         return Err(ForestError::TargetNotFinite { row, value: as_f64(value) });
     }
-    let raw: Vec<f64> = targets.iter().map(|&t| as_f64(t)).collect();
-    let offset = raw.iter().sum::<f64>() / samples as f64;
-    let columns: Vec<Vec<F>> =
-        records.axis_iter(Axis(1)).map(|column| column.iter().copied().collect()).collect();
-    let orders = columns
-        .par_iter()
-        .map(|column| {
-            let mut order: Vec<u32> = (0..samples as u32).collect();
-            order.sort_by(|&a, &b| {
-                let (a, b) = (column[a as usize], column[b as usize]);
-                // Values are finite, so the comparison always answers.
-                a.partial_cmp(&b).unwrap_or(std::cmp::Ordering::Equal)
-            });
-            order
-        })
-        .collect();
-    let targets = raw.iter().map(|t| t - offset).collect();
-    Ok(Table { columns, targets, offset, orders })
+    let offset = targets.iter().map(|&t| as_f64(t)).sum::<f64>() / samples as f64;
+    let (_, rows) = sort(records.column(0).iter().copied());
+    let targets = rows.iter().map(|&row| as_f64(targets[row as usize]) - offset).collect();
+    let (columns, orders) = records
+        .axis_iter(Axis(1))
+        .into_par_iter()
+        .map(|column| sort(rows.iter().map(|&row| column[row as usize])))
+        .unzip();
+    Ok(Table { columns, orders, targets, offset, rows })
 }
 
-/// The samples of one tree: N draws with replacement, or all once.
-fn draw<F>(table: &Table<F>, bootstrap: bool, stream: &mut Stream) -> Samples {
-    let n = table.targets.len();
+/// The values in increasing order, and their numbers; of equal values the lower number first.
+fn sort<F: Float>(values: impl Iterator<Item = F>) -> (Vec<F>, Vec<u32>) {
+    let mut numbered: Vec<(F, u32)> = values.zip(0..).collect();
+    // Values are finite, so the comparison always answers.
+    numbered.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+    numbered.into_iter().unzip()
+}
+
+/// How often each sample is drawn for a tree: N draws with replacement, or all once.
+fn draw(samples: usize, bootstrap: bool, stream: &mut Stream) -> Vec<u32> {
     if !bootstrap {
-        return Samples { orders: table.orders.clone(), weights: vec![1.0; n] };
+        return vec![1; samples];
     }
-    let mut weights = vec![0.0; n];
-    for _ in 0..n {
-        weights[stream.below(n)] += 1.0;
+    let mut times = vec![0; samples];
+    for _ in 0..samples {
+        times[stream.below(samples)] += 1;
     }
-    let drawn =
-        |order: &Vec<u32>| order.iter().copied().filter(|&s| weights[s as usize] > 0.0).collect();
-    Samples { orders: table.orders.iter().map(drawn).collect(), weights }
+    times
+}
+
+/// The draws of a tree of a fitted forest: its stream draws the samples first.
+fn drawn_again<F>(params: &ForestValidParams<F>, tree: usize, samples: usize) -> Vec<u32> {
+    draw(samples, params.bootstrap, &mut Stream::new(params.seed, tree as u64))
 }
 
 fn out_of_bag<F: Float>(
@@ -177,19 +213,39 @@ fn out_of_bag<F: Float>(
     records: ArrayView2<'_, F>,
     table: &Table<F>,
 ) -> OutOfBag {
-    let n = table.targets.len();
-    let mut sums = vec![(0.0, 0u32); n];
-    for (index, tree) in forest.trees.iter().enumerate() {
-        // The tree's stream draws its samples first, so they can be drawn again.
-        let mut seen = vec![false; n];
-        let mut stream = Stream::new(forest.params.seed, index as u64);
-        for _ in 0..n {
-            seen[stream.below(n)] = true;
-        }
-        sums.par_iter_mut().enumerate().filter(|(row, _)| !seen[*row]).for_each(|(row, sum)| {
-            let value = tree.predict(&records.row(row)).to_f64().unwrap_or(f64::NAN);
-            sum.0 += value - table.offset;
-            sum.1 += 1;
+    let samples = table.targets.len();
+    let mut sums = vec![(0.0, 0u32); samples];
+    let mut walk = Walk::new();
+    let mut streams = 0..;
+    for trees in groups(&forest.trees) {
+        let times: Vec<Vec<u32>> = trees
+            .iter()
+            .zip(&mut streams)
+            .map(|(_, tree)| drawn_again(&forest.params, tree, samples))
+            .collect();
+        walk.take(trees);
+        sums.par_chunks_mut(BATCH).enumerate().for_each(|(batch, sums)| {
+            let rows = &table.rows[batch * BATCH..][..sums.len()];
+            let records: Vec<F> = rows
+                .iter()
+                .flat_map(|&row| records.row(row as usize).into_iter())
+                .copied()
+                .collect();
+            let (mut unseen, mut walking) = (Vec::new(), Vec::new());
+            for (tree, times) in times.iter().enumerate() {
+                let times = &times[batch * BATCH..];
+                unseen.clear();
+                unseen.extend((0..sums.len()).filter(|&at| times[at] == 0));
+                walking.clear();
+                for at in &unseen {
+                    walking.extend_from_slice(&records[at * forest.features..][..forest.features]);
+                }
+                walk.leaves(tree, &Rows::new(&walking, forest.features), |row, leaf| {
+                    let (sum, trees) = &mut sums[unseen[row]];
+                    *sum += as_f64(walk.value(leaf)) - table.offset;
+                    *trees += 1;
+                });
+            }
         });
     }
     let (mut error, mut spread, mut samples) = (0.0, 0.0, 0);
@@ -204,9 +260,53 @@ fn out_of_bag<F: Float>(
     OutOfBag { rmse: (error / count).sqrt(), r2, samples: samples as usize }
 }
 
-/// Rows predicted together: few enough that they stay in the first-level cache while
-/// tree after tree passes over them.
-const BATCH: usize = 512;
+/// The samples of every leaf: the training records walk each tree again.
+fn members<F: Float>(
+    forest: &RegressionForest<F>,
+    records: ArrayView2<'_, F>,
+    targets: impl Iterator<Item = F>,
+    table: &Table<F>,
+) -> Members<F> {
+    let (targets, by_target) = sort(targets);
+    let mut members = Members::new(targets);
+    let rows: Vec<F> = by_target.iter().flat_map(|&r| records.row(r as usize).to_vec()).collect();
+    let mut samples = vec![0; by_target.len()];
+    (0..).zip(&table.rows).for_each(|(sample, &row)| samples[row as usize] = sample);
+    let mut leaves = vec![0; by_target.len()];
+    let mut walk = Walk::new();
+    for (index, tree) in forest.trees.iter().enumerate() {
+        let times = drawn_again(&forest.params, index, by_target.len());
+        walk.take(std::slice::from_ref(tree));
+        walk.visit(&rows, forest.features, &mut leaves, |of_row, leaf| *of_row = leaf);
+        let times = by_target.iter().map(|&row| times[samples[row as usize] as usize]);
+        members.push(tree.nodes(), leaves.iter().copied().zip(times));
+    }
+    members
+}
+
+/// Mean over the trees that have a split of each feature's share in its gains.
+fn importance(gains: &[Vec<f64>]) -> Vec<f64> {
+    let mut shares = vec![0.0; gains.first().map_or(0, Vec::len)];
+    for gains in gains {
+        let sum: f64 = gains.iter().sum();
+        if sum > 0.0 {
+            shares.iter_mut().zip(gains).for_each(|(share, gain)| *share += gain / sum);
+        }
+    }
+    let sum: f64 = shares.iter().sum();
+    if sum > 0.0 {
+        shares.iter_mut().for_each(|share| *share /= sum);
+    }
+    shares
+}
+
+/// Nodes that are packed in the time that a row walks.
+const NODES_PACKED_AS_ROW_WALKS: usize = 16;
+
+/// Trees from which on rows walk in the order of the first tree's leaves, which costs about
+/// as much as four trees: neighbours take nearly the same ways in all trees, so that those in
+/// step arrive together and their nodes are in the cache.
+const TREES_WORTH_ORDERING: usize = 8;
 
 impl<F, D> PredictInplace<ArrayBase<D, Ix2>, Array1<F>> for RegressionForest<F>
 where
@@ -223,18 +323,34 @@ where
         assert_eq!(x.nrows(), y.len(), "one target is needed per record");
         let trees = F::cast(self.trees.len());
         let x = x.view();
-        y.axis_chunks_iter_mut(Axis(0), BATCH)
-            .into_par_iter()
-            .zip(x.axis_chunks_iter(Axis(0), BATCH))
-            .for_each(|(mut y, x)| {
-                y.fill(F::zero());
-                for tree in &self.trees {
-                    for (y, record) in y.iter_mut().zip(x.rows()) {
-                        *y += tree.predict(&record);
-                    }
-                }
-                y.mapv_inplace(|sum| sum / trees);
-            });
+        let nodes = self.trees.iter().map(Tree::nodes).max().unwrap_or(0);
+        if x.nrows() * NODES_PACKED_AS_ROW_WALKS < nodes {
+            Zip::from(y).and(x.rows()).par_for_each(|y, record| *y = self.predict_one(&record));
+            return;
+        }
+        let mut walk = Walk::new();
+        let mut rows: Vec<F> = x.iter().copied().collect();
+        let order = (self.trees.len() >= TREES_WORTH_ORDERING).then(|| {
+            walk.take(&self.trees[..1]);
+            let mut leaves: Vec<(usize, usize)> = (0..x.nrows()).map(|row| (0, row)).collect();
+            walk.visit(&rows, self.features, &mut leaves, |(of_row, _), leaf| *of_row = leaf);
+            leaves.par_sort_unstable();
+            leaves
+        });
+        if let Some(order) = &order {
+            let row = |&(_, row): &(usize, usize)| &rows[row * self.features..][..self.features];
+            rows = order.iter().flat_map(row).copied().collect();
+        }
+        let mut sums = vec![F::zero(); x.nrows()];
+        for trees in groups(&self.trees) {
+            walk.take(trees);
+            walk.visit(&rows, self.features, &mut sums, |sum, leaf| *sum += walk.value(leaf));
+        }
+        let means = sums.into_iter().map(|sum| sum / trees);
+        match order {
+            Some(order) => order.iter().zip(means).for_each(|(&(_, row), mean)| y[row] = mean),
+            None => y.iter_mut().zip(means).for_each(|(y, mean)| *y = mean),
+        }
     }
 
     fn default_target(&self, x: &ArrayBase<D, Ix2>) -> Array1<F> {

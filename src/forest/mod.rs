@@ -3,7 +3,8 @@
 //! Knows arrays, never curves. The algorithm is that of the reference method (domain
 //! terms: variance reduction, bootstrap, mean over trees) and of Breiman, "Random
 //! Forests", Machine Learning 45 (2001); with random thresholds that of Geurts, Ernst and
-//! Wehenkel, "Extremely randomized trees", Machine Learning 63 (2006).
+//! Wehenkel, "Extremely randomized trees", Machine Learning 63 (2006). Beside predictions it
+//! gives feature importance, out-of-bag error, quantiles and an ONNX model.
 //!
 //! ```
 //! use crumple::forest::ForestParams;
@@ -21,12 +22,17 @@
 mod criterion;
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
+mod grow;
+mod onnx;
 mod params;
+mod quantiles;
 mod splitter;
 mod stream;
 mod tree;
+mod walk;
 
 pub use forest::{OutOfBag, RegressionForest};
+pub use onnx::{OnnxDescription, OnnxError};
 pub use params::{
     FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds, Ties,
 };

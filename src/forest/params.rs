@@ -3,6 +3,9 @@
 use linfa::{Float, ParamGuard};
 use serde::{Deserialize, Serialize};
 
+/// Samples of which the nodes of a tree, twice as many, can still be numbered in 31 bits.
+pub(super) const MOST_SAMPLES: usize = 1 << 30;
+
 /// How thresholds are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -45,7 +48,7 @@ pub enum FeaturesPerSplit {
     Count(usize),
 }
 
-/// Why a forest cannot be fitted.
+/// Why a forest cannot be fitted, or asked for quantiles.
 #[derive(Debug, thiserror::Error)]
 pub enum ForestError {
     #[error("a forest needs at least 1 tree, found 0")]
@@ -66,7 +69,7 @@ pub enum ForestError {
     NoSamples,
     #[error("there are no features to split on")]
     NoFeatures,
-    #[error("{samples} samples are more than a forest can index ({most})", most = u32::MAX)]
+    #[error("{samples} samples are more than a forest can index ({most})", most = MOST_SAMPLES)]
     TooManySamples { samples: usize },
     #[error("{records} records but {targets} targets")]
     Lengths { records: usize, targets: usize },
@@ -74,6 +77,12 @@ pub enum ForestError {
     RecordNotFinite { row: usize, feature: usize, value: f64 },
     #[error("target {row} is {value}: expected a finite number")]
     TargetNotFinite { row: usize, value: f64 },
+    #[error("the forest has not kept the samples of its leaves: fit it with quantiles(true)")]
+    NoMembers,
+    #[error("the level of a quantile must be between 0 and 1, found {level}")]
+    Level { level: f64 },
+    #[error("the records have {found} features, the forest was fitted to {fitted}")]
+    Features { found: usize, fitted: usize },
     #[error(transparent)]
     Linfa(#[from] linfa::Error),
 }
@@ -91,6 +100,9 @@ pub struct ForestValidParams<F> {
     pub(super) features_per_split: FeaturesPerSplit,
     pub(super) ties: Ties,
     pub(super) out_of_bag: bool,
+    /// Absent in files of programs that did not know it.
+    #[serde(default)]
+    pub(super) quantiles: bool,
     #[serde(skip)]
     float: std::marker::PhantomData<F>,
 }
@@ -120,6 +132,7 @@ impl<F: Float> ForestParams<F> {
             features_per_split: FeaturesPerSplit::All,
             ties: Ties::LowestFeature,
             out_of_bag: false,
+            quantiles: false,
             float: std::marker::PhantomData,
         })
     }
@@ -171,6 +184,13 @@ impl<F: Float> ForestParams<F> {
     /// Whether to estimate the error from the samples each tree did not see.
     pub fn out_of_bag(mut self, out_of_bag: bool) -> Self {
         self.0.out_of_bag = out_of_bag;
+        self
+    }
+
+    /// Whether to keep the samples of every leaf, for
+    /// [`RegressionForest::quantiles`](super::RegressionForest::quantiles).
+    pub fn quantiles(mut self, quantiles: bool) -> Self {
+        self.0.quantiles = quantiles;
         self
     }
 }

@@ -2,30 +2,28 @@
 
 use linfa::Float;
 
-use super::criterion::{Sums, proxy};
-use super::params::{FeaturesPerSplit, Thresholds, Ties};
+use super::criterion::Sums;
+use super::params::{FeaturesPerSplit, ForestValidParams, Thresholds, Ties};
 use super::stream::Stream;
 
-/// Training data by columns; shared by all trees.
-pub struct Table<F> {
-    /// Feature values: `columns[feature][sample]`.
-    pub columns: Vec<Vec<F>>,
-    /// Targets, centred on their mean.
-    pub targets: Vec<f64>,
-    /// Mean that was taken off the targets.
-    pub offset: f64,
-    /// Samples by increasing value of each feature, ties by sample.
-    pub orders: Vec<Vec<u32>>,
+/// A drawn sample in a feature's order. What a scan reads stands side by side, so that it
+/// goes through memory in one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn<F> {
+    /// Centred on the training mean.
+    pub target: f64,
+    /// The feature's value.
+    pub value: F,
+    pub sample: u32,
+    /// How often it was drawn.
+    pub times: u32,
 }
 
-/// The samples of one tree.
-///
-/// Invariant: for every feature, `orders[feature][start..end]` are the samples of the
-/// node that owns the range `start..end`, by increasing value.
-pub struct Samples {
-    pub orders: Vec<Vec<u32>>,
-    /// How often each sample was drawn.
-    pub weights: Vec<f64>,
+impl<F> Drawn<F> {
+    #[inline]
+    pub fn weight(&self) -> f64 {
+        f64::from(self.times)
+    }
 }
 
 /// A split: left if `value < threshold`.
@@ -33,15 +31,33 @@ pub struct Samples {
 pub struct Split<F> {
     pub feature: usize,
     pub threshold: F,
-    gain: f64,
+    /// Distinct samples that go left: the first so many in the feature's order.
+    pub left: usize,
+    pub gain: f64,
 }
 
 /// What a split must keep to.
 pub struct Rules {
-    pub thresholds: Thresholds,
-    pub features: FeaturesPerSplit,
-    pub ties: Ties,
+    thresholds: Thresholds,
+    features: FeaturesPerSplit,
+    ties: Ties,
     pub min_samples_leaf: f64,
+}
+
+impl Rules {
+    pub fn new<F>(params: &ForestValidParams<F>) -> Self {
+        Self {
+            thresholds: params.thresholds,
+            features: params.features_per_split,
+            ties: params.ties,
+            min_samples_leaf: params.min_samples_leaf as f64,
+        }
+    }
+
+    fn large_enough(&self, node: &Sums, left_weight: f64) -> bool {
+        let right_weight = node.weight - left_weight;
+        (left_weight >= self.min_samples_leaf) & (right_weight >= self.min_samples_leaf)
+    }
 }
 
 impl<F: Float> Split<F> {
@@ -56,35 +72,39 @@ impl<F: Float> Split<F> {
     }
 }
 
-/// The best split of the node that owns `start..end`, or `None` if no split gains.
+/// Room that searches share.
+#[derive(Default)]
+pub struct Room {
+    untried: Vec<usize>,
+    gains: Vec<f64>,
+}
+
+/// The best split of the node that owns the range `start..end` of every feature's order, or
+/// `None` if no split gains.
 pub fn best<F: Float>(
-    table: &Table<F>,
-    samples: &Samples,
+    orders: &[Vec<Drawn<F>>],
     (start, end): (usize, usize),
     node: &Sums,
     rules: &Rules,
     stream: &mut Stream,
+    Room { untried, gains }: &mut Room,
 ) -> Option<Split<F>> {
-    let features = table.columns.len();
+    let features = orders.len();
     let mut best: Option<Split<F>> = None;
-    let consider = |feature: usize, best: &mut Option<Split<F>>, stream: &mut Stream| {
-        let column = &table.columns[feature];
-        let order = &samples.orders[feature][start..end];
-        let (low, high) = (column[order[0] as usize], column[order[order.len() - 1] as usize]);
+    let mut consider = |feature: usize, stream: &mut Stream| {
+        let order = &orders[feature][start..end];
+        let (low, high) = (order[0].value, order[order.len() - 1].value);
         if low >= high {
             return false; // constant in this node
         }
         let found = match rules.thresholds {
-            Thresholds::Midpoint => midpoints(table, samples, feature, order, node, rules),
-            Thresholds::Random => {
-                let threshold = draw(low, high, stream);
-                at(table, samples, feature, order, threshold, node, rules)
-            }
+            Thresholds::Midpoint => midpoints(feature, order, node, rules, gains),
+            Thresholds::Random => at(feature, order, draw(low, high, stream), node, rules),
         };
         if let Some(split) = found
-            && split.beats(best, rules.ties, node.rounding())
+            && split.beats(&best, rules.ties, node.rounding())
         {
-            *best = Some(split);
+            best = Some(split);
         }
         true
     };
@@ -94,82 +114,68 @@ pub fn best<F: Float>(
     };
     if wanted >= features && rules.ties == Ties::LowestFeature {
         for feature in 0..features {
-            consider(feature, &mut best, stream);
+            consider(feature, stream);
         }
     } else {
-        let mut untried: Vec<usize> = (0..features).collect();
+        untried.clear();
+        untried.extend(0..features);
         let mut tried = 0;
         while tried < wanted && !untried.is_empty() {
             let feature = untried.swap_remove(stream.below(untried.len()));
-            tried += usize::from(consider(feature, &mut best, stream));
+            tried += usize::from(consider(feature, stream));
         }
     }
-    let unsplit = node.target * node.target / node.weight;
-    best.filter(|split| split.gain > unsplit + node.rounding())
+    best
 }
 
-/// The best of all midpoints between consecutive distinct values.
+/// The best of all midpoints between consecutive distinct values, if it gains.
+///
+/// Gains are noted first and searched then: a running best would branch on every gain, and
+/// in the small nodes that are most of a tree half of the branches go astray.
 fn midpoints<F: Float>(
-    table: &Table<F>,
-    samples: &Samples,
     feature: usize,
-    order: &[u32],
+    order: &[Drawn<F>],
     node: &Sums,
     rules: &Rules,
+    gains: &mut Vec<f64>,
 ) -> Option<Split<F>> {
-    let column = &table.columns[feature];
     let (mut left_weight, mut left_target) = (0.0, 0.0);
-    let mut best: Option<(f64, F, F)> = None;
-    let mut best_gain = f64::NEG_INFINITY;
-    let rounding = node.rounding();
-    let mut value = column[order[0] as usize];
-    for pair in order.windows(2) {
-        let sample = pair[0] as usize;
-        let weight = samples.weights[sample];
+    let mut most = 0.0;
+    gains.resize(order.len() - 1, 0.0);
+    for (pair, gain) in order.windows(2).zip(gains.iter_mut()) {
+        let weight = pair[0].weight();
         left_weight += weight;
-        left_target += weight * table.targets[sample];
-        let next = column[pair[1] as usize];
-        let (low, high) = (value, next);
-        value = next;
-        if low >= high {
-            continue;
-        }
-        let right_weight = node.weight - left_weight;
-        if left_weight < rules.min_samples_leaf || right_weight < rules.min_samples_leaf {
-            continue;
-        }
-        let gain = proxy(left_target, left_weight, node.target - left_target, right_weight);
-        if gain > best_gain + rounding {
-            best_gain = gain;
-            best = Some((gain, low, high));
-        }
+        left_target += weight * pair[0].target;
+        let allowed = (pair[0].value < pair[1].value) & rules.large_enough(node, left_weight);
+        let found = node.gain(left_weight, left_target);
+        *gain = if allowed { found } else { 0.0 };
+        most = if *gain > most { *gain } else { most };
     }
-    best.map(|(gain, low, high)| Split { feature, threshold: between(low, high), gain })
+    if most <= node.rounding() {
+        return None;
+    }
+    let at = gains.iter().position(|&gain| gain >= most - node.rounding())?;
+    let threshold = between(order[at].value, order[at + 1].value);
+    Some(Split { feature, threshold, left: at + 1, gain: most })
 }
 
-/// The split at a given threshold, if both sides are large enough.
+/// The split at a given threshold, if it gains and both sides are large enough.
 fn at<F: Float>(
-    table: &Table<F>,
-    samples: &Samples,
     feature: usize,
-    order: &[u32],
+    order: &[Drawn<F>],
     threshold: F,
     node: &Sums,
     rules: &Rules,
 ) -> Option<Split<F>> {
-    let column = &table.columns[feature];
-    let (mut left_weight, mut left_target) = (0.0, 0.0);
-    for &sample in order.iter().take_while(|&&s| column[s as usize] < threshold) {
-        let weight = samples.weights[sample as usize];
-        left_weight += weight;
-        left_target += weight * table.targets[sample as usize];
+    let (mut left, mut left_weight, mut left_target) = (0, 0.0, 0.0);
+    for drawn in order.iter().take_while(|d| d.value < threshold) {
+        left += 1;
+        left_weight += drawn.weight();
+        left_target += drawn.weight() * drawn.target;
     }
-    let right_weight = node.weight - left_weight;
-    if left_weight < rules.min_samples_leaf || right_weight < rules.min_samples_leaf {
-        return None;
-    }
-    let gain = proxy(left_target, left_weight, node.target - left_target, right_weight);
-    Some(Split { feature, threshold, gain })
+    let gain = node.gain(left_weight, left_target);
+    let split = Split { feature, threshold, left, gain };
+    (gain > node.rounding() && rules.large_enough(node, left_weight)).then_some(split)
 }
 
 /// A threshold with `low < threshold <= high`, so that both sides are never empty.

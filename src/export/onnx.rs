@@ -1,0 +1,26 @@
+//! ONNX: a forest model for other programs' runtimes.
+
+use super::ExportError;
+use crate::forest::OnnxDescription;
+use crate::surrogate::{Fitted, Model};
+
+/// The model's forest: speed and deflection to force, in SI.
+pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
+    let Fitted::Forest(forest) = model.fitted() else {
+        let needs = format!("forest models, this is of --model {}", model.options.name());
+        return Err(ExportError::Unfit { format: "onnx", needs });
+    };
+    let (low, high) = model.range_m_per_s();
+    let text = format!(
+        "Force (N) over {} (m/s) and deflection (m) of {}; fitted between {low} and {high} m/s",
+        model.speed_kind.name(),
+        model.group
+    );
+    let description = OnnxDescription {
+        name: &model.group,
+        text: &text,
+        features: &["speed_m_per_s", "deflection_m"],
+        target: "force_N",
+    };
+    Ok(forest.forest().to_onnx(&description)?)
+}
