@@ -16,7 +16,7 @@ use crate::multibody::{
 };
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
-use crate::surrogate::{Model, ModelError, Query, predict};
+use crate::surrogate::{Model, ModelError, PredictedCurve, Query, predict};
 use crate::unit::{LengthText, MassText, SpeedKind, SpeedText, StiffnessText, TimeText, km_per_h};
 
 /// A scenario as written.
@@ -84,8 +84,24 @@ pub struct CurveTable {
     pub law: LawName,
     #[serde(default)]
     pub end: EndName,
+    /// Of a model: the rule for the maximal crush; the model's own if absent.
     #[serde(default)]
     pub max_crush: Option<MaxCrushRule>,
+    /// Of a model or curve file: the force of the recipe, or the one that moves a body of one
+    /// mass.
+    #[serde(default)]
+    pub force: ForceName,
+}
+
+/// Which force of a predicted curve drives an interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceName {
+    /// The force of the recipe (contact or body).
+    #[default]
+    Declared,
+    /// The force of the body's motion, with its rebound.
+    Body,
 }
 
 /// Force law of an interface.
@@ -462,7 +478,7 @@ fn source(
         (Some(model), None, None) => {
             from_model(&meeting.folder.join(model), table, name, mass_kg, meeting)
         }
-        (None, Some(file), None) => from_file(&meeting.folder.join(file)),
+        (None, Some(file), None) => from_file(&meeting.folder.join(file), table.force),
         (None, None, Some(database)) => {
             let case = table.case.as_deref().and_then(|c| c.split_once('/')).ok_or_else(|| {
                 invalid(format!("curve \"{name}\": write case = \"group/case\" beside database"))
@@ -487,26 +503,32 @@ fn from_model(
         Query { mass_kg: Some(mass_kg), rule: table.max_crush, ..Query::at(meeting.speed_m_per_s) };
     let failed = |source| ScenarioError::Predict { curve: name.into(), source };
     let curve = predict(&model, &query).map_err(failed)?;
+    from_curve(&curve, table.force).map_err(failed)
+}
+
+/// The force that was asked for, with the unloading that goes with it.
+fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Source, PredictError> {
+    let declared = Some(curve.unloading_stiffness_n_per_m);
+    let (envelope, unloading_n_per_m) = match force {
+        ForceName::Declared => (curve.envelope()?, declared),
+        ForceName::Body => {
+            let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
+            (curve.driving_envelope()?, rebound.or(declared))
+        }
+    };
     Ok(Source {
-        envelope: curve.envelope().map_err(failed)?,
-        unloading_n_per_m: Some(curve.unloading_stiffness_n_per_m),
+        envelope,
+        unloading_n_per_m,
         kind: Some(curve.speed_kind),
-        warnings: curve.warnings.iter().map(|w| w.message.clone()).collect(),
+        warnings: curve.warnings.iter().map(|w| w.to_string()).collect(),
     })
 }
 
-fn from_file(path: &Path) -> Result<Source, ScenarioError> {
+fn from_file(path: &Path, force: ForceName) -> Result<Source, ScenarioError> {
     if path.extension().is_some_and(|e| e == "json") {
         let curve = json::read(path)?;
-        let envelope = curve
-            .envelope()
-            .map_err(|source| json::CurveFileError::Curve { path: path.into(), source })?;
-        return Ok(Source {
-            envelope,
-            unloading_n_per_m: Some(curve.unloading_stiffness_n_per_m),
-            kind: Some(curve.speed_kind),
-            warnings: curve.warnings.iter().map(|w| w.message.clone()).collect(),
-        });
+        return Ok(from_curve(&curve, force)
+            .map_err(|source| json::CurveFileError::Curve { path: path.into(), source })?);
     }
     let envelope = csv::read(path)?;
     Ok(Source { envelope, unloading_n_per_m: None, kind: None, warnings: Vec::new() })

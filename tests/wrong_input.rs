@@ -245,7 +245,7 @@ fn files_that_are_not_ours() {
     t(
         here,
         &["export", "m.model", "--to", "onnx"],
-        "onnx takes forest models, this is of --model nearest",
+        "onnx takes models of --model forest or extra, this is of --model nearest",
     );
     t(
         here,

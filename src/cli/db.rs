@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::curve::{Case, EnergyAudit, Source};
+use crumple::curve::{Case, EnergyAudit, Parameter, Source};
 use crumple::database::Database;
 use crumple::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
@@ -67,6 +67,8 @@ pub struct CaseRow {
     mass_kg: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     other_mass_kg: Option<f64>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    parameters: BTreeMap<String, Parameter>,
     force_kind: crumple::curve::ForceKind,
     states: usize,
     #[serde(rename = "peak_force_N")]
@@ -95,6 +97,7 @@ impl CaseRow {
             speed_m_per_s: case.speed.m_per_s,
             speed_kind: case.speed.kind,
             mass_kg: case.masses.body_kg,
+            parameters: case.parameters.clone(),
             other_mass_kg: case.masses.other_kg,
             force_kind: case.force_kind,
             states: case.sampled.time_s().len(),
@@ -254,6 +257,12 @@ fn print_case(out: &mut dyn Write, group: &str, case: &Case) -> io::Result<()> {
             source.solver.as_deref().unwrap_or("unknown solver"),
             source.version.as_deref().unwrap_or("")
         )?;
+    }
+    for (name, value) in &case.parameters {
+        match value {
+            Parameter::Number(value) => writeln!(out, "parameter: {name} = {value}")?,
+            Parameter::Category(value) => writeln!(out, "parameter: {name} = {value}")?,
+        }
     }
     for note in &case.notes {
         writeln!(out, "note: {note}")?;

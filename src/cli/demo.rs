@@ -45,7 +45,7 @@ duration = "300ms"
 output_interval = "0.75ms"
 
 [curves]
-nose = { model = "lead.model" }
+nose = { model = "lead.model", force = "body" }   # what moves the car; the wall feels more
 
 [[train]]
 name = "A"

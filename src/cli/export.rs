@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::export::{self, ExportError, FORMATS, Format, Options};
 use crumple::file::write_whole;
-use crumple::surrogate::Model;
+use crumple::surrogate::{Model, PredictedCurve};
 use crumple::unit::UnitSystem;
 use serde::Serialize;
 
@@ -16,11 +16,12 @@ use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 #[command(after_help = "Examples:
   crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
   crumple export lead50.json --to csv
-  crumple export lead.model --to onnx -o lead.onnx
+  crumple export lead50.json --to lsdyna --force body -o lead50.k
+  crumple export ddtcm.model --to onnx -o ddtcm.onnx
   crumple export --list
 
-ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m; output is force_N, float,
-N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
+ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
+parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
 pub struct Args {
     /// Predicted curve (JSON made by crumple predict); for onnx a model (made by crumple train)
     #[arg(required_unless_present = "list")]
@@ -44,9 +45,20 @@ pub struct Target {
     /// Units of the target's deck, such as mm-t-s (LS-DYNA; default: SI)
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
+    /// Which force: the recipe's, or the one that moves a body of one mass
+    #[arg(long, value_enum, default_value_t = ForceChoice::Declared)]
+    force: ForceChoice,
     /// Number of the curve in the target's deck
     #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_999))]
     curve_id: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum ForceChoice {
+    /// The force of the recipe (contact or body)
+    Declared,
+    /// The force of the body's motion
+    Body,
 }
 
 fn units(text: &str) -> Result<UnitSystem, String> {
@@ -70,7 +82,16 @@ impl Target {
         found.map_err(|e: ExportError| Failure::Usage(e.to_string()))
     }
 
-    pub fn options(&self) -> Result<Options, Failure> {
+    /// The file's bytes of the force that was asked for.
+    pub fn encode(&self, format: &Format, curve: &PredictedCurve) -> Result<Vec<u8>, Failure> {
+        let options = self.options()?;
+        Ok(match self.force {
+            ForceChoice::Declared => format.encode(curve, &options)?,
+            ForceChoice::Body => format.encode(&curve.of_body_force()?, &options)?,
+        })
+    }
+
+    fn options(&self) -> Result<Options, Failure> {
         Ok(Options { units: self.units.unwrap_or(UnitSystem::SI), id: self.curve_id })
     }
 }
@@ -112,7 +133,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     }
     let bytes = match format.takes_model() {
         true => format.encode_model(&Model::read(input)?)?,
-        false => format.encode(&export::json::read(input)?, &args.target.options()?)?,
+        false => args.target.encode(format, &export::json::read(input)?)?,
     };
     match output {
         None if manners.json && format.takes_model() => {

@@ -52,7 +52,6 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         true => Some(MaxCrushRule::Spline),
         false => args.max_crush.map(MaxCrushRule::from),
     };
-    let options = args.target.options()?;
     let formats = args
         .output
         .iter()
@@ -71,7 +70,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     // All files are encoded before the first is written.
     let files = formats
         .iter()
-        .map(|format| format.encode(&curve, &options))
+        .map(|format| args.target.encode(format, &curve))
         .collect::<Result<Vec<_>, _>>()?;
     let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
     write_all_whole(&named.collect::<Vec<_>>())?;

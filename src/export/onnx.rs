@@ -6,8 +6,11 @@ use crate::surrogate::{Fitted, Model};
 
 /// The model's forest: speed and deflection to force, in SI.
 pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
-    let Fitted::Forest(forest) = model.fitted() else {
-        let needs = format!("forest models, this is of --model {}", model.options.name());
+    let (Fitted::Forest(forest) | Fitted::Extra(forest)) = model.fitted() else {
+        let needs = format!(
+            "models of --model forest or extra, this is of --model {}",
+            model.options.name()
+        );
         return Err(ExportError::Unfit { format: "onnx", needs });
     };
     let (low, high) = model.range_m_per_s();
@@ -16,11 +19,12 @@ pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
         model.speed_kind.name(),
         model.group
     );
-    let description = OnnxDescription {
-        name: &model.group,
-        text: &text,
-        features: &["speed_m_per_s", "deflection_m"],
-        target: "force_N",
-    };
+    let further: Vec<String> = model.features.iter().map(|f| f.name()).collect();
+    let features: Vec<&str> = ["speed_m_per_s", "deflection_m"]
+        .into_iter()
+        .chain(further.iter().map(String::as_str))
+        .collect();
+    let description =
+        OnnxDescription { name: &model.group, text: &text, features: &features, target: "force_N" };
     Ok(forest.forest().to_onnx(&description)?)
 }

@@ -20,6 +20,9 @@ pub struct ForestOptions {
     /// Whether each tree sees a sample drawn with replacement, or all points.
     #[serde(default = "yes")]
     pub bootstrap: bool,
+    /// Whether the leaves keep their members, for quantiles.
+    #[serde(default)]
+    pub quantiles: bool,
 }
 
 fn yes() -> bool {
@@ -37,6 +40,7 @@ impl Default for ForestOptions {
             min_samples_leaf: 1,
             table: TableKind::Grid,
             bootstrap: true,
+            quantiles: false,
         }
     }
 }
@@ -83,12 +87,26 @@ impl ForestSurrogate {
             .min_samples_leaf(options.min_samples_leaf)
             .bootstrap(options.bootstrap)
             .out_of_bag(options.bootstrap)
+            .quantiles(options.quantiles && force == Force::Declared)
             .fit(&set.table_of(options.table, force))?;
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
 
     pub fn forest(&self) -> &RegressionForest<f64> {
         &self.forest
+    }
+
+    /// Lowest and highest force in N at each deflection between which the leaves' members lie
+    /// with a weight of `level`; `None` if the leaves kept none.
+    pub fn quantiles(
+        &self,
+        at: &At<'_>,
+        deflection_m: &[f64],
+        level: f64,
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let levels = [0.5 * (1.0 - level), 0.5 * (1.0 + level)];
+        let found = self.forest.quantiles(records(at, deflection_m).view(), &levels).ok()?;
+        Some((found.column(0).to_vec(), found.column(1).to_vec()))
     }
 
     /// Checks a forest that was read from a file.
@@ -103,13 +121,7 @@ impl ForestSurrogate {
 
 impl Surrogate for ForestSurrogate {
     fn force_n(&self, _: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
-        let shape = (deflection_m.len(), 2 + at.features.len());
-        let records = Array2::from_shape_fn(shape, |(i, k)| match k {
-            0 => at.speed_m_per_s,
-            1 => deflection_m[i],
-            _ => at.features[k - 2],
-        });
-        let force: Array1<f64> = self.forest.predict(&records);
+        let force: Array1<f64> = self.forest.predict(&records(at, deflection_m));
         force.to_vec()
     }
 
@@ -129,4 +141,14 @@ impl Surrogate for ForestSurrogate {
             .map(|pair| Warning::near_split_midpoint(speed_m_per_s, pair[0], pair[1]))
             .collect()
     }
+}
+
+/// One record per deflection, with the columns of the training table.
+fn records(at: &At<'_>, deflection_m: &[f64]) -> Array2<f64> {
+    let shape = (deflection_m.len(), 2 + at.features.len());
+    Array2::from_shape_fn(shape, |(i, k)| match k {
+        0 => at.speed_m_per_s,
+        1 => deflection_m[i],
+        _ => at.features[k - 2],
+    })
 }

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::band::Band;
+use super::band::{self, Band};
 use super::curves::interpolate_held;
 use super::max_crush::{self, MaxCrushRule};
-use super::model::ModelCase;
+use super::model::{Fitted, ModelCase};
 use super::warning::Warning;
 use super::{At, Model};
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
@@ -76,6 +76,10 @@ pub struct PredictedCurve {
     /// mass.
     #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_n: Option<Vec<f64>>,
+    /// Forces between which the members of a forest's leaves lie, if the model keeps them. They
+    /// tell how the training points scatter, not how far FE lies off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forest_quantiles: Option<ForestQuantiles>,
     /// One stiffness for unloading from any deflection: at least the steepest rise of the
     /// curve, so that no deflection creates energy.
     #[serde(rename = "unloading_stiffness_N_per_m")]
@@ -94,6 +98,17 @@ pub struct PredictedCurve {
     pub model: String,
     pub warnings: Vec<Warning>,
     pub provenance: Provenance,
+}
+
+/// Quantiles of a regression forest (Meinshausen, JMLR 7, 2006) along the curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ForestQuantiles {
+    /// Share of the members' weight between the two.
+    pub level: f64,
+    #[serde(rename = "low_N")]
+    pub low_n: Vec<f64>,
+    #[serde(rename = "high_N")]
+    pub high_n: Vec<f64>,
 }
 
 /// How the bodies part after the maximal crush.
@@ -290,6 +305,12 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
         force_low_n,
         force_high_n,
         body_force_n: body.map(|b| b.force_n().to_vec()),
+        forest_quantiles: match model.fitted() {
+            Fitted::Forest(forest) | Fitted::Extra(forest) => forest
+                .quantiles(&at, envelope.deflection_m(), band::LEVEL)
+                .map(|(low_n, high_n)| ForestQuantiles { level: band::LEVEL, low_n, high_n }),
+            _ => None,
+        },
         speed_m_per_s: v,
         speed_kind: model.speed_kind,
         mass_kg: masses.body_kg,
@@ -470,6 +491,31 @@ impl PredictedCurve {
             ))),
             None => Ok(envelope),
         }
+    }
+
+    /// The same curve with the body force in place of the declared one; itself if it has no
+    /// other. What belongs to the declared force alone (band, quantiles) goes.
+    ///
+    /// # Errors
+    /// As [`envelope`](Self::envelope).
+    pub fn of_body_force(&self) -> Result<Self, PredictError> {
+        let envelope = self.driving_envelope()?;
+        if self.body_force_n.is_none() {
+            return Ok(self.clone());
+        }
+        let mut curve = self.clone();
+        let stiffness = self.rebound.map_or(0.0, |r| r.stiffness_n_per_m);
+        curve.unloading_stiffness_n_per_m = stiffness.max(envelope.max_slope());
+        curve.energy_j = envelope.work();
+        curve.force_n = envelope.force_n().to_vec();
+        (curve.force_low_n, curve.force_high_n, curve.forest_quantiles) = (None, None, None);
+        curve.body_force_n = None;
+        curve.provenance.force_kind = ForceKind::Body;
+        curve.provenance.energy_over_kinetic =
+            self.provenance.body_energy_over_kinetic.unwrap_or(self.provenance.energy_over_kinetic);
+        curve.provenance.body_energy_over_kinetic = None;
+        curve.provenance.band = None;
+        Ok(curve)
     }
 
     /// The curve that moves a body of one mass: the body force, or the only force there is.

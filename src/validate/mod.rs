@@ -86,6 +86,11 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Valid
             (options, validate(group, cases, &candidates, Some(options.name()))?)
         }
     };
+    // Only the model that is kept needs the members of its leaves.
+    let options = match options {
+        Options::Forest(forest) => Options::Forest(ForestOptions { quantiles: true, ..forest }),
+        other => other,
+    };
     let mut model = Model::fit(&set, options)?;
     if let Some(means) = validation.means.iter().find(|m| m.model == options.name()) {
         model.max_crush_rule = means.max_crush_rule;
