@@ -505,3 +505,44 @@ fn validate_prints_and_tells_what_to_run_next() {
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stderr).unwrap().contains("there is no group \"x\""));
 }
+
+/// Starts at 0, pushes, and no point stands alone as none of a training curve does.
+#[test]
+fn predicted_curves_are_physically_sound() {
+    // How far a point lies above both of its neighbours or below both, at most.
+    fn standing(force: &[f64]) -> f64 {
+        let out = |w: &[f64]| {
+            let (a, b) = (w[1] - w[0], w[1] - w[2]);
+            if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 }
+        };
+        force.windows(3).map(out).fold(0.0, f64::max)
+    }
+    for group in GROUPS {
+        let set = TrainingSet::new(group, databases().cases(group)).unwrap();
+        let (low, high) =
+            (set.cases[0].speed_m_per_s, set.cases[set.cases.len() - 1].speed_m_per_s);
+        for options in all_options() {
+            let model = Model::fit(&set, options).unwrap();
+            for i in 0..=20 {
+                let v = low + (high - low) * f64::from(i) / 20.0;
+                let curve = curve(&model, v);
+                assert_eq!((curve.deflection_m[0], curve.force_n[0]), (0.0, 0.0));
+                assert!(curve.force_n.iter().all(|&f| f >= 0.0));
+                let step = curve.deflection_m[1];
+                let measured = set.cases.iter().map(|c| {
+                    // Half steps, as the prediction's grid may lie anywhere on the curve's.
+                    let phase = |p: f64| -> f64 {
+                        let n = (c.envelope.end_m() / step) as usize;
+                        let at = |k: usize| c.envelope.force_at(step * (k as f64 + p));
+                        standing(&(0..n).map(at).collect::<Vec<_>>())
+                    };
+                    phase(0.0).max(phase(0.5))
+                });
+                let most = measured.fold(0.0, f64::max);
+                // The first point is 0 by definition; the curve begins behind it.
+                let found = standing(&curve.force_n[1..]);
+                assert!(found <= 1.1 * most, "{group} {} at {v}: {found} > {most}", options.name());
+            }
+        }
+    }
+}

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
+use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
 use crumple::validate::choose::{NextRun, next_run};
 use crumple::validate::{candidates, validate};
@@ -20,7 +21,8 @@ use super::{CommandResult, Failure, Manners, Outcome};
   crumple validate curves.h5
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
-Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE;
+Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (in
+the means by spline, monotone, energy and motion, the model's own rule marked);
 peaks are the first two of FE's curve (force and place); v and a are velocity and acceleration
 (CFC 60; in brackets not filtered) of a multi-body run of one mass, driven by the model's body
 force, sum|p-r|/sum|r| to 30 ms after FE's largest crush. The means are over inner speeds; the
@@ -175,7 +177,7 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
     if let Some(first) = validation.means.first() {
         let speeds = first.speeds;
         writeln!(out, "{group}: means over {speeds} inner speeds left out in turn")?;
-        let heading = ["model", "force", "energy", "crush", "by", "v", "a"];
+        let heading = ["model", "force", "energy", "crush", "spl/mon/ene/mot", "v", "a"];
         let rows: Vec<Vec<String>> = validation
             .means
             .iter()
@@ -211,10 +213,20 @@ fn means(means: &Means, chosen: &str) -> Vec<String> {
         percent(means.force_l1),
         percent(means.energy_error),
         percent(means.max_crush_error),
-        means.max_crush_rule.name().into(),
+        by_rule(means),
         percent(means.velocity_l1),
         acceleration(means.acceleration_l1, means.acceleration_unfiltered_l1),
     ]
+}
+
+/// The crush by every rule in per cent, the model's own marked.
+fn by_rule(means: &Means) -> String {
+    let cell = |rule: &MaxCrushRule| {
+        let mark = if *rule == means.max_crush_rule { "*" } else { "" };
+        let error = means.max_crush_errors.get(rule);
+        error.map_or("-".into(), |e| format!("{:.1}{mark}", e * 100.0))
+    };
+    MaxCrushRule::ALL.iter().map(cell).collect::<Vec<_>>().join("/")
 }
 
 /// FE's own curves over the inner speeds.

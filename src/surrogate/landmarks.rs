@@ -15,6 +15,9 @@ const STEPS: usize = 500;
 const JUMP: f64 = 3.0;
 /// if it is also more than this share of the crush: smaller ones are scatter of the search.
 const LEAST_JUMP: f64 = 0.03;
+/// A curve's start and this last share of it are no landmarks: a force that still rises when
+/// the body stops has not reached its peak.
+const END: f64 = 0.02;
 /// Slopes that a warp may have between landmarks.
 const SLOPES: (f64, f64) = (0.25, 4.0);
 
@@ -34,6 +37,19 @@ struct Trail {
     alive: bool,
 }
 
+impl Trail {
+    /// Case and deflection where it was last seen.
+    fn at(&self) -> Option<(usize, f64)> {
+        self.positions.last().copied()
+    }
+}
+
+/// The one of `among` with the smallest value, if any is finite.
+fn nearest(among: &[usize], value: impl Fn(usize) -> f64) -> Option<usize> {
+    let best = among.iter().copied().min_by(|&a, &b| value(a).total_cmp(&value(b)))?;
+    value(best).is_finite().then_some(best)
+}
+
 /// Landmarks matched over the cases, and where they jump.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Landmarks {
@@ -46,7 +62,8 @@ pub struct Landmarks {
 fn extrema(case: &CaseCurve) -> Vec<(bool, f64)> {
     let at = |i: usize| case.end_m() * i as f64 / STEPS as f64;
     let force: Vec<f64> = (0..=STEPS).map(|i| case.force_at(at(i))).collect();
-    let tops = peaks(&force, PROMINENCE * case.envelope().peak_force_n());
+    let mut tops = peaks(&force, PROMINENCE * case.envelope().peak_force_n());
+    tops.retain(|&i| i > 0 && at(i) <= (1.0 - END) * case.end_m());
     let mut found = Vec::new();
     for (k, &top) in tops.iter().enumerate() {
         if k > 0 {
@@ -73,24 +90,35 @@ impl Landmarks {
         let mut trails: Vec<Trail> = found[last].iter().map(begin).collect();
         for i in (0..last).rev() {
             let near = NEAR * cases[i].end_m().max(cases[i + 1].end_m());
-            let mut next = 0; // matched in order: none is used twice, none crosses
-            for Trail { is_peak, positions, alive } in &mut trails {
-                let Some(&(of, before)) = positions.last() else { continue };
-                if !*alive || of != i + 1 {
-                    continue;
+            let live: Vec<usize> = (0..trails.len())
+                .filter(|&k| trails[k].alive && trails[k].at().is_some_and(|(of, _)| of == i + 1))
+                .collect();
+            let distance = |k: usize, m: usize| -> f64 {
+                let (is_peak, d) = found[i][m];
+                match trails[k].at() {
+                    Some((_, before)) if trails[k].is_peak == is_peak => (d - before).abs(),
+                    _ => f64::INFINITY,
                 }
-                let candidates = found[i].iter().enumerate().skip(next);
-                let matched = candidates
-                    .filter(|(_, (p, d))| p == is_peak && (d - before).abs() <= near)
-                    .min_by(|a, b| (a.1.1 - before).abs().total_cmp(&(b.1.1 - before).abs()));
+            };
+            let all: Vec<usize> = (0..found[i].len()).collect();
+            // A pair matches if each is the other's nearest; a third one between the two has
+            // no partner then, instead of taking that of its neighbour.
+            let matches: Vec<(usize, Option<f64>)> = live
+                .iter()
+                .map(|&k| {
+                    let mutual = nearest(&all, |m| distance(k, m))
+                        .filter(|&m| nearest(&live, |k| distance(k, m)) == Some(k))
+                        .filter(|&m| distance(k, m) <= near);
+                    (k, mutual.map(|m| found[i][m].1))
+                })
+                .collect();
+            for (k, matched) in matches {
+                let before = trails[k].at().map_or(0.0, |(_, d)| d);
                 match matched {
-                    Some((k, &(_, d))) => {
-                        positions.push((i, d));
-                        next = k + 1;
-                    }
+                    Some(d) => trails[k].positions.push((i, d)),
                     // It ends before the landmark, or about there.
                     None if cases[i].end_m() < before + near => {}
-                    None => *alive = false,
+                    None => trails[k].alive = false,
                 }
             }
         }
@@ -127,7 +155,7 @@ impl Landmarks {
                 .into_iter()
                 .filter(|&(i, change)| {
                     let by = cases[i + 1].speed_m_per_s - cases[i].speed_m_per_s;
-                    change > JUMP * typical && change * by > LEAST_JUMP * cases[i].end_m()
+                    change > JUMP * typical && change * by > LEAST_JUMP * cases[i + 1].end_m()
                 })
                 .map(|(i, _)| i)
                 .collect();
@@ -225,6 +253,15 @@ mod tests {
         assert!(landmarks.jumps.is_empty());
         // The second hump is not reached at 10 m/s, and that is no reason to drop it.
         assert!(at.iter().any(|d| (d - 0.58).abs() < 5e-3), "{at:?}");
+    }
+
+    /// A hump that only the fastest case has does not take its neighbour's partner.
+    #[test]
+    fn landmarks_that_stand_alone_are_dropped() {
+        let cases = [humps(10.0, &[0.6], 1.0), humps(20.0, &[0.42, 0.66], 1.0)];
+        let at: Vec<f64> = Landmarks::of(&cases).at(&cases, 15.0).iter().map(|l| l.1).collect();
+        assert_eq!(at.len(), 1);
+        assert!((at[0] - 0.63).abs() < 3e-3, "{at:?}");
     }
 
     #[test]

@@ -80,6 +80,8 @@ pub struct Means {
     /// By the model's rule.
     pub max_crush_error: f64,
     pub max_crush_rule: MaxCrushRule,
+    /// By every rule that has an answer at all inner speeds.
+    pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
     pub velocity_l1: f64,
     pub acceleration_l1: f64,
     pub acceleration_unfiltered_l1: f64,

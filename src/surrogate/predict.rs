@@ -23,9 +23,10 @@ const SAME_MASS: f64 = 1e-3;
 const REACH: f64 = 1.5;
 /// Bounds of an energy correction: beyond them level or crush is wrong, not the scale.
 const CORRECTION: (f64, f64) = (0.8, 1.25);
-/// A point stands alone if its force leaves the line between its neighbours by more than
-/// this factor of what any training curve does.
+/// A point stands alone if its force lies above both neighbours, or below both, by more than
+/// this factor of what any training curve shows.
 const SPIKE: f64 = 1.05;
+const ROUNDS: usize = 100;
 
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -351,8 +352,11 @@ fn sound(
     let step = deflection_m[1] - deflection_m[0];
     let (declared, body) = model.curves();
     let curves = if of_body && !body.is_empty() { body } else { declared };
-    // How far a point may lie off the middle of its neighbours.
-    let stands_out = |before: f64, at: f64, after: f64| (at - 0.5 * (before + after)).abs();
+    // How far a point lies above both of its neighbours, or below both.
+    let stands_out = |before: f64, at: f64, after: f64| {
+        let (a, b) = (at - before, at - after);
+        if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 }
+    };
     let mut most = 0.0_f64;
     for curve in curves {
         let mut d = step;
@@ -362,12 +366,18 @@ fn sound(
             d += 0.5 * step;
         }
     }
-    if most > 0.0 {
+    // Taking one point back may leave its neighbour standing: a few rounds settle it.
+    for _ in 0..ROUNDS {
+        let mut settled = true;
         for i in 2..force_n.len() - 1 {
             let (before, after) = (force_n[i - 1], force_n[i + 1]);
-            if stands_out(before, force_n[i], after) > SPIKE * most {
+            if most > 0.0 && stands_out(before, force_n[i], after) > SPIKE * most {
                 force_n[i] = 0.5 * (before + after);
+                settled = false;
             }
+        }
+        if settled {
+            break;
         }
     }
     force_n[0] = 0.0;

@@ -129,6 +129,7 @@ mod tests {
             energy_error: 0.0,
             max_crush_error: 0.0,
             max_crush_rule: MaxCrushRule::Energy,
+            max_crush_errors: Default::default(),
             acceleration_l1: 0.0,
             acceleration_unfiltered_l1: 0.0,
         }

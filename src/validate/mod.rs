@@ -378,13 +378,16 @@ impl Trial {
     }
 }
 
-/// The rule with the smallest mean error of the crush over the inner speeds; the reference
-/// method keeps its spline.
+/// The rule with the smallest mean error of crush and energy over the inner speeds, as the
+/// crush decides both; the reference method keeps its spline.
 fn best_rule(options: &Options, trials: &[&Trial]) -> Option<MaxCrushRule> {
     let mean = |rule: &MaxCrushRule| -> Option<f64> {
         let inner = trials.iter().filter(|t| t.inner);
         let errors: Vec<f64> = inner
-            .map(|t| t.predictions.get(rule).map(|j| j.max_crush_error.abs()))
+            .map(|t| {
+                let judged = t.predictions.get(rule)?;
+                Some(judged.max_crush_error.abs() + judged.energy_error.abs())
+            })
             .collect::<Option<_>>()?;
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
     };
@@ -437,6 +440,14 @@ fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
         energy_error: over(|r| r.energy_error),
         max_crush_error: over(|r| r.max_crush_error),
         max_crush_rule: rule,
+        max_crush_errors: MaxCrushRule::ALL
+            .into_iter()
+            .filter_map(|rule| {
+                let errors: Option<Vec<f64>> =
+                    inner.iter().map(|r| Some(r.max_crush_errors.get(&rule)?.abs())).collect();
+                Some((rule, errors?.iter().sum::<f64>() / inner.len() as f64))
+            })
+            .collect(),
         velocity_l1: over(|r| r.velocity_l1),
         acceleration_l1: over(|r| r.acceleration_l1),
         acceleration_unfiltered_l1: over(|r| r.acceleration_unfiltered_l1),
