@@ -317,6 +317,14 @@ impl Model {
     /// [`ModelError`] with the place in the file where it is no model of ours.
     pub fn read(path: &Path) -> Result<Self, ModelError> {
         let text = fs::read(path).map_err(|source| ModelError::Io { path: path.into(), source })?;
+        Self::parse(path, &text)
+    }
+
+    /// Parses and checks the bytes of a model file; `path` is for messages.
+    ///
+    /// # Errors
+    /// As of [`read`](Self::read).
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self, ModelError> {
         let no_model = |e: serde_json::Error| ModelError::NotAModel {
             path: path.into(),
             line: e.line(),
@@ -328,7 +336,7 @@ impl Model {
             format: String,
             version: u32,
         }
-        let head: Head = serde_json::from_slice(&text).map_err(no_model)?;
+        let head: Head = serde_json::from_slice(text).map_err(no_model)?;
         if head.format != FORMAT {
             let detail = format!("its format is \"{}\"", head.format);
             return Err(ModelError::NotAModel { path: path.into(), line: 1, column: 1, detail });
@@ -337,8 +345,8 @@ impl Model {
             return Err(ModelError::Version { path: path.into(), found: head.version });
         }
         let mut model: Self = match head.version {
-            1 => from_version_1(&text).map_err(no_model)?,
-            _ => serde_json::from_slice(&text).map_err(no_model)?,
+            1 => from_version_1(text).map_err(no_model)?,
+            _ => serde_json::from_slice(text).map_err(no_model)?,
         };
         model.curves = Curves::of(&model.cases)
             .map_err(|e| ModelError::Damaged { path: path.into(), detail: e.to_string() })?;

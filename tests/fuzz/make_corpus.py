@@ -6,6 +6,7 @@ Every file is as the solver (or its converter l2a) writes it, so that mutations 
 where the readers' branches are. Layouts: fixed columns as in the readers' own constants.
 """
 
+import json
 import pathlib
 import struct
 import sys
@@ -345,6 +346,21 @@ gap = "0mm"
 """
 
 
+def model(name, fitted):
+    """A model file of two cases, as crumple train writes it."""
+    def case(speed):
+        deflection = [0.0, 0.1, 0.2, 0.5 + speed / 100]
+        return {"name": str(speed), "speed_m_per_s": speed, "max_deflection_m": deflection[-1],
+                "truncated": False, "unloading_stiffness_N_per_m": 1e8, "rebound_speed_m_per_s": 1.0,
+                "deflection_m": deflection, "force_N": [0.0, 2e6, 1e6, 3e6],
+                "body_force_N": [0.0, 1.9e6, 1e6, 2.9e6], "closing_speed_m_per_s": [speed, 6.0, 4.0, 0.0]}
+    return json.dumps({
+        "format": "crumple model", "version": 2, "written_by": "crumple", "group": "g", "speed_kind": "wall",
+        "force_kind": "contact", "mass_kg": 24e3, "other_mass_kg": None, "training_hash": "0",
+        "cases": [case(8.0), case(12.0)], "options": {"model": name}, "max_crush_rule": "motion",
+        "fitted": fitted, "fitted_body": fitted}).encode()
+
+
 def main(folder):
     text = [nodout, rcforc, rwforc, secforc, glstat, matsum, spcforc, bndout, nodfor, sleout, swforc,
             abstat, curvout, deforc, jntforc, rbdout, elout, eloutdet]
@@ -355,6 +371,9 @@ def main(folder):
     files["deck"] = [DECK.encode(), DECK.replace("*KEYWORD", "*KEYWORD LONG=Y").encode()]
     files["study"] = [STUDY.encode(), STUDY.replace("pair", "wall").replace("half_model = true\n", "").encode()]
     files["scenario"] = [SCENARIO.encode(), SCENARIO.replace("[wall]", "").encode()]
+    files["model"] = [model(name, fitted) for name, fitted in (
+        ("nearest", "nearest"), ("linear", "linear"), ("registered", "registered"), ("gp", "gp"),
+        ("rate", {"rate": {"sensitivity_sqrt_s_per_m": 0.03}}))]
     for target, contents in files.items():
         corpus = pathlib.Path(folder) / target
         corpus.mkdir(parents=True, exist_ok=True)
