@@ -6,17 +6,14 @@ use serde::Serialize;
 
 use crate::curve::rating::l1_ratio;
 use crate::curve::{Case, Envelope, EnvelopeError};
-use crate::dataset::{DatasetError, TrainingCase, TrainingSet, nearest};
+use crate::dataset::{DatasetError, TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
-use crate::surrogate::{Model, ModelError, Options, Query, predict};
+use crate::surrogate::{Model, ModelError, Options, predict};
 use crate::unit::{SpeedKind, km_per_h};
 use crate::validate::motion::{Driver, MotionError, Reference};
-use crate::validate::{self, Choice, ValidateError};
-
-/// A speed names a case if it is within this share of the case's.
-const SAME_SPEED: f64 = 1e-3;
+use crate::validate::{self, Choice, ValidateError, query_of};
 
 /// Errors of every method at one left-out speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -68,6 +65,8 @@ pub enum CompareError {
     NoCase { group: String, asked: String, known: String },
     #[error("leaving out one of {cases} cases leaves too few: a comparison needs at least 3")]
     TooFew { cases: usize },
+    #[error("case \"{case}\" ended while loading: it is no reference; compare at another speed")]
+    Truncated { case: String },
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     #[error(transparent)]
@@ -97,7 +96,7 @@ pub fn compare(
     seed: u64,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
-    let near = |v: f64| (v / speed_m_per_s - 1.0).abs() <= SAME_SPEED;
+    let near = |v: f64| is_same_speed(v, speed_m_per_s);
     let index = set.cases.iter().position(|c| near(c.speed_m_per_s)).ok_or_else(|| {
         let known: Vec<String> = set.cases.iter().map(|c| km_per_h(c.speed_m_per_s)).collect();
         CompareError::NoCase {
@@ -112,7 +111,14 @@ pub fn compare(
     let own = &set.cases[index];
     let case = cases.iter().find(|c| c.name == own.name).ok_or(DatasetError::Empty)?;
     let reference = Reference::of(case)?;
-    let rest = set.without(index);
+    if own.truncated {
+        return Err(CompareError::Truncated { case: own.name.clone() });
+    }
+    let mut rest = set.clone();
+    rest.cases.retain(|c| !near(c.speed_m_per_s));
+    if rest.cases.len() < 2 {
+        return Err(CompareError::TooFew { cases: set.cases.len() });
+    }
     let speed = case.speed.m_per_s;
     let with = |method, curve, candidate| row(method, curve, candidate, &reference);
     let mut rows = Vec::new();
@@ -128,8 +134,13 @@ pub fn compare(
     let options = Options::Forest(ForestOptions { seed, ..ForestOptions::paper() });
     let start = Instant::now();
     let model = Model::fit(&rest, options)?;
-    let curve = predict(&model, &Query::at(speed).with_rule(MaxCrushRule::Spline))?;
+    let rule = match model.features.is_empty() {
+        true => MaxCrushRule::Spline,
+        false => MaxCrushRule::Motion,
+    };
+    let curve = predict(&model, &query_of(case, &model).with_rule(rule))?;
     let ddtcm = Candidate {
+        declared: curve.envelope()?,
         driver: Driver {
             envelope: curve.envelope()?,
             stiffness_n_per_m: Some(curve.unloading_stiffness_n_per_m),
@@ -139,20 +150,18 @@ pub fn compare(
     };
     rows.push(with("ddtcm", format!("forest on {} speeds", rest.cases.len()), ddtcm)?);
 
-    let others: Vec<Case> = cases.iter().filter(|c| c.name != own.name).cloned().collect();
+    let others: Vec<Case> = cases.iter().filter(|c| !near(c.speed.m_per_s)).cloned().collect();
     let start = Instant::now();
     let model = validate::train(group, &others, Choice::Auto { seed })?;
-    let curve = predict(&model, &Query::at(speed))?;
+    let curve = predict(&model, &query_of(case, &model))?;
     let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
     let best = Candidate {
         driver: Driver {
             envelope: curve.driving_envelope()?,
             stiffness_n_per_m: rebound.or(Some(curve.unloading_stiffness_n_per_m)),
         },
-        truth: match curve.body_force_n {
-            Some(_) => &own.motion.force,
-            None => &own.envelope,
-        },
+        declared: curve.envelope()?,
+        truth: &own.envelope,
         time_s: start.elapsed().as_secs_f64(),
     };
     rows.push(with("best", format!("{} on {} speeds", curve.model, rest.cases.len()), best)?);
@@ -174,6 +183,8 @@ pub fn compare(
 /// A method's curve, and FE's own of the same kind of force.
 struct Candidate<'a> {
     driver: Driver,
+    /// What is held against FE's curve of the same kind of force.
+    declared: Envelope,
     truth: &'a Envelope,
     time_s: f64,
 }
@@ -189,6 +200,7 @@ impl<'a> Candidate<'a> {
                 from.motion.rebound_speed_m_per_s,
                 from.unloading_stiffness_n_per_m,
             ),
+            declared: envelope.clone(),
             truth: if is_body { &own.motion.force } else { &own.envelope },
             time_s: 0.0,
         }
@@ -203,7 +215,7 @@ fn row(
 ) -> Result<Row, CompareError> {
     let truth = candidate.truth;
     let along = truth.deflection_m();
-    let force: Vec<f64> = along.iter().map(|&d| candidate.driver.envelope.force_at(d)).collect();
+    let force: Vec<f64> = along.iter().map(|&d| candidate.declared.force_at(d)).collect();
     let force_l1 = l1_ratio(truth.force_n(), &force);
     let start = Instant::now();
     let run = reference.run(&candidate.driver)?;

@@ -161,7 +161,7 @@ pub fn feature_values(
 fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
     let mut parameters = case.parameters.clone();
     parameters.insert(MASS.into(), Parameter::Number(case.masses.body_kg));
-    if let Some(other) = case.masses.other_kg.filter(|&m| m != case.masses.body_kg) {
+    if let Some(other) = case.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
     parameters
@@ -229,6 +229,14 @@ pub enum TableKind {
 /// third of the way to the first peak.
 pub const GRID_M: f64 = 2e-3;
 
+/// Speeds within this share of each other count as one.
+const SAME_SPEED: f64 = 1e-3;
+
+/// Whether two speeds count as one.
+pub fn is_same_speed(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= SAME_SPEED
+}
+
 /// Even deflections from 0 to `end_m`, no coarser than [`GRID_M`], at least `fewest` steps.
 pub fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
     let steps = ((end_m / GRID_M).ceil().clamp(1.0, 1e6) as usize).max(fewest);
@@ -274,7 +282,7 @@ impl TrainingSet {
             .collect::<Result<Vec<_>, _>>()?;
         // By values, so that names and the order of the cases change nothing.
         training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
-        if let Some(pair) = training.windows(2).find(|w| w[0].key() == w[1].key()) {
+        if let Some(pair) = training.windows(2).find(|w| w[0].is_like(&w[1])) {
             let (parameters, hint) = match features.is_empty() {
                 true => ("", ", or tell them apart by parameters = { … } in the manifest"),
                 false => (" and parameters", ""),
@@ -295,14 +303,6 @@ impl TrainingSet {
             features,
             cases: training,
         })
-    }
-
-    /// The set without its `i`-th case. What the others share stays a feature, so that
-    /// queries for the case left out can be asked.
-    pub fn without(&self, i: usize) -> Self {
-        let mut rest = self.clone();
-        rest.cases.remove(i);
-        rest
     }
 
     /// Hash over the fingerprints of the cases.
@@ -377,6 +377,12 @@ impl TrainingCase {
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
             fingerprint: case.fingerprint.clone(),
         })
+    }
+
+    /// Whether two cases differ in nothing that a model could see: their speeds are within
+    /// 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
+    fn is_like(&self, other: &Self) -> bool {
+        self.features == other.features && is_same_speed(self.speed_m_per_s, other.speed_m_per_s)
     }
 
     /// What cases are ordered by.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::curve::Envelope;
+use crate::curve::{Envelope, Parameter};
 use crate::database::{Database, DatabaseError};
 use crate::export::{csv, json};
 use crate::manifest::{self, ManifestError};
@@ -87,6 +87,9 @@ pub struct CurveTable {
     /// Of a model: the rule for the maximal crush; the model's own if absent.
     #[serde(default)]
     pub max_crush: Option<MaxCrushRule>,
+    /// Of a model: values of its further parameters.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
     /// Of a model or curve file: the force of the recipe, or the one that moves a body of one
     /// mass.
     #[serde(default)]
@@ -499,8 +502,12 @@ fn from_model(
     meeting: &Meeting<'_>,
 ) -> Result<Source, ScenarioError> {
     let model = Model::read(path)?;
-    let query =
-        Query { mass_kg: Some(mass_kg), rule: table.max_crush, ..Query::at(meeting.speed_m_per_s) };
+    let query = Query {
+        mass_kg: Some(mass_kg),
+        rule: table.max_crush,
+        parameters: table.parameters.clone(),
+        ..Query::at(meeting.speed_m_per_s)
+    };
     let failed = |source| ScenarioError::Predict { curve: name.into(), source };
     let curve = predict(&model, &query).map_err(failed)?;
     from_curve(&curve, table.force).map_err(failed)
@@ -508,14 +515,13 @@ fn from_model(
 
 /// The force that was asked for, with the unloading that goes with it.
 fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Source, PredictError> {
-    let declared = Some(curve.unloading_stiffness_n_per_m);
-    let (envelope, unloading_n_per_m) = match force {
-        ForceName::Declared => (curve.envelope()?, declared),
-        ForceName::Body => {
-            let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
-            (curve.driving_envelope()?, rebound.or(declared))
-        }
+    let envelope = match force {
+        ForceName::Declared => curve.envelope()?,
+        ForceName::Body => curve.driving_envelope()?,
     };
+    // The force law keeps to its bounds by itself; the one constant is for other tools.
+    let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
+    let unloading_n_per_m = rebound.or(Some(curve.unloading_stiffness_n_per_m));
     Ok(Source {
         envelope,
         unloading_n_per_m,

@@ -4,7 +4,7 @@ mod common;
 
 use std::collections::BTreeMap;
 
-use common::{build_fixture, crumple_in, crumple_ok, root};
+use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, root};
 use crumple::curve::energy::audit;
 use crumple::curve::loading::unloading_stiffness;
 use crumple::curve::{Case, Curve, ForceKind, Masses, Parameter};
@@ -108,7 +108,8 @@ fn curve(model: &Model, v: f64) -> PredictedCurve {
     predict(model, &Query::at(v)).unwrap()
 }
 
-/// What issue and README promise of the bundled FE runs, with the real candidates.
+/// The choice on the bundled FE runs, with the real candidates. The README's table, which a test
+/// holds against the program, has the numbers.
 #[test]
 fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
     for group in GROUPS {
@@ -298,6 +299,16 @@ fn several_parameters() {
         assert!((tilted / wall - 0.8).abs() < 0.06, "{}: {}", options.name(), tilted / wall);
         let error = predict(&model, &Query::at(12.0)).unwrap_err().to_string();
         assert_eq!(error, "the model needs angle_deg as a finite number: give it with the query");
+        let mut more = ask(0.0, "wall");
+        more.parameters.insert("bogus".into(), Parameter::Number(1.0));
+        let error = predict(&model, &more).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "the model has no parameter \"bogus\": its parameters are angle_deg, obstacle"
+        );
+        let far = predict(&model, &ask(30.0, "wall")).unwrap();
+        let says = "angle_deg = 30 lies outside the training cases' 0 to 10";
+        assert!(far.warnings.iter().any(|w| w.message.starts_with(says)));
         let error = predict(&model, &ask(0.0, "deer")).unwrap_err().to_string();
         assert_eq!(error, "the model needs obstacle, one of pole, wall: give it with the query");
         let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
@@ -331,6 +342,9 @@ fn cases_that_are_no_training_set() {
     t(&[], "the group is empty");
     let two = || vec![case("a", 8.0, 24e3, &law), case("b", 8.0, 24e3, &law)];
     t(&two(), "cases \"a\" and \"b\" have the same speed 28.8 km/h: keep one of them, or tell");
+    let mut near = two();
+    near[1].speed.m_per_s *= 1.0005;
+    t(&near, "have the same speed");
     let mut same = two();
     let angle = || BTreeMap::from([("angle_deg".to_string(), Parameter::Number(3.0))]);
     same[0].parameters = angle();
@@ -372,6 +386,47 @@ fn energy_correction_has_bounds() {
     // The crush by speed is that of 24 t: twice the mass is not a matter of scale.
     let error = predict(&model, &ask(48e3)).unwrap_err().to_string();
     assert!(error.contains("outside 0.8 to 1.25"), "{error}");
+}
+
+/// The other body of a pair may weigh as much as the first, or not.
+#[test]
+fn pairs_of_unequal_masses() {
+    let cases: Vec<Case> = [(8.0, 24e3), (10.0, 30e3), (12.0, 24e3), (14.0, 30e3)]
+        .map(|(v, other_kg)| {
+            let masses = Masses { body_kg: 24e3, other_kg: Some(other_kg) };
+            let mut pair = case(&format!("{v}"), v, masses.effective_kg(), &law);
+            pair.masses = masses;
+            pair.speed.kind = SpeedKind::Closing;
+            pair
+        })
+        .to_vec();
+    let model = train("made", &cases, Choice::Options(Options::Gp)).unwrap();
+    assert_eq!(model.features[0].name(), "other_mass_kg");
+    let ask = |other: f64| Query {
+        parameters: BTreeMap::from([("other_mass_kg".into(), Parameter::Number(other))]),
+        ..Query::at(11.0)
+    };
+    let crush = |other| predict(&model, &ask(other)).unwrap().max_deflection_m;
+    assert!(crush(24e3) < crush(30e3));
+}
+
+/// Speeds that no car has ever had: an answer with warnings or an error, soon.
+#[test]
+fn absurd_speeds_and_masses_end() {
+    for options in all_options() {
+        let model = train("made", &family(&[8.0, 12.0, 16.0]), Choice::Options(options)).unwrap();
+        for (v, mass_kg) in [(1e-7, 24e3), (1e7, 24e3), (10.0, 1e-9), (10.0, 1e12)] {
+            let query = Query { mass_kg: Some(mass_kg), ..Query::at(v) };
+            if let Ok(curve) = predict(&model, &query) {
+                assert!(!curve.warnings.is_empty());
+                assert!(curve.force_n.iter().all(|f| f.is_finite() && *f >= 0.0));
+            }
+        }
+        // Crush over speed is that of the trained mass: not for a quarter of it.
+        let light = Query { mass_kg: Some(6e3), ..Query::at(12.0) };
+        let energy = predict(&model, &light).unwrap().provenance.body_energy_over_kinetic;
+        assert!((energy.unwrap() - 1.0).abs() < 0.02, "{}: {energy:?}", options.name());
+    }
 }
 
 /// Another mass: the rate model's crush follows the motion.
@@ -425,6 +480,12 @@ fn model_files_of_version_1_are_read() {
     let curve = predict(&model, &Query::at(11.0)).unwrap();
     assert_eq!(curve.force_n[400], 2e6);
     assert!(curve.body_force_n.is_none());
+    for broken in [serde_json::json!([5]), serde_json::json!([{}]), serde_json::json!([[1]])] {
+        let mut json: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        json["fitted"]["nearest"]["curves"] = broken;
+        let bytes = serde_json::to_vec(&json).unwrap();
+        assert!(Model::parse(&path, &bytes).is_err());
+    }
 }
 
 /// Parameters stand in the manifest, the database, the model and the prediction.
@@ -465,7 +526,9 @@ fn parameters_through_the_commands() {
     assert_eq!(refused("angle_deg").0, Some(2));
     let (code, message) = refused("height_m=1");
     assert_eq!(code, Some(1));
-    assert!(message.contains("the model needs angle_deg as a finite number"), "{message}");
+    assert!(message.contains("has no parameter \"height_m\""), "{message}");
+    let without = crumple_fails(here, 1, &["predict", "m", "--speed", "50km/h"]);
+    assert!(without.contains("the model needs angle_deg as a finite number"), "{without}");
     let train = ["train", "more.h5", "--group", "lead-car-wall", "--model", "linear", "-o", "m2"];
     let output = crumple_in(here, &train);
     assert_eq!(output.status.code(), Some(1));
@@ -499,6 +562,14 @@ fn validate_prints_and_tells_what_to_run_next() {
         assert_eq!(row["inner"], (7.0..19.9).contains(&v), "{v}");
         assert_eq!(row["max_crush_errors"].as_object().unwrap().len(), 4);
     }
+    let nested: Value = serde_json::from_str(&crumple_ok(
+        here,
+        &["validate", "curves.h5", "--group", "lead-car-wall", "--nested", "--json"],
+    ))
+    .unwrap();
+    let rows = nested["groups"][0]["rows"].as_array().unwrap();
+    let auto = rows.iter().filter(|r| r["model"] == "auto");
+    assert_eq!(auto.map(|r| r["inner"].as_bool().unwrap()).collect::<Vec<_>>(), [true; 3]);
     let next = group["next_run"]["speed_m_per_s"].as_f64().unwrap();
     assert!((25.0 / 3.6..20.0).contains(&next));
     let output = crumple_in(here, &["validate", "curves.h5", "--group", "x"]);

@@ -9,7 +9,7 @@ use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Valida
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
 use crumple::validate::choose::{NextRun, next_run};
-use crumple::validate::{candidates, validate};
+use crumple::validate::{add_nested, candidates, validate};
 use serde::Serialize;
 
 use super::output;
@@ -27,7 +27,7 @@ peaks are the first two of FE's curve (force and place); v and a are velocity an
 (CFC 60; in brackets not filtered) of a multi-body run of one mass, driven by the model's body
 force, sum|p-r|/sum|r| to 30 ms after FE's largest crush. The means are over inner speeds; the
 ends of the range are extrapolation and stand apart. forest is the reference method (DDTCM),
-nearest is FDRM.")]
+nearest is FDRM. --nested adds auto: model and rule chosen without the speed that is left out.")]
 pub struct Args {
     /// Curve database
     database: PathBuf,
@@ -37,6 +37,9 @@ pub struct Args {
     /// Propose the speed whose FE run would help most
     #[arg(long)]
     next: bool,
+    /// Also leave speeds out of the choice itself: the honest error of auto (takes longer)
+    #[arg(long)]
+    nested: bool,
     /// Seed of the forests
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -70,9 +73,20 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let mut document = Document { groups: Vec::new() };
     for group in groups {
         let cases = database.group(&args.database, group)?;
-        let validation = validate(group, cases, &candidates(args.seed), None)?;
+        let mut validation = validate(group, cases, &candidates(args.seed), None)?;
+        if args.nested {
+            add_nested(&mut validation, cases, args.seed)?;
+        }
         let next_run = match args.next {
-            true => next_run(&TrainingSet::new(group, cases)?, &validation),
+            true => {
+                let next = next_run(&TrainingSet::new(group, cases)?, &validation);
+                if next.is_none() {
+                    manners.warn(&format!(
+                        "{group}: there is no gap to run in: a second speed, far from the first, comes first"
+                    ));
+                }
+                next
+            }
             false => None,
         };
         for note in &validation.notes {
@@ -128,10 +142,12 @@ fn print_group(out: &mut dyn Write, group: &GroupDocument) -> io::Result<()> {
             output::table(out, &heading, &rows)?;
         }
     }
-    if let Some(next) = &group.next_run {
-        writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+    match &group.next_run {
+        Some(next) => {
+            writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)
+        }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn row(row: &LeftOut, chosen: &str) -> Vec<String> {

@@ -29,10 +29,11 @@ pub enum EnvelopeEnd {
 /// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
 /// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
 /// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
-/// one stiff line for both would lose most of the rebound. Therefore
-/// `D(δ) = min(A(δ) − F_e²/2k_s, max over s ≤ δ of A(s) − F_e(s)²/2k)`, not below 0, and the
-/// line at δ has the stiffness `F_e²/2(A − D)`, which lies between `k` and `k_s`. With
-/// `k ≥ k_s` this is the law of one stiffness.
+/// one stiff line for both would lose most of the rebound. Therefore the line at δ stores
+/// `U = max(A − D, S(k_s))` with `S(k) = min(F_e²/2k, F_e δ/2)` and
+/// `D = max over s ≤ δ of A(s) − S(k)(s)`, not below 0; its stiffness is `F_e²/2U`. The bound
+/// `F_e δ/2` keeps the line from reaching zero deflection with a force left, whose energy would
+/// be lost. With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceLaw {
     envelope: Envelope,
@@ -41,8 +42,13 @@ pub struct ForceLaw {
     end_slope_n_per_m: f64,
     /// Steepest rise of the envelope, or the unloading stiffness if that is more.
     steepest_n_per_m: f64,
-    /// `max over s ≤ δ of A(s) − F_e(s)²/2k` at each point of the envelope, in J.
+    /// `D` at each point of the envelope, in J.
     dissipated_j: Vec<f64>,
+}
+
+/// `S`: energy that a line of this stiffness, or the stiffer one to (0, 0), can store.
+fn storable(deflection_m: f64, force_n: f64, stiffness_n_per_m: f64) -> f64 {
+    0.5 * force_n * (force_n / stiffness_n_per_m).min(deflection_m)
 }
 
 impl ForceLaw {
@@ -60,7 +66,7 @@ impl ForceLaw {
             steepest_n_per_m = steepest_n_per_m.max(stiffness_n_per_m);
             let mut most = 0.0_f64;
             for (&d, &f) in d.iter().zip(f) {
-                most = most.max(envelope.work_to(d) - 0.5 * f * f / stiffness_n_per_m);
+                most = most.max(envelope.work_to(d) - storable(d, f, stiffness_n_per_m));
                 dissipated_j.push(most);
             }
         }
@@ -92,16 +98,13 @@ impl ForceLaw {
     /// Force on the envelope at δ and the energy stored there, in N and J.
     fn stored_at(&self, deflection_m: f64, stiffness_n_per_m: f64) -> (f64, f64) {
         let force = self.envelope_n(deflection_m);
-        let softest = 0.5 * force * force / stiffness_n_per_m;
-        if stiffness_n_per_m >= self.steepest_n_per_m {
-            return (force, softest);
-        }
         let work = self.envelope_work_j(deflection_m);
         let before = self.envelope.deflection_m().partition_point(|&d| d <= deflection_m);
-        // Within a segment A − F²/2k is monotone, so its ends and δ decide.
-        let dissipated = self.dissipated_j[before.max(1) - 1].max(work - softest);
-        let stiffest = 0.5 * force * force / self.steepest_n_per_m;
-        (force, (work - dissipated).max(stiffest))
+        // Within a segment A − S is monotone for either bound, so its ends and δ decide.
+        let dissipated = self.dissipated_j[before.max(1) - 1]
+            .max(work - storable(deflection_m, force, stiffness_n_per_m));
+        let least = storable(deflection_m, force, self.steepest_n_per_m);
+        (force, (work - dissipated).max(least))
     }
 
     fn steepest_fall(&self) -> f64 {
@@ -214,6 +217,13 @@ mod tests {
             let line = with(300e6).energies_j(largest, largest);
             assert!(stored >= line.0 - 1e-9 && dissipated <= line.1 + 1e-9);
             before = dissipated;
+            // What is stored comes back on the way to zero deflection, all of it.
+            let steps = 20_000;
+            let at = |k: i32| largest * f64::from(k) / f64::from(steps);
+            let force = |k: i32| soft.force_n(at(k).max(1e-15), largest);
+            let work: f64 =
+                (0..steps).map(|k| 0.5 * (force(k) + force(k + 1)) * (at(k + 1) - at(k))).sum();
+            assert!((work - stored).abs() < 1e-3 * stored, "{work} of {stored} at {largest} m");
         }
     }
 

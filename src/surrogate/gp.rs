@@ -87,6 +87,9 @@ fn at_query(cases: &[CaseCurve], curves: &Array2<f64>, at: &At<'_>) -> Option<Ar
     let (variances, vectors) = centred.dot(&centred.t()).eigh_into().ok()?;
     let largest = variances.iter().copied().fold(0.0, f64::max);
     let inputs = standardised(cases, at);
+    if !inputs.0.iter().chain(&inputs.1).all(|x| x.is_finite()) {
+        return None;
+    }
     let mut force = mean;
     for (variance, vector) in variances.iter().zip(vectors.axis_iter(Axis(1))) {
         if *variance <= LEAST_VARIANCE * largest || largest <= 0.0 {

@@ -27,6 +27,9 @@ const FORMAT: &str = "crumple model";
 const VERSION: u32 = 2;
 /// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
 const STEPS: usize = 200;
+/// Forces and bands beyond these are damage, not measurement.
+const LARGEST_N: f64 = 1e15;
+const WIDEST: f64 = 1e6;
 /// A nearest training speed further away than this share of the speed needs a word.
 const FAR: f64 = 0.25;
 
@@ -94,6 +97,18 @@ impl Fitted {
             Options::Forest(options) => Self::Forest(ForestSurrogate::fit(set, force, options)?),
             Options::Gp => Self::Gp,
         })
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Nearest => "nearest",
+            Self::Linear => "linear",
+            Self::Rate(_) => "rate",
+            Self::Registered => "registered",
+            Self::Extra(_) => "extra",
+            Self::Forest(_) => "forest",
+            Self::Gp => "gp",
+        }
     }
 
     fn surrogate(&self) -> &dyn Surrogate {
@@ -164,6 +179,25 @@ impl ModelCase {
             closing_speed_m_per_s: over(&|d| case.motion.closing_speed.force_at(d).max(0.0)),
             deflection_m,
         }
+    }
+
+    /// What a fit guarantees of a case.
+    fn check(&self) -> Result<(), String> {
+        let positive = |value: Option<f64>| value.is_none_or(|v| v > 0.0 && v.is_finite());
+        if !positive(self.unloading_stiffness_n_per_m) || !positive(self.rebound_speed_m_per_s) {
+            return Err("its unloading stiffness or rebound speed is not above 0".into());
+        }
+        let forces = self.force_n.iter().chain(&self.body_force_n);
+        if let Some(force) = forces.into_iter().find(|f| f.abs() > LARGEST_N) {
+            return Err(format!("a force of {force} N is beyond any vehicle's"));
+        }
+        if let Some(end) = self.deflection_m.last()
+            && (end / self.max_deflection_m - 1.0).abs() > 1e-9
+        {
+            let max = self.max_deflection_m;
+            return Err(format!("its curve ends at {end} m, its maximal deflection is {max} m"));
+        }
+        Ok(())
     }
 
     fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, EnvelopeError> {
@@ -239,11 +273,11 @@ pub enum ModelError {
     #[error(transparent)]
     Forest(#[from] ForestError),
     #[error(
-        "a {model} model needs at least 2 curves, the group has 1: only --model nearest can use a single curve, as it is"
+        "model {model} needs at least 2 curves, the group has 1: only --model nearest can use a single curve, as it is"
     )]
     OneCurve { model: &'static str },
     #[error(
-        "a {model} model sees only the speed, but the cases also differ in {features}: use --model forest, extra or gp, or keep cases that differ in speed alone"
+        "model {model} sees only the speed, but the cases also differ in {features}: use --model forest, extra or gp, or keep cases that differ in speed alone"
     )]
     OneParameter { model: &'static str, features: String },
     #[error("{0}")]
@@ -372,6 +406,21 @@ impl Model {
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
             return Err("a maximal deflection is not above 0".into());
         }
+        for case in &self.cases {
+            case.check().map_err(|detail| format!("case \"{}\": {detail}", case.name))?;
+        }
+        let kinds = [Some(&self.fitted), self.fitted_body.as_ref()];
+        if kinds.into_iter().flatten().any(|f| f.name() != self.options.name()) {
+            return Err("its options name another model than it holds".into());
+        }
+        if self.fitted_body.is_some() && self.force_kind == ForceKind::Body {
+            return Err("it holds two forces, but its force is the body's".into());
+        }
+        let band = self.leave_one_out.as_ref().and_then(|v| v.band);
+        let wide = |share: f64| !(0.0..=WIDEST).contains(&share);
+        if band.is_some_and(|b| wide(b.pointwise_share) || wide(b.simultaneous_share)) {
+            return Err(format!("its band is not between 0 and {WIDEST} times the force"));
+        }
         let masses = [Some(self.mass_kg), self.other_mass_kg];
         if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {
             return Err("a mass is not above 0".into());
@@ -460,6 +509,15 @@ impl Model {
         } else if (nearest / v - 1.0).abs() > FAR {
             warnings.push(Warning::far_from_training(v, nearest));
         }
+        for (k, feature) in self.features.iter().enumerate().filter(|(_, f)| f.category.is_none()) {
+            let known = || self.cases.iter().map(|c| c.features[k]);
+            let (low, high) =
+                (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+            let asked = at.features[k];
+            if !(low..=high).contains(&asked) {
+                warnings.push(Warning::parameter_out_of_range(&feature.name(), asked, low, high));
+            }
+        }
         for &(below, above) in &self.mode_switches_m_per_s {
             if below < v && v < above {
                 warnings.push(Warning::mode_switch(below, above));
@@ -487,8 +545,13 @@ fn from_version_1(text: &[u8]) -> Result<Model, serde_json::Error> {
     if let Some(serde_json::Value::Array(curves)) = curves {
         if let Some(cases) = json.pointer_mut("/cases").and_then(|c| c.as_array_mut()) {
             for (case, mut curve) in cases.iter_mut().zip(curves) {
+                // What is no object is refused when the whole is read.
+                let (Some(case), Some(curve)) = (case.as_object_mut(), curve.as_object_mut())
+                else {
+                    continue;
+                };
                 for key in ["deflection_m", "force_N"] {
-                    case[key] = curve[key].take();
+                    case.insert(key.into(), curve.remove(key).unwrap_or_default());
                 }
             }
         }

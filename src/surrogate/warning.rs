@@ -18,7 +18,7 @@ pub struct Warning {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
-    /// The speed lies outside the training speeds.
+    /// The speed or another parameter lies outside the training cases'.
     OutOfRange,
     /// A midpoint forest jumps here from one training curve to the next.
     NearSplitMidpoint,
@@ -78,6 +78,15 @@ impl Warning {
                 km_per_h(by),
                 km_per_h(low),
                 km_per_h(high)
+            ),
+        }
+    }
+
+    pub fn parameter_out_of_range(name: &str, asked: f64, low: f64, high: f64) -> Self {
+        Self {
+            code: WarningCode::OutOfRange,
+            message: format!(
+                "{name} = {asked} lies outside the training cases' {low} to {high}: this is extrapolation"
             ),
         }
     }
