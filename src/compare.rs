@@ -154,12 +154,9 @@ pub fn compare(
     let start = Instant::now();
     let model = validate::train(group, &others, Choice::Auto { seed })?;
     let curve = predict(&model, &query_of(case, &model))?;
-    let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
+    let envelope = curve.driving_envelope()?;
     let best = Candidate {
-        driver: Driver {
-            envelope: curve.driving_envelope()?,
-            stiffness_n_per_m: rebound.or(Some(curve.unloading_stiffness_n_per_m)),
-        },
+        driver: Driver { stiffness_n_per_m: Some(curve.stiffness_at_end(&envelope)), envelope },
         declared: curve.envelope()?,
         truth: &own.envelope,
         time_s: start.elapsed().as_secs_f64(),

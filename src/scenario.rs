@@ -520,8 +520,7 @@ fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Source, Predic
         ForceName::Body => curve.driving_envelope()?,
     };
     // The force law keeps to its bounds by itself; the one constant is for other tools.
-    let rebound = curve.rebound.map(|r| r.stiffness_n_per_m);
-    let unloading_n_per_m = rebound.or(Some(curve.unloading_stiffness_n_per_m));
+    let unloading_n_per_m = Some(curve.stiffness_at_end(&envelope));
     Ok(Source {
         envelope,
         unloading_n_per_m,

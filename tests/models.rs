@@ -617,3 +617,41 @@ fn predicted_curves_are_physically_sound() {
         }
     }
 }
+
+/// The description names every key that a model file has.
+#[test]
+fn the_model_file_is_described() {
+    let described = std::fs::read_to_string(root().join("schemas/model.md")).unwrap();
+    let cases = databases().cases("lead-car-wall");
+    let model = train("lead-car-wall", cases, Choice::Options(Options::Linear)).unwrap();
+    let json: Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
+    let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let all = [keys(&json), keys(&json["cases"][0])].concat();
+    assert!(all.len() > 20);
+    for key in all {
+        assert!(described.contains(&format!("`{key}`")), "{key} is not described");
+    }
+}
+
+/// The rebound is the same, whichever force drives the run.
+#[test]
+fn contact_and_body_force_rebound_alike() {
+    use crumple::validate::motion::{Driver, Reference};
+    let cases = databases().cases("lead-car-wall");
+    let model = train("lead-car-wall", cases, Choice::Options(Options::Linear)).unwrap();
+    for case in &cases[1..4] {
+        let curve = curve(&model, case.speed.m_per_s);
+        let reference = Reference::of(case).unwrap();
+        let rebound = |envelope: crumple::curve::Envelope| {
+            let stiffness_n_per_m = Some(curve.stiffness_at_end(&envelope));
+            let run = reference.run(&Driver { envelope, stiffness_n_per_m }).unwrap();
+            -run.bodies[0].v_m_per_s.last().unwrap()
+        };
+        let (contact, body) =
+            (rebound(curve.envelope().unwrap()), rebound(curve.driving_envelope().unwrap()));
+        let measured = curve.rebound.unwrap().speed_m_per_s;
+        assert!((body / measured - 1.0).abs() < 0.03, "{body} of {measured}");
+        // The contact curve stops the body a little short of its end, where its force differs.
+        assert!((contact / measured - 1.0).abs() < 0.25, "{contact} of {measured}");
+    }
+}

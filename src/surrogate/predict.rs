@@ -567,6 +567,18 @@ impl PredictedCurve {
         Ok(curve)
     }
 
+    /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
+    /// energy of the rebound is the same whichever force it comes from.
+    pub fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
+        let end = self.max_deflection_m;
+        let driving = self.body_force_n.as_ref().unwrap_or(&self.force_n).last();
+        let share = driving.map_or(1.0, |driving| envelope.force_at(end) / driving);
+        self.rebound
+            .map(|r| r.stiffness_n_per_m * share * share)
+            .filter(|k| *k > 0.0 && k.is_finite())
+            .unwrap_or(self.unloading_stiffness_n_per_m)
+    }
+
     /// The curve that moves a body of one mass: the body force, or the only force there is.
     ///
     /// # Errors

@@ -350,13 +350,8 @@ impl<'a> Held<'a> {
         let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
         let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
         let driven = |envelope: Envelope| -> Result<MotionErrors, MotionError> {
-            let driver = Driver {
-                envelope,
-                stiffness_n_per_m: curve
-                    .rebound
-                    .map(|r| r.stiffness_n_per_m)
-                    .or(Some(curve.unloading_stiffness_n_per_m)),
-            };
+            let stiffness_n_per_m = Some(curve.stiffness_at_end(&envelope));
+            let driver = Driver { envelope, stiffness_n_per_m };
             self.reference.errors(&self.reference.run(&driver)?)
         };
         Ok(Judged {
