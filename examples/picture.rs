@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let report = build(&study.join("study.toml"), &folder.path().join("curves.h5"), |_| {})?;
     let cases = report.database.cases(GROUP);
     let set = TrainingSet::new(GROUP, cases)?;
-    let model = train(GROUP, cases, Choice::Auto { seed: 0 })?;
+    let model = train(GROUP, cases, Choice::Auto { seed: 0, trees: None })?;
     let curve = predict(&model, &Query::at(SPEED_M_PER_S))?;
 
     let [left, top, width, height] = AREA;

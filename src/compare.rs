@@ -152,7 +152,7 @@ pub fn compare(
 
     let others: Vec<Case> = cases.iter().filter(|c| !near(c.speed.m_per_s)).cloned().collect();
     let start = Instant::now();
-    let model = validate::train(group, &others, Choice::Auto { seed })?;
+    let model = validate::train(group, &others, Choice::Auto { seed, trees: None })?;
     let curve = predict(&model, &query_of(case, &model))?;
     let envelope = curve.driving_envelope()?;
     let best = Candidate {

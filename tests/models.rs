@@ -241,7 +241,7 @@ fn one_to_five_curves() {
             assert_eq!(validation.means.is_empty(), n < 3);
             assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));
         }
-        let auto = train("made", &cases, Choice::Auto { seed: 0 }).unwrap();
+        let auto = train("made", &cases, Choice::Auto { seed: 0, trees: None }).unwrap();
         let expected = ["nearest", "linear"];
         if n < 3 {
             assert_eq!(auto.options.name(), expected[n - 1]);
@@ -314,7 +314,7 @@ fn several_parameters() {
         let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
         assert!(predict(&model, &crush).unwrap_err().to_string().contains("try --max-crush"));
     }
-    let auto = train("made", &cases, Choice::Auto { seed: 0 }).unwrap();
+    let auto = train("made", &cases, Choice::Auto { seed: 0, trees: None }).unwrap();
     let notes = auto.leave_one_out.unwrap().notes;
     assert!(notes.iter().any(|n| n.starts_with("linear: ")), "{notes:?}");
 }
@@ -336,7 +336,8 @@ fn masses_are_a_parameter_where_they_differ() {
 #[test]
 fn cases_that_are_no_training_set() {
     fn t(cases: &[Case], expected: &str) {
-        let error = train("made", cases, Choice::Auto { seed: 0 }).unwrap_err().to_string();
+        let error =
+            train("made", cases, Choice::Auto { seed: 0, trees: None }).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}\nlacks: {expected}");
     }
     t(&[], "the group is empty");

@@ -182,7 +182,8 @@ impl Flow<'_> {
 
     fn train(&mut self, database: &Database) -> Result<Model, Failure> {
         self.bar.step("training the model");
-        let model = validate::train(GROUP, database.cases(GROUP), Choice::Auto { seed: 0 })?;
+        let model =
+            validate::train(GROUP, database.cases(GROUP), Choice::Auto { seed: 0, trees: None })?;
         model.write(&self.path("lead.model"))?;
         Ok(model)
     }

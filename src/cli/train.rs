@@ -117,7 +117,8 @@ impl Args {
             return Ok(Choice::Options(Options::Forest(options)));
         }
         let is_forest = matches!(self.model, Kind::Forest | Kind::Extra);
-        if !is_forest && (self.trees.is_some() || self.thresholds.is_some()) {
+        let is_auto = matches!(self.model, Kind::Auto);
+        if !is_forest && (self.thresholds.is_some() || !is_auto && self.trees.is_some()) {
             return Err(Failure::Usage(
                 "--trees and --thresholds need --model forest or --model extra".into(),
             ));
@@ -139,7 +140,9 @@ impl Args {
             ..options
         };
         Ok(Choice::Options(match self.model {
-            Kind::Auto => return Ok(Choice::Auto { seed }),
+            Kind::Auto => {
+                return Ok(Choice::Auto { seed, trees: self.trees.map(|t| t as usize) });
+            }
             Kind::Forest => Options::Forest(forest(ForestOptions::default())),
             Kind::Extra => Options::Extra(forest(ForestOptions::extra())),
             Kind::Linear => Options::Linear,

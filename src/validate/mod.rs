@@ -56,8 +56,9 @@ pub fn candidates(seed: u64) -> Vec<Options> {
 /// Which model to train.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Choice {
-    /// The one that leave-one-speed-out chooses; seed of the forests.
-    Auto { seed: u64 },
+    /// The one that leave-one-speed-out chooses; seed of the forests, and their number of trees
+    /// if not their own.
+    Auto { seed: u64, trees: Option<usize> },
     /// This one; it is validated beside `nearest` and `linear`.
     Options(Options),
 }
@@ -69,8 +70,13 @@ pub enum Choice {
 pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, ValidateError> {
     let set = TrainingSet::new(group, cases)?;
     let (options, validation) = match choice {
-        Choice::Auto { seed } => {
-            let candidates = candidates(seed);
+        Choice::Auto { seed, trees } => {
+            let mut candidates = candidates(seed);
+            for options in &mut candidates {
+                if let (Options::Forest(f) | Options::Extra(f), Some(trees)) = (options, trees) {
+                    f.trees = trees;
+                }
+            }
             let validation = validate(group, cases, &candidates, None)?;
             let chosen = candidates.into_iter().find(|o| o.name() == validation.chosen);
             (chosen.unwrap_or(Options::Nearest), validation)
@@ -201,7 +207,7 @@ pub fn add_nested(
             let v = held.own.speed_m_per_s;
             let others: Vec<Case> =
                 cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
-            let model = train(&group, &others, Choice::Auto { seed })?;
+            let model = train(&group, &others, Choice::Auto { seed, trees: None })?;
             let curve = predict(&model, &query_of(held.case, &model))?;
             let rule = curve.provenance.max_crush_rule;
             let predictions = BTreeMap::from([(rule, held.judged(curve)?)]);
