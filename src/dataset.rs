@@ -237,9 +237,13 @@ pub fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
-/// Even deflections from 0 to `end_m`, no coarser than [`GRID_M`], at least `fewest` steps.
+/// Most steps of a grid: 40 m of [`GRID_M`], more than any vehicle crushes.
+const MOST_STEPS: f64 = 20_000.0;
+
+/// Even deflections from 0 to `end_m`, at least `fewest` steps and no coarser than [`GRID_M`]
+/// up to 40 m.
 pub fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
-    let steps = ((end_m / GRID_M).ceil().clamp(1.0, 1e6) as usize).max(fewest);
+    let steps = ((end_m / GRID_M).ceil().clamp(1.0, MOST_STEPS) as usize).max(fewest);
     (0..=steps).map(|i| end_m * i as f64 / steps as f64).collect()
 }
 

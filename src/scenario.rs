@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::curve::{Envelope, Parameter};
+use crate::curve::body::body_motion;
+use crate::curve::{Envelope, ForceKind, Parameter};
 use crate::database::{Database, DatabaseError};
 use crate::export::{csv, json};
 use crate::manifest::{self, ManifestError};
@@ -90,7 +91,7 @@ pub struct CurveTable {
     /// Of a model: values of its further parameters.
     #[serde(default)]
     pub parameters: BTreeMap<String, Parameter>,
-    /// Of a model or curve file: the force of the recipe, or the one that moves a body of one
+    /// Of a model, predicted curve or database case: the force of the recipe, or the one that moves a body of one
     /// mass.
     #[serde(default)]
     pub force: ForceName,
@@ -481,12 +482,20 @@ fn source(
         (Some(model), None, None) => {
             from_model(&meeting.folder.join(model), table, name, mass_kg, meeting)
         }
-        (None, Some(file), None) => from_file(&meeting.folder.join(file), table.force),
+        (None, Some(file), None) => {
+            let path = meeting.folder.join(file);
+            if table.force == ForceName::Body && !is_json(&path) {
+                return Err(invalid(format!(
+                    "curve \"{name}\": a CSV file does not say which force it holds: leave force away"
+                )));
+            }
+            from_file(&path, table.force)
+        }
         (None, None, Some(database)) => {
             let case = table.case.as_deref().and_then(|c| c.split_once('/')).ok_or_else(|| {
                 invalid(format!("curve \"{name}\": write case = \"group/case\" beside database"))
             })?;
-            from_database(&meeting.folder.join(database), case)
+            from_database(&meeting.folder.join(database), case, table.force)
         }
         _ => {
             Err(invalid(format!("curve \"{name}\" needs exactly one of model, file and database")))
@@ -529,8 +538,12 @@ fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Source, Predic
     })
 }
 
+fn is_json(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "json")
+}
+
 fn from_file(path: &Path, force: ForceName) -> Result<Source, ScenarioError> {
-    if path.extension().is_some_and(|e| e == "json") {
+    if is_json(path) {
         let curve = json::read(path)?;
         return Ok(from_curve(&curve, force)
             .map_err(|source| json::CurveFileError::Curve { path: path.into(), source })?);
@@ -539,17 +552,34 @@ fn from_file(path: &Path, force: ForceName) -> Result<Source, ScenarioError> {
     Ok(Source { envelope, unloading_n_per_m: None, kind: None, warnings: Vec::new() })
 }
 
-fn from_database(path: &Path, (group, name): (&str, &str)) -> Result<Source, ScenarioError> {
+fn from_database(
+    path: &Path,
+    (group, name): (&str, &str),
+    force: ForceName,
+) -> Result<Source, ScenarioError> {
     let database = Database::read(path)?;
     let case = database.case(path, group, name)?;
-    let loading = case.loading().map_err(|e| ScenarioError::Invalid {
+    let damaged = |e: &dyn std::fmt::Display| ScenarioError::Invalid {
         path: path.into(),
         message: format!("case {group}/{name}: {e}"),
-    })?;
+    };
+    let is_motion = force == ForceName::Body && case.force_kind == ForceKind::Contact;
+    let (envelope, unloading_n_per_m) = match is_motion {
+        true => {
+            let motion = body_motion(case)
+                .ok_or_else(|| damaged(&"its sampled states make no loading branch"))?;
+            let unloading = motion.end_stiffness_n_per_m(case.masses.effective_kg());
+            (motion.force, unloading.or(case.unloading_stiffness_n_per_m))
+        }
+        false => {
+            let loading = case.loading().map_err(|e| damaged(&e))?;
+            (loading.envelope, case.unloading_stiffness_n_per_m)
+        }
+    };
     let truncated = case.is_truncated().then(|| "the run ended while loading".to_string());
     Ok(Source {
-        envelope: loading.envelope,
-        unloading_n_per_m: case.unloading_stiffness_n_per_m,
+        envelope,
+        unloading_n_per_m,
         kind: Some(case.speed.kind),
         warnings: truncated.into_iter().collect(),
     })

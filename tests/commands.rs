@@ -797,3 +797,49 @@ fn a_closed_pipe_is_no_error() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stderr.is_empty());
 }
+
+/// Which force drives an interface, from every source that can have two.
+#[test]
+fn scenarios_choose_the_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, WALL);
+    let train = ["train", "curves.h5", "--group", WALL, "--model", "linear", "-o", "a.model"];
+    crumple_ok(here, &train);
+    let outputs = ["-o", "a.json", "-o", "a.csv"];
+    crumple_ok(here, &[&["predict", "a.model", "--speed", "48km/h"][..], &outputs].concat());
+    let scenario = |nose: &str| {
+        let text = format!(
+            "[run]\nduration = \"300ms\"\noutput_interval = \"0.75ms\"\n[curves]\nnose = {{ {nose} }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"48km/h\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"nose\"\n"
+        );
+        std::fs::write(here.join("s.toml"), text).unwrap();
+    };
+    let crush = |nose: &str| {
+        scenario(nose);
+        let result = json(&crumple_ok(here, &["simulate", "s.toml", "--json"]));
+        result["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
+    };
+    // FE's largest crush is 0.8749 m; a contact force stops the body short of it.
+    for source in [
+        "model = \"a.model\"",
+        "file = \"a.json\"",
+        "database = \"curves.h5\", case = \"lead-car-wall/48kmh\"",
+    ] {
+        let (declared, body) = (crush(source), crush(&format!("{source}, force = \"body\"")));
+        assert!(declared < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {declared} and {body}");
+    }
+    scenario("file = \"a.csv\", force = \"body\"");
+    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    assert!(error.contains("a CSV file does not say which force it holds"), "{error}");
+    // A contact curve without its body force is not passed off as one.
+    let mut curve: Value = json(&std::fs::read_to_string(here.join("a.json")).unwrap());
+    curve.as_object_mut().unwrap().remove("body_force_N");
+    std::fs::write(here.join("old.json"), curve.to_string()).unwrap();
+    scenario("file = \"old.json\", force = \"body\"");
+    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    assert!(error.contains("a contact force and no body force"), "{error}");
+    let export = ["export", "old.json", "--to", "csv", "--force", "body"];
+    assert!(crumple_fails(here, 1, &export).contains("no body force"));
+}

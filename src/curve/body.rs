@@ -19,6 +19,15 @@ pub struct BodyMotion {
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
+impl BodyMotion {
+    /// Unloading stiffness from the end of the force that gives the rebound, in N/m.
+    pub fn end_stiffness_n_per_m(&self, mass_kg: f64) -> Option<f64> {
+        let top = self.force.force_at(self.force.end_m());
+        let speed = self.rebound_speed_m_per_s?;
+        Some(top * top / (mass_kg * speed * speed)).filter(|k| *k > 0.0 && k.is_finite())
+    }
+}
+
 /// The body force `−m dv/dt` of the closing speed `v`, with the case's effective mass.
 ///
 /// It differs from the contact force by the mass that the crush zone stops before the body

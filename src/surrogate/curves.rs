@@ -9,13 +9,13 @@ pub struct CaseCurve {
     /// Values of the further features.
     pub features: Vec<f64>,
     envelope: Envelope,
-    /// Closing speed at the envelope's deflections, in m/s; empty if it is not known.
-    closing_m_per_s: Vec<f64>,
+    /// Closing speed in m/s over deflection, if it is known: an envelope by its shape.
+    closing: Option<Envelope>,
 }
 
 impl CaseCurve {
     /// # Errors
-    /// [`EnvelopeError`] if the columns are no envelope; closing speeds must be as many.
+    /// [`EnvelopeError`] if the columns are no envelopes; closing speeds may be none.
     pub fn new(
         speed_m_per_s: f64,
         features: Vec<f64>,
@@ -23,12 +23,12 @@ impl CaseCurve {
         force_n: Vec<f64>,
         closing_m_per_s: Vec<f64>,
     ) -> Result<Self, EnvelopeError> {
-        let (deflections, forces) = (deflection_m.len(), closing_m_per_s.len());
-        if forces != 0 && forces != deflections {
-            return Err(EnvelopeError::Lengths { deflections, forces });
-        }
+        let closing = match closing_m_per_s.is_empty() {
+            true => None,
+            false => Some(Envelope::new(deflection_m.clone(), closing_m_per_s)?),
+        };
         let envelope = Envelope::new(deflection_m, force_n)?;
-        Ok(Self { speed_m_per_s, features, envelope, closing_m_per_s })
+        Ok(Self { speed_m_per_s, features, envelope, closing })
     }
 
     pub fn envelope(&self) -> &Envelope {
@@ -51,17 +51,11 @@ impl CaseCurve {
 
     /// Closing speed in m/s; 0 beyond the end, and the impact speed where it is not known.
     pub fn closing_at(&self, deflection_m: f64) -> f64 {
-        if self.closing_m_per_s.is_empty() {
-            return self.speed_m_per_s;
+        match &self.closing {
+            None => self.speed_m_per_s,
+            Some(_) if !self.reaches(deflection_m) => 0.0,
+            Some(closing) => closing.force_at(deflection_m).max(0.0),
         }
-        if deflection_m > self.end_m() {
-            return 0.0;
-        }
-        let d = self.envelope.deflection_m();
-        let i = d.partition_point(|&x| x <= deflection_m).clamp(1, d.len() - 1);
-        let share = ((deflection_m - d[i - 1]) / (d[i] - d[i - 1])).clamp(0.0, 1.0);
-        let (a, b) = (self.closing_m_per_s[i - 1], self.closing_m_per_s[i]);
-        (a + share * (b - a)).max(0.0)
     }
 }
 

@@ -12,7 +12,7 @@ use super::model::{Fitted, ModelCase};
 use super::warning::Warning;
 use super::{At, Model};
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
-use crate::dataset::{DatasetError, GRID_M, MASS, OTHER_MASS, feature_values, grid, nearest};
+use crate::dataset::{DatasetError, MASS, OTHER_MASS, feature_values, grid, nearest};
 use crate::unit::{Speed, SpeedKind};
 
 /// Points of a predicted curve beside (0, 0), as in the reference data.
@@ -29,8 +29,6 @@ const SPIKE: f64 = 1.05;
 const ROUNDS: usize = 100;
 /// Most places of a training curve that are looked at.
 const PROBES: f64 = 4_000.0;
-/// Most points along which the body is followed: 40 m at 2 mm, more than any vehicle crushes.
-const FOLLOWED: usize = 20_000;
 
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -188,6 +186,10 @@ pub enum PredictError {
     Parameters(Box<DatasetError>),
     #[error("the model has no parameter \"{name}\": its parameters are {known}")]
     UnknownParameter { name: String, known: String },
+    #[error(
+        "the curve has a contact force and no body force: predict it again with a model trained by this version, or use its own force"
+    )]
+    NoBodyForce,
     #[error("the {model} model has no answer at this speed: train another one")]
     NoAnswer { model: &'static str },
     #[error("the predicted curve is no curve: {0}")]
@@ -248,10 +250,7 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
 
     // The motion first: crush and the speeds along it follow from the body's force.
     let reach = REACH * model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
-    let along = match grid(reach.min(GRID_M * FOLLOWED as f64), POINTS) {
-        along if reach <= GRID_M * FOLLOWED as f64 => along,
-        along => along.iter().map(|d| d * reach / along[along.len() - 1]).collect(),
-    };
+    let along = grid(reach, POINTS);
     let body_n = sound(model, &along, model.body_force_n(&at, &along), true)?;
     let body = Envelope::new(along.clone(), body_n)?;
     let closing_at = |&d: &f64| (v * v - 2.0 * body.work_to(d) / mass_kg).max(0.0).sqrt();
@@ -582,11 +581,14 @@ impl PredictedCurve {
     /// The curve that moves a body of one mass: the body force, or the only force there is.
     ///
     /// # Errors
-    /// As [`envelope`](Self::envelope).
+    /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] for a contact force alone.
     pub fn driving_envelope(&self) -> Result<Envelope, PredictError> {
         let declared = self.envelope()?;
         match &self.body_force_n {
             Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),
+            None if self.provenance.force_kind == ForceKind::Contact => {
+                Err(PredictError::NoBodyForce)
+            }
             None => Ok(declared),
         }
     }
