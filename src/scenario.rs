@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::curve::body::body_motion;
-use crate::curve::{Envelope, ForceKind, Parameter};
+use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::database::{Database, DatabaseError};
 use crate::export::{csv, json};
 use crate::manifest::{self, ManifestError};
@@ -221,18 +221,120 @@ fn checked(path: &Path, scenario: Scenario) -> Result<(Scenario, f64), ScenarioE
     Ok((scenario, obstacle_speed))
 }
 
+/// The files that a scenario's curves name, read once: the same for every variation of it.
+#[derive(Clone, Debug)]
+pub struct Sources {
+    curves: BTreeMap<String, Source>,
+}
+
+/// What the file of a curve holds.
+#[derive(Clone, Debug)]
+enum Source {
+    Model(Box<Model>),
+    Predicted(Box<PredictedCurve>),
+    Table(Envelope),
+    Case(Box<Case>),
+}
+
+impl Sources {
+    /// Reads what `scenario`, which stands at `path`, names.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] names the curve or file.
+    pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut databases = BTreeMap::new();
+        let mut curves = BTreeMap::new();
+        for (name, table) in &scenario.curves {
+            let source =
+                Source::read(table, name, folder, &mut databases).map_err(|e| match e {
+                    ReadError::Message(message) => {
+                        ScenarioError::Invalid { path: path.into(), message }
+                    }
+                    ReadError::Scenario(error) => *error,
+                })?;
+            curves.insert(name.clone(), source);
+        }
+        Ok(Self { curves })
+    }
+}
+
+enum ReadError {
+    Message(String),
+    Scenario(Box<ScenarioError>),
+}
+
+impl<E: Into<ScenarioError>> From<E> for ReadError {
+    fn from(error: E) -> Self {
+        Self::Scenario(Box::new(error.into()))
+    }
+}
+
+impl Source {
+    fn read(
+        table: &CurveTable,
+        name: &str,
+        folder: &Path,
+        databases: &mut BTreeMap<PathBuf, Database>,
+    ) -> Result<Self, ReadError> {
+        match (&table.model, &table.file, &table.database) {
+            (Some(model), None, None) => {
+                Ok(Self::Model(Box::new(Model::read(&folder.join(model))?)))
+            }
+            (None, Some(file), None) => {
+                let path = folder.join(file);
+                match (is_json(&path), table.force) {
+                    (true, _) => Ok(Self::Predicted(Box::new(json::read(&path)?))),
+                    (false, ForceName::Body) => Err(ReadError::Message(format!(
+                        "curve \"{name}\": a CSV file does not say which force it holds: leave force away"
+                    ))),
+                    (false, ForceName::Declared) => Ok(Self::Table(csv::read(&path)?)),
+                }
+            }
+            (None, None, Some(database)) => {
+                let case = table.case.as_deref().and_then(|c| c.split_once('/'));
+                let (group, case) = case.ok_or_else(|| {
+                    ReadError::Message(format!(
+                        "curve \"{name}\": write case = \"group/case\" beside database"
+                    ))
+                })?;
+                let path = folder.join(database);
+                if !databases.contains_key(&path) {
+                    databases.insert(path.clone(), Database::read(&path)?);
+                }
+                Ok(Self::Case(Box::new(databases[&path].case(&path, group, case)?.clone())))
+            }
+            _ => Err(ReadError::Message(format!(
+                "curve \"{name}\" needs exactly one of model, file and database"
+            ))),
+        }
+    }
+}
+
 /// Loads a scenario and everything it names.
 ///
 /// # Errors
 /// [`ScenarioError`] names the key, curve or file.
 pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
-    let (scenario, obstacle_speed) = checked(path, manifest::load(path)?)?;
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let meeting = Meeting {
-        folder: &folder,
-        path,
-        speed_m_per_s: scenario.train[0].speed.0 - obstacle_speed,
-    };
+    let scenario = manifest::load(path)?;
+    let (scenario, _) = checked(path, scenario)?;
+    let sources = Sources::read(path, &scenario)?;
+    assemble(path, &scenario, &sources)
+}
+
+/// Puts a scenario together with what its files hold; `path` is for messages.
+///
+/// # Errors
+/// [`ScenarioError`] names the key or curve.
+pub fn assemble(
+    path: &Path,
+    scenario: &Scenario,
+    sources: &Sources,
+) -> Result<Prepared, ScenarioError> {
+    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
+    let obstacle_speed = check(scenario).map_err(invalid)?;
+    let meeting =
+        Meeting { sources, path, speed_m_per_s: scenario.train[0].speed.0 - obstacle_speed };
     let mut builder = Builder::default();
     // From the back of the first train to its nose.
     let first = &scenario.train[0];
@@ -240,7 +342,7 @@ pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
         builder.body(vehicle, first.speed.0);
         if i > 0 {
             let sides = Sides::Vehicles(&first.vehicles[i - 1], vehicle);
-            builder.interface(&scenario, &meeting, inner(first), sides, None)?;
+            builder.interface(scenario, &meeting, inner(first), sides, None)?;
         }
     }
     let nose = &first.vehicles[0];
@@ -249,13 +351,13 @@ pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
         (wall, _) => Sides::Wall(nose, wall.as_ref().map_or("wall", |w| &w.name)),
     };
     let gap = scenario.contact.gap.map(|g| g.0);
-    builder.interface(&scenario, &meeting, &scenario.contact.curve, contact, gap)?;
+    builder.interface(scenario, &meeting, &scenario.contact.curve, contact, gap)?;
     if let Some(second) = scenario.train.get(1) {
         for (i, vehicle) in second.vehicles.iter().enumerate() {
             builder.body(vehicle, second.speed.0);
             if let Some(next) = second.vehicles.get(i + 1) {
                 let sides = Sides::Vehicles(vehicle, next);
-                builder.interface(&scenario, &meeting, inner(second), sides, None)?;
+                builder.interface(scenario, &meeting, inner(second), sides, None)?;
             }
         }
     }
@@ -338,7 +440,7 @@ fn check(scenario: &Scenario) -> Result<f64, String> {
 
 /// What all interfaces share.
 struct Meeting<'a> {
-    folder: &'a Path,
+    sources: &'a Sources,
     path: &'a Path,
     speed_m_per_s: f64,
 }
@@ -379,7 +481,7 @@ struct Builder {
 }
 
 /// An envelope with what its source knows of unloading.
-struct Source {
+struct Spring {
     envelope: Envelope,
     unloading_n_per_m: Option<f64>,
     kind: Option<SpeedKind>,
@@ -418,7 +520,12 @@ impl Builder {
                 "interface {name} takes its curve from a model at its own closing speed, which this version does not iterate: write interface_speed = \"train\" in [run], or give curve \"{curve}\" as a file or database case"
             )));
         }
-        let source = source(table, curve, sides.mass_kg(), meeting, &invalid)?;
+        let source = meeting
+            .sources
+            .curves
+            .get(curve)
+            .ok_or_else(|| invalid(format!("curve \"{curve}\" has not been read")))?;
+        let source = spring(source, table, curve, sides.mass_kg(), meeting)?;
         let expected = match sides {
             Sides::Wall(..) => SpeedKind::Wall,
             Sides::Noses(..) | Sides::Vehicles(..) => SpeedKind::Closing,
@@ -470,67 +577,48 @@ impl Builder {
     }
 }
 
-/// Reads the one source that a curve table names.
-fn source(
+/// The curve of a source that an interface needs.
+fn spring(
+    source: &Source,
     table: &CurveTable,
     name: &str,
     mass_kg: f64,
     meeting: &Meeting<'_>,
-    invalid: &impl Fn(String) -> ScenarioError,
-) -> Result<Source, ScenarioError> {
-    match (&table.model, &table.file, &table.database) {
-        (Some(model), None, None) => {
-            from_model(&meeting.folder.join(model), table, name, mass_kg, meeting)
+) -> Result<Spring, ScenarioError> {
+    let failed = |source| ScenarioError::Predict { curve: name.into(), source };
+    match source {
+        Source::Model(model) => {
+            let query = Query {
+                mass_kg: Some(mass_kg),
+                rule: table.max_crush,
+                parameters: table.parameters.clone(),
+                ..Query::at(meeting.speed_m_per_s)
+            };
+            from_curve(&predict(model, &query).map_err(failed)?, table.force).map_err(failed)
         }
-        (None, Some(file), None) => {
-            let path = meeting.folder.join(file);
-            if table.force == ForceName::Body && !is_json(&path) {
-                return Err(invalid(format!(
-                    "curve \"{name}\": a CSV file does not say which force it holds: leave force away"
-                )));
-            }
-            from_file(&path, table.force)
-        }
-        (None, None, Some(database)) => {
-            let case = table.case.as_deref().and_then(|c| c.split_once('/')).ok_or_else(|| {
-                invalid(format!("curve \"{name}\": write case = \"group/case\" beside database"))
-            })?;
-            from_database(&meeting.folder.join(database), case, table.force)
-        }
-        _ => {
-            Err(invalid(format!("curve \"{name}\" needs exactly one of model, file and database")))
-        }
+        Source::Predicted(curve) => from_curve(curve, table.force).map_err(failed),
+        Source::Table(envelope) => Ok(Spring {
+            envelope: envelope.clone(),
+            unloading_n_per_m: None,
+            kind: None,
+            warnings: Vec::new(),
+        }),
+        Source::Case(case) => from_case(case, table.force).map_err(|message| {
+            let path = meeting.path.into();
+            ScenarioError::Invalid { path, message: format!("curve \"{name}\": {message}") }
+        }),
     }
 }
 
-fn from_model(
-    path: &Path,
-    table: &CurveTable,
-    name: &str,
-    mass_kg: f64,
-    meeting: &Meeting<'_>,
-) -> Result<Source, ScenarioError> {
-    let model = Model::read(path)?;
-    let query = Query {
-        mass_kg: Some(mass_kg),
-        rule: table.max_crush,
-        parameters: table.parameters.clone(),
-        ..Query::at(meeting.speed_m_per_s)
-    };
-    let failed = |source| ScenarioError::Predict { curve: name.into(), source };
-    let curve = predict(&model, &query).map_err(failed)?;
-    from_curve(&curve, table.force).map_err(failed)
-}
-
 /// The force that was asked for, with the unloading that goes with it.
-fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Source, PredictError> {
+fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Spring, PredictError> {
     let envelope = match force {
         ForceName::Declared => curve.envelope()?,
         ForceName::Body => curve.driving_envelope()?,
     };
     // The force law keeps to its bounds by itself; the one constant is for other tools.
     let unloading_n_per_m = Some(curve.stiffness_at_end(&envelope));
-    Ok(Source {
+    Ok(Spring {
         envelope,
         unloading_n_per_m,
         kind: Some(curve.speed_kind),
@@ -542,42 +630,21 @@ fn is_json(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "json")
 }
 
-fn from_file(path: &Path, force: ForceName) -> Result<Source, ScenarioError> {
-    if is_json(path) {
-        let curve = json::read(path)?;
-        return Ok(from_curve(&curve, force)
-            .map_err(|source| json::CurveFileError::Curve { path: path.into(), source })?);
-    }
-    let envelope = csv::read(path)?;
-    Ok(Source { envelope, unloading_n_per_m: None, kind: None, warnings: Vec::new() })
-}
-
-fn from_database(
-    path: &Path,
-    (group, name): (&str, &str),
-    force: ForceName,
-) -> Result<Source, ScenarioError> {
-    let database = Database::read(path)?;
-    let case = database.case(path, group, name)?;
-    let damaged = |e: &dyn std::fmt::Display| ScenarioError::Invalid {
-        path: path.into(),
-        message: format!("case {group}/{name}: {e}"),
-    };
+fn from_case(case: &Case, force: ForceName) -> Result<Spring, String> {
     let is_motion = force == ForceName::Body && case.force_kind == ForceKind::Contact;
     let (envelope, unloading_n_per_m) = match is_motion {
         true => {
-            let motion = body_motion(case)
-                .ok_or_else(|| damaged(&"its sampled states make no loading branch"))?;
+            let motion = body_motion(case).ok_or("its sampled states make no loading branch")?;
             let unloading = motion.end_stiffness_n_per_m(case.masses.effective_kg());
             (motion.force, unloading.or(case.unloading_stiffness_n_per_m))
         }
         false => {
-            let loading = case.loading().map_err(|e| damaged(&e))?;
+            let loading = case.loading().map_err(|e| e.to_string())?;
             (loading.envelope, case.unloading_stiffness_n_per_m)
         }
     };
     let truncated = case.is_truncated().then(|| "the run ended while loading".to_string());
-    Ok(Source {
+    Ok(Spring {
         envelope,
         unloading_n_per_m,
         kind: Some(case.speed.kind),
