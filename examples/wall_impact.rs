@@ -5,7 +5,6 @@
 use std::error::Error;
 
 use crumple::curve::Envelope;
-use crumple::multibody::integrator::DEFAULT_STEP_S;
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading, simulate,
 };
@@ -14,15 +13,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let curve = Envelope::new(vec![0.0, 0.1, 0.3, 1.5], vec![0.0, 3.0e6, 1.8e6, 2.4e6])?;
     let unloading = Unloading::Memory { stiffness_n_per_m: 120e6 };
     let chain = Chain::new(
-        vec![Body { name: "car".into(), mass_kg: 24e3, speed_m_per_s: 50.0 / 3.6 }],
-        vec![Interface {
-            name: "car|wall".into(),
-            law: ForceLaw::new(curve, unloading, EnvelopeEnd::Hold),
-            gap_m: 0.0,
-        }],
+        vec![Body::new("car", 24e3, 50.0 / 3.6)],
+        vec![Interface::new("car|wall", ForceLaw::new(curve, unloading, EnvelopeEnd::Hold), 0.0)],
     )?;
-    let settings =
-        RunSettings { duration_s: 0.3, output_interval_s: 0.75e-3, step_s: DEFAULT_STEP_S };
+    let settings = RunSettings::new(0.3, 0.75e-3);
     let run = simulate(&chain, &settings)?;
     let contact = &run.interfaces[0];
     println!("peak force {:.3} MN", contact.peak_force_n / 1e6);

@@ -11,7 +11,6 @@ use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::database::{Database, DatabaseError};
 use crate::export::{csv, json};
 use crate::manifest::{self, ManifestError};
-use crate::multibody::integrator::DEFAULT_STEP_S;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading,
 };
@@ -365,11 +364,8 @@ pub fn assemble(
     let order = (0..front).rev().chain(front..builder.bodies.len()).collect();
     let chain = Chain::new(builder.bodies, builder.interfaces)
         .map_err(|source| ScenarioError::Chain { path: path.into(), source })?;
-    let settings = RunSettings {
-        duration_s: scenario.run.duration.0,
-        output_interval_s: scenario.run.output_interval.0,
-        step_s: scenario.run.step.map_or(DEFAULT_STEP_S, |s| s.0),
-    };
+    let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0);
+    let settings = scenario.run.step.map_or(settings, |step| settings.with_step(step.0));
     builder.warnings.dedup();
     Ok(Prepared { chain, settings, order, warnings: builder.warnings })
 }
@@ -490,8 +486,7 @@ struct Spring {
 
 impl Builder {
     fn body(&mut self, vehicle: &VehicleTable, speed_m_per_s: f64) {
-        let (name, mass_kg) = (vehicle.name.clone(), vehicle.mass.0);
-        self.bodies.push(Body { name, mass_kg, speed_m_per_s });
+        self.bodies.push(Body::new(vehicle.name.clone(), vehicle.mass.0, speed_m_per_s));
     }
 
     fn interface(
@@ -568,11 +563,9 @@ impl Builder {
             EndName::Slope => EnvelopeEnd::Slope,
             EndName::Error => EnvelopeEnd::Error,
         };
-        self.interfaces.push(Interface {
-            name,
-            law: ForceLaw::new(source.envelope, unloading, end),
-            gap_m: gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0),
-        });
+        let law = ForceLaw::new(source.envelope, unloading, end);
+        let gap_m = gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
+        self.interfaces.push(Interface::new(name, law, gap_m));
         Ok(())
     }
 }

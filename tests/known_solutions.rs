@@ -19,16 +19,11 @@ fn linear(stiffness: f64) -> Envelope {
 
 /// Bodies (mass, speed) from back to front, `laws` between them or to a wall.
 fn chain(bodies: &[(f64, f64)], laws: &[ForceLaw]) -> Chain {
-    let body = |(i, &(mass_kg, speed_m_per_s)): (usize, &(f64, f64))| Body {
-        name: format!("B{i}"),
-        mass_kg,
-        speed_m_per_s,
+    let body = |(i, &(mass_kg, speed)): (usize, &(f64, f64))| {
+        Body::new(format!("B{i}"), mass_kg, speed)
     };
-    let interface = |(i, law): (usize, &ForceLaw)| Interface {
-        name: format!("I{i}"),
-        law: law.clone(),
-        gap_m: 0.0,
-    };
+    let interface =
+        |(i, law): (usize, &ForceLaw)| Interface::new(format!("I{i}"), law.clone(), 0.0);
     Chain::new(
         bodies.iter().enumerate().map(body).collect(),
         laws.iter().enumerate().map(interface).collect(),
@@ -45,7 +40,7 @@ fn memory(envelope: Envelope, stiffness_n_per_m: f64) -> ForceLaw {
 }
 
 fn run(chain: &Chain, duration_s: f64, step_s: f64) -> Run {
-    let settings = RunSettings { duration_s, output_interval_s: 0.75e-3, step_s };
+    let settings = RunSettings::new(duration_s, 0.75e-3).with_step(step_s);
     let run = simulate(chain, &settings).unwrap();
     assert!(run.ledger.max_energy_error < 1e-3, "energy {:e}", run.ledger.max_energy_error);
     assert!(run.ledger.max_momentum_error < 1e-10, "momentum {:e}", run.ledger.max_momentum_error);
@@ -153,15 +148,11 @@ fn chain_of_springs_follows_its_modes_while_it_is_pressed() {
 /// there although the constant force begins at full height.
 #[test]
 fn a_gap_is_closed_before_time_begins() {
-    let settings = RunSettings { duration_s: 0.1, output_interval_s: 0.75e-3, step_s: STEP_S };
+    let settings = RunSettings::new(0.1, 0.75e-3);
     let with_gap = |gap_m: f64| {
-        let interface =
-            Interface { name: "I0".into(), law: memory(constant(2.0 * MEGA), 80.0 * MEGA), gap_m };
-        let bodies = [("A", 10.0), ("B", 0.0)].map(|(name, speed_m_per_s)| Body {
-            name: name.into(),
-            mass_kg: 24.0 * TONNES,
-            speed_m_per_s,
-        });
+        let interface = Interface::new("I0", memory(constant(2.0 * MEGA), 80.0 * MEGA), gap_m);
+        let bodies =
+            [("A", 10.0), ("B", 0.0)].map(|(name, speed)| Body::new(name, 24.0 * TONNES, speed));
         simulate(&Chain::new(bodies.to_vec(), vec![interface]).unwrap(), &settings).unwrap()
     };
     let (touching, apart) = (with_gap(0.0), with_gap(0.5));
@@ -227,7 +218,7 @@ fn order_of_convergence_is_two() {
     let exact = 40.0 / 3.0 * (24.0 * TONNES / (40.0 * MEGA)).sqrt();
     let error = |step_s| {
         let wall = chain(&[(24.0 * TONNES, 40.0 / 3.0)], &[elastic(linear(40.0 * MEGA))]);
-        let settings = RunSettings { duration_s: 0.06, output_interval_s: 0.75e-3, step_s };
+        let settings = RunSettings::new(0.06, 0.75e-3).with_step(step_s);
         let run = simulate(&wall, &settings).unwrap();
         // At a fixed time on the way in, free of the search for the top.
         let row = run.time_s.len() / 2;
@@ -249,7 +240,7 @@ fn the_step_keeps_to_its_rule() {
 fn a_curve_that_ends_is_an_error_with_the_interface_named() {
     let short = Envelope::new(vec![0.0, 0.2], vec![0.0, 1.0 * MEGA]).unwrap();
     let law = ForceLaw::new(short, Unloading::Elastic, EnvelopeEnd::Error);
-    let settings = RunSettings { duration_s: 0.3, output_interval_s: 0.75e-3, step_s: STEP_S };
+    let settings = RunSettings::new(0.3, 0.75e-3);
     let error = simulate(&chain(&[(24.0 * TONNES, 10.0)], &[law]), &settings).unwrap_err();
     let message = error.to_string();
     assert!(message.starts_with("interface I0 is crushed 0.200"), "{message}");
@@ -259,6 +250,6 @@ fn a_curve_that_ends_is_an_error_with_the_interface_named() {
 #[test]
 fn a_mistyped_duration_does_not_run_for_days() {
     let wall = chain(&[(24.0 * TONNES, 10.0)], &[elastic(linear(MEGA))]);
-    let settings = RunSettings { duration_s: 1e9, output_interval_s: 0.75e-3, step_s: STEP_S };
+    let settings = RunSettings::new(1e9, 0.75e-3);
     assert!(matches!(simulate(&wall, &settings), Err(SimulationError::TooLong { .. })));
 }

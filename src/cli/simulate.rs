@@ -64,15 +64,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let run = simulate(&prepared.chain, &prepared.settings)?;
     let mut warnings = prepared.warnings.clone();
     warnings.extend(ledger_warnings(&run.ledger));
-    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
-        let (crush, end) = (history.max_deflection_m, interface.law.end_m());
-        if crush > end {
-            warnings.push(format!(
-                "interface {} is crushed {crush:.4} m, beyond the end of its curve at {end:.4} m",
-                interface.name
-            ));
-        }
-    }
+    warnings.extend(run.warnings.iter().map(|w| w.to_string()));
     for warning in &warnings {
         manners.warn(warning);
     }

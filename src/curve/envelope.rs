@@ -90,6 +90,11 @@ impl Envelope {
         &self.force_n
     }
 
+    /// `∫F dd` from 0 to each point, in J.
+    pub fn work_j(&self) -> &[f64] {
+        &self.work_j
+    }
+
     /// Largest deflection of the table, in m.
     pub fn end_m(&self) -> f64 {
         self.deflection_m[self.deflection_m.len() - 1]

@@ -23,58 +23,196 @@ pub enum EnvelopeEnd {
     Error,
 }
 
+/// Shape of an unloading branch: share of the force at the top over the share of the
+/// branch's length that has been given back.
+///
+/// Invariant: shares of the length rise from 0 to 1, those of the force are at least 0, begin
+/// at 1 and end at 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnloadingShape {
+    length: Vec<f64>,
+    force: Vec<f64>,
+    /// `∫` from each point to the end; the first is the share of `F δ` that is given back.
+    rest: Vec<f64>,
+}
+
+impl UnloadingShape {
+    /// The straight line.
+    pub fn line() -> Self {
+        Self { length: vec![0.0, 1.0], force: vec![1.0, 0.0], rest: vec![0.5, 0.0] }
+    }
+
+    /// From a branch that was recorded: deflections in m, falling, and forces in N. Points at
+    /// which the deflection does not fall are left out; forces end at the first that is not
+    /// above 0. `None` if that leaves fewer than three points or no force.
+    pub fn of_branch(deflection_m: &[f64], force_n: &[f64]) -> Option<Self> {
+        let (&top_m, &top_n) = (deflection_m.first()?, force_n.first()?);
+        if !(top_n > 0.0) {
+            return None;
+        }
+        let mut points = vec![(top_m, 1.0)];
+        for (&d, &f) in deflection_m.iter().zip(force_n).skip(1) {
+            let (before_m, before) = points[points.len() - 1];
+            if !(d < before_m && f.is_finite()) {
+                continue;
+            }
+            let force = f / top_n;
+            if force <= 0.0 {
+                // Where the straight line between the two samples reaches zero.
+                points.push((before_m - (before_m - d) * before / (before - force), 0.0));
+                break;
+            }
+            points.push((d, force));
+        }
+        let (end_m, last) = points[points.len() - 1];
+        if points.len() < 3 || last > 0.0 || end_m >= points[points.len() - 2].0 {
+            return None;
+        }
+        let length = points.iter().map(|(d, _)| (top_m - d) / (top_m - end_m)).collect();
+        let mut shape =
+            Self { length, force: points.iter().map(|p| p.1).collect(), rest: Vec::new() };
+        let mut rest = vec![0.0; points.len()];
+        for j in (0..points.len() - 1).rev() {
+            let step = shape.length[j + 1] - shape.length[j];
+            rest[j] = rest[j + 1] + 0.5 * (shape.force[j] + shape.force[j + 1]) * step;
+        }
+        shape.rest = rest;
+        Some(shape)
+    }
+
+    /// Share of force × length that is given back: ½ for the line.
+    fn share(&self) -> f64 {
+        self.rest[0]
+    }
+
+    fn piece(&self, length: f64) -> usize {
+        let above = self.length.partition_point(|&s| s <= length);
+        above.clamp(1, self.length.len() - 1) - 1
+    }
+
+    fn slope(&self, j: usize) -> f64 {
+        (self.force[j + 1] - self.force[j]) / (self.length[j + 1] - self.length[j])
+    }
+
+    /// Steepest fall, 1 for the line.
+    fn steepest(&self) -> f64 {
+        (0..self.length.len() - 1).map(|j| self.slope(j).abs()).fold(0.0, f64::max)
+    }
+}
+
 /// Force over deflection at an interface.
 ///
 /// Invariant: with memory, the dissipated energy never falls while the deflection grows, so
 /// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
 /// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
 /// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
-/// one stiff line for both would lose most of the rebound. Therefore the line at δ stores
-/// `U = max(A − D, S(k_s))` with `S(k) = min(F_e²/2k, F_e δ/2)` and
-/// `D = max over s ≤ δ of A(s) − S(k)(s)`, not below 0; its stiffness is `F_e²/2U`. The bound
-/// `F_e δ/2` keeps the line from reaching zero deflection with a force left, whose energy would
-/// be lost. With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
+/// one stiff line for both would lose most of the rebound. Therefore the branch from δ stores
+/// `U = max(A − D, S(k_s))` with `S(k) = F_e min(F_e/2k, cδ)` and
+/// `D = max over s ≤ δ of A(s) − S(k)(s)`, not below 0; `c = ½` for a straight line, whose
+/// stiffness is `F_e²/2U`, and less for a shape that gives back less. The bound `cδF_e` keeps
+/// the branch from reaching zero deflection with a force left, whose energy would be lost.
+/// With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceLaw {
     envelope: Envelope,
     unloading: Unloading,
+    shape: UnloadingShape,
     end: EnvelopeEnd,
-    end_slope_n_per_m: f64,
+    /// Slope of the piece from each point of the envelope on; the last one beyond the end.
+    slope_n_per_m: Vec<f64>,
     /// Steepest rise of the envelope, or the unloading stiffness if that is more.
     steepest_n_per_m: f64,
-    /// `D` at each point of the envelope, in J.
+    /// `D` at each point of the envelope, in J; empty without memory.
     dissipated_j: Vec<f64>,
 }
 
-/// `S`: energy that a line of this stiffness, or the stiffer one to (0, 0), can store.
-fn storable(deflection_m: f64, force_n: f64, stiffness_n_per_m: f64) -> f64 {
-    0.5 * force_n * (force_n / stiffness_n_per_m).min(deflection_m)
+/// The unloading branch from the largest deflection so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Branch {
+    pub largest_m: f64,
+    pub top_n: f64,
+    pub stored_j: f64,
+    pub dissipated_j: f64,
+    /// Deflection given back until the force is zero.
+    pub length_m: f64,
+}
+
+/// A straight piece of the law: `F = force_n + slope δ` between two deflections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    pub from_m: f64,
+    pub to_m: f64,
+    pub at_zero_n: f64,
+    pub slope_n_per_m: f64,
+}
+
+impl Piece {
+    /// No force up to a deflection.
+    pub fn open_to(to_m: f64) -> Self {
+        Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0 }
+    }
 }
 
 impl ForceLaw {
     /// Forces below zero become zero, because an interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
+        Self::shaped(envelope, unloading, UnloadingShape::line(), end)
+    }
+
+    /// The same with an unloading branch that is no straight line; its energy is that of the
+    /// line of the unloading stiffness.
+    pub fn shaped(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+    ) -> Self {
         let envelope = envelope.pushing();
         let n = envelope.deflection_m().len();
         let (d, f) = (envelope.deflection_m(), envelope.force_n());
-        let end_slope_n_per_m = match end {
-            EnvelopeEnd::Slope => ((f[n - 1] - f[n - 2]) / (d[n - 1] - d[n - 2])).max(0.0),
+        let mut slope_n_per_m: Vec<f64> =
+            (1..n).map(|i| (f[i] - f[i - 1]) / (d[i] - d[i - 1])).collect();
+        slope_n_per_m.push(match end {
+            EnvelopeEnd::Slope => slope_n_per_m[n - 2].max(0.0),
             EnvelopeEnd::Hold | EnvelopeEnd::Error => 0.0,
+        });
+        let steepest_n_per_m = match unloading {
+            Unloading::Elastic => envelope.max_slope(),
+            Unloading::Memory { stiffness_n_per_m } => envelope.max_slope().max(stiffness_n_per_m),
         };
-        let (mut steepest_n_per_m, mut dissipated_j) = (envelope.max_slope(), Vec::new());
+        let mut law = Self {
+            envelope,
+            unloading,
+            shape,
+            end,
+            slope_n_per_m,
+            steepest_n_per_m,
+            dissipated_j: Vec::new(),
+        };
         if let Unloading::Memory { stiffness_n_per_m } = unloading {
-            steepest_n_per_m = steepest_n_per_m.max(stiffness_n_per_m);
             let mut most = 0.0_f64;
-            for (&d, &f) in d.iter().zip(f) {
-                most = most.max(envelope.work_to(d) - storable(d, f, stiffness_n_per_m));
-                dissipated_j.push(most);
+            for i in 0..n {
+                let (d, f) = (law.envelope.deflection_m()[i], law.envelope.force_n()[i]);
+                most = most.max(law.envelope.work_j()[i] - law.storable(d, f, stiffness_n_per_m));
+                law.dissipated_j.push(most);
             }
         }
-        Self { envelope, unloading, end, end_slope_n_per_m, steepest_n_per_m, dissipated_j }
+        law
+    }
+
+    /// `S`: energy that a branch of this stiffness, or the stiffer one to (0, 0), can store.
+    fn storable(&self, deflection_m: f64, force_n: f64, stiffness_n_per_m: f64) -> f64 {
+        let bound = self.shape.share().min(0.5) * deflection_m;
+        force_n * (0.5 * force_n / stiffness_n_per_m).min(bound)
     }
 
     pub fn unloading(&self) -> Unloading {
         self.unloading
+    }
+
+    /// Whether the largest deflection changes the force.
+    pub(super) fn has_memory(&self) -> bool {
+        matches!(self.unloading, Unloading::Memory { .. })
     }
 
     /// Whether the run may not go to this deflection.
@@ -90,38 +228,133 @@ impl ForceLaw {
     /// Largest stiffness the integrator meets, in N/m.
     pub fn max_stiffness_n_per_m(&self) -> f64 {
         match self.unloading {
-            Unloading::Elastic => self.envelope.max_slope().max(self.steepest_fall()),
-            Unloading::Memory { .. } => self.steepest_n_per_m,
+            Unloading::Elastic => {
+                self.slope_n_per_m.iter().map(|s| s.abs()).fold(0.0, f64::max)
+            }
+            // Line of stiffness k: slope k. Shape: k × 2 share × its steepest fall.
+            Unloading::Memory { .. } => {
+                self.steepest_n_per_m * (2.0 * self.shape.share() * self.shape.steepest()).max(1.0)
+            }
         }
     }
 
-    /// Force on the envelope at δ and the energy stored there, in N and J.
-    fn stored_at(&self, deflection_m: f64, stiffness_n_per_m: f64) -> (f64, f64) {
-        let force = self.envelope_n(deflection_m);
-        let work = self.envelope_work_j(deflection_m);
-        let before = self.envelope.deflection_m().partition_point(|&d| d <= deflection_m);
-        // Within a segment A − S is monotone for either bound, so its ends and δ decide.
-        let dissipated = self.dissipated_j[before.max(1) - 1]
-            .max(work - storable(deflection_m, force, stiffness_n_per_m));
-        let least = storable(deflection_m, force, self.steepest_n_per_m);
-        (force, (work - dissipated).max(least))
+    /// Index of the envelope's piece that holds δ ≥ 0, searched from a piece near by; the last
+    /// one reaches beyond the end.
+    pub(super) fn piece_index(&self, near: usize, deflection_m: f64) -> usize {
+        let d = self.envelope.deflection_m();
+        let mut i = near.min(d.len() - 1);
+        // A step moves by a piece or two; from far away the search halves.
+        for _ in 0..4 {
+            if i + 1 < d.len() && deflection_m >= d[i + 1] {
+                i += 1;
+            } else if i > 0 && deflection_m < d[i] {
+                i -= 1;
+            } else {
+                return i;
+            }
+        }
+        d.partition_point(|&d| d <= deflection_m).max(1) - 1
     }
 
-    fn steepest_fall(&self) -> f64 {
+    /// Piece `i` of the envelope.
+    pub(super) fn envelope_piece(&self, i: usize) -> Piece {
         let (d, f) = (self.envelope.deflection_m(), self.envelope.force_n());
-        (1..d.len()).map(|i| (f[i - 1] - f[i]) / (d[i] - d[i - 1])).fold(0.0, f64::max)
+        let slope_n_per_m = self.slope_n_per_m[i];
+        Piece {
+            from_m: d[i],
+            to_m: d.get(i + 1).copied().unwrap_or(f64::INFINITY),
+            at_zero_n: f[i] - slope_n_per_m * d[i],
+            slope_n_per_m,
+        }
+    }
+
+    /// Largest force of the envelope's points `from..=to`.
+    pub(super) fn peak_between_n(&self, from: usize, to: usize) -> f64 {
+        self.envelope.force_n()[from..=to].iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Force and work on the envelope at δ ≥ 0 in piece `i`, in N and J.
+    fn on_envelope(&self, i: usize, deflection_m: f64) -> (f64, f64) {
+        let (d, f) = (self.envelope.deflection_m()[i], self.envelope.force_n()[i]);
+        let along = (deflection_m - d).max(0.0);
+        let force = f + self.slope_n_per_m[i] * along;
+        (force, self.envelope.work_j()[i] + 0.5 * (f + force) * along)
+    }
+
+    /// The unloading branch from δ in piece `i` of the envelope.
+    pub(super) fn branch(&self, i: usize, largest_m: f64) -> Branch {
+        let (top_n, work) = self.on_envelope(i, largest_m);
+        let Unloading::Memory { stiffness_n_per_m } = self.unloading else {
+            return Branch { largest_m, top_n, stored_j: work, dissipated_j: 0.0, length_m: 0.0 };
+        };
+        // Within a piece A − S is monotone for either bound, so its ends and δ decide.
+        let dissipated =
+            self.dissipated_j[i].max(work - self.storable(largest_m, top_n, stiffness_n_per_m));
+        let least = self.storable(largest_m, top_n, self.steepest_n_per_m);
+        let stored_j = (work - dissipated).max(least);
+        let length_m = match top_n > 0.0 && stored_j > 0.0 {
+            true => stored_j / (top_n * self.shape.share()),
+            false => 0.0, // the envelope itself has no force here
+        };
+        Branch { largest_m, top_n, stored_j, dissipated_j: work - stored_j, length_m }
+    }
+
+    /// The piece of an unloading branch that holds δ below its top.
+    pub(super) fn branch_piece(&self, branch: &Branch, deflection_m: f64) -> Piece {
+        let zero_m = branch.largest_m - branch.length_m;
+        if deflection_m <= zero_m || branch.length_m <= 0.0 {
+            return Piece::open_to(zero_m.max(0.0));
+        }
+        let j = self.shape.piece((branch.largest_m - deflection_m) / branch.length_m);
+        let at = |j: usize| branch.largest_m - self.shape.length[j] * branch.length_m;
+        let slope_n_per_m = -self.shape.slope(j) * branch.top_n / branch.length_m;
+        Piece {
+            from_m: at(j + 1),
+            to_m: if j == 0 { branch.largest_m } else { at(j) },
+            at_zero_n: branch.top_n * self.shape.force[j] - slope_n_per_m * at(j),
+            slope_n_per_m,
+        }
+    }
+
+    /// Stored energy at δ on an unloading branch, in J.
+    fn stored_on(&self, branch: &Branch, deflection_m: f64) -> f64 {
+        if branch.length_m <= 0.0 {
+            return 0.0;
+        }
+        let length = (branch.largest_m - deflection_m.max(0.0)) / branch.length_m;
+        if length >= 1.0 {
+            return 0.0;
+        }
+        let shape = &self.shape;
+        let j = shape.piece(length);
+        let along = shape.length[j + 1] - length;
+        let force = shape.force[j + 1] - shape.slope(j) * along;
+        let rest = shape.rest[j + 1] + 0.5 * (shape.force[j + 1] + force) * along;
+        branch.stored_j * rest / shape.share()
+    }
+
+    /// Stored and dissipated energy in J at δ on the branch (at its top: `δ = largest`), with a
+    /// piece of the envelope near by. Their sum is the work done so far.
+    pub(super) fn energies_on_j(
+        &self,
+        near: usize,
+        branch: &Branch,
+        deflection_m: f64,
+    ) -> (f64, f64) {
+        match self.unloading {
+            Unloading::Elastic if deflection_m <= 0.0 => (0.0, 0.0),
+            Unloading::Elastic => {
+                (self.on_envelope(self.piece_index(near, deflection_m), deflection_m).1, 0.0)
+            }
+            Unloading::Memory { .. } => {
+                (self.stored_on(branch, deflection_m), branch.dissipated_j)
+            }
+        }
     }
 
     /// `F_e(δ)` on the loading branch, in N; `δ ≥ 0`.
     pub fn envelope_n(&self, deflection_m: f64) -> f64 {
-        let beyond = (deflection_m - self.envelope.end_m()).max(0.0);
-        self.envelope.force_at(deflection_m) + self.end_slope_n_per_m * beyond
-    }
-
-    /// `A(δ) = ∫₀^δ F_e`, exact for the table, in J; `δ ≥ 0`.
-    fn envelope_work_j(&self, deflection_m: f64) -> f64 {
-        let beyond = (deflection_m - self.envelope.end_m()).max(0.0);
-        self.envelope.work_to(deflection_m) + 0.5 * self.end_slope_n_per_m * beyond * beyond
+        self.on_envelope(self.piece_index(0, deflection_m), deflection_m).0
     }
 
     /// Force in N at `deflection_m` after the deflection has once been `largest_m`
@@ -130,18 +363,12 @@ impl ForceLaw {
         if deflection_m <= 0.0 {
             return 0.0;
         }
-        match self.unloading {
-            Unloading::Elastic => self.envelope_n(deflection_m),
-            Unloading::Memory { .. } if deflection_m >= largest_m => self.envelope_n(deflection_m),
-            Unloading::Memory { stiffness_n_per_m } => {
-                let (top, stored) = self.stored_at(largest_m, stiffness_n_per_m);
-                if stored <= 0.0 {
-                    return 0.0; // the envelope itself has no force here
-                }
-                let stiffness = 0.5 * top * top / stored;
-                (top - stiffness * (largest_m - deflection_m)).max(0.0)
-            }
+        if !self.has_memory() || deflection_m >= largest_m {
+            return self.envelope_n(deflection_m);
         }
+        let branch = self.branch(self.piece_index(0, largest_m), largest_m);
+        let piece = self.branch_piece(&branch, deflection_m);
+        (piece.at_zero_n + piece.slope_n_per_m * deflection_m).max(0.0)
     }
 
     /// Stored and dissipated energy in J at a deflection, given the largest so far.
@@ -149,18 +376,8 @@ impl ForceLaw {
         if largest_m <= 0.0 {
             return (0.0, 0.0); // never in contact
         }
-        match self.unloading {
-            Unloading::Elastic => (self.envelope_work_j(deflection_m.max(0.0)), 0.0),
-            Unloading::Memory { stiffness_n_per_m } => {
-                let (top, stored) = self.stored_at(largest_m, stiffness_n_per_m);
-                let dissipated = self.envelope_work_j(largest_m) - stored;
-                if top <= 0.0 {
-                    return (0.0, dissipated);
-                }
-                let share = self.force_n(deflection_m, largest_m) / top;
-                (share * share * stored, dissipated)
-            }
-        }
+        let i = self.piece_index(0, largest_m);
+        self.energies_on_j(i, &self.branch(i, largest_m), deflection_m)
     }
 }
 

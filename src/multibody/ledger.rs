@@ -6,9 +6,10 @@ use super::train::Chain;
 
 /// Energies in J and the worst imbalances over a run.
 ///
-/// `KE + ΣU + ΣD = KE₀`, with stored and dissipated energy exact from the envelopes'
-/// tables. The trapezoidal work of the forces would balance for any step and so check
-/// nothing.
+/// `KE + ΣU + ΣD + W = KE₀`, with stored and dissipated energy of the interfaces exact from
+/// their tables, and `W` what dampers and resistance took, by the trapezoidal rule over the
+/// steps. The trapezoidal work of the interfaces' forces would balance for any step and so
+/// check nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Ledger {
     #[serde(rename = "initial_kinetic_J")]
@@ -19,6 +20,12 @@ pub struct Ledger {
     pub stored_j: f64,
     #[serde(rename = "dissipated_J")]
     pub dissipated_j: f64,
+    /// By dampers.
+    #[serde(rename = "damped_J")]
+    pub damped_j: f64,
+    /// By running and braking resistance.
+    #[serde(rename = "resisted_J")]
+    pub resisted_j: f64,
     /// Largest imbalance of energy at any output, as a share of the initial kinetic energy.
     pub max_energy_error: f64,
     /// Largest imbalance of momentum at any output, as a share of `Σ m|v₀|`.
@@ -30,11 +37,13 @@ pub const ENERGY_TOLERANCE: f64 = 1e-3;
 /// Imbalance of momentum over which a warning is due.
 pub const MOMENTUM_TOLERANCE: f64 = 1e-10;
 
-/// The running account of a simulation.
+/// The running account of a simulation: at each output [`Account::begin`], every body and
+/// interface, [`Account::end`].
 pub(super) struct Account {
     ledger: Ledger,
     initial_momentum: f64,
     momentum_scale: f64,
+    momentum: f64,
 }
 
 impl Account {
@@ -47,37 +56,44 @@ impl Account {
             ledger,
             initial_momentum: bodies.iter().map(|b| b.mass_kg * b.speed_m_per_s).sum(),
             momentum_scale: bodies.iter().map(|b| b.mass_kg * b.speed_m_per_s.abs()).sum(),
+            momentum: 0.0,
         }
     }
 
-    /// Audits one state. `wall_impulse` is what the wall has taken so far, in N s.
-    pub fn audit(
-        &mut self,
-        chain: &Chain,
-        speed_m_per_s: &[f64],
-        deflection_m: &[f64],
-        largest_m: &[f64],
-        wall_impulse: f64,
-    ) {
+    pub fn begin(&mut self) {
         let ledger = &mut self.ledger;
-        let masses = || chain.bodies().iter().map(|b| b.mass_kg).zip(speed_m_per_s);
-        ledger.kinetic_j = masses().map(|(m, v)| 0.5 * m * v * v).sum();
-        (ledger.stored_j, ledger.dissipated_j) = (0.0, 0.0);
-        for ((interface, &d), &largest) in
-            chain.interfaces().iter().zip(deflection_m).zip(largest_m)
-        {
-            let (stored, dissipated) = interface.law.energies_j(d, largest);
-            ledger.stored_j += stored;
-            ledger.dissipated_j += dissipated;
-        }
-        let energy = ledger.kinetic_j + ledger.stored_j + ledger.dissipated_j;
-        let momentum: f64 = masses().map(|(m, v)| m * v).sum();
+        (ledger.kinetic_j, ledger.stored_j, ledger.dissipated_j) = (0.0, 0.0, 0.0);
+        self.momentum = 0.0;
+    }
+
+    pub fn body(&mut self, mass_kg: f64, v: f64) {
+        self.ledger.kinetic_j += 0.5 * mass_kg * v * v;
+        self.momentum += mass_kg * v;
+    }
+
+    pub fn interface(&mut self, stored_j: f64, dissipated_j: f64) {
+        self.ledger.stored_j += stored_j;
+        self.ledger.dissipated_j += dissipated_j;
+    }
+
+    pub fn rates(&mut self, damped_j: f64, resisted_j: f64) {
+        (self.ledger.damped_j, self.ledger.resisted_j) = (damped_j, resisted_j);
+    }
+
+    /// Audits the state. `impulse` is what wall and track have taken so far, in N s.
+    pub fn end(&mut self, impulse: f64) {
+        let ledger = &mut self.ledger;
+        let energy = ledger.kinetic_j
+            + ledger.stored_j
+            + ledger.dissipated_j
+            + ledger.damped_j
+            + ledger.resisted_j;
         let share = |difference: f64, scale: f64| {
             if difference == 0.0 { 0.0 } else { difference.abs() / scale }
         };
         let energy_error = share(energy - ledger.initial_kinetic_j, ledger.initial_kinetic_j);
         let momentum_error =
-            share(momentum + wall_impulse - self.initial_momentum, self.momentum_scale);
+            share(self.momentum + impulse - self.initial_momentum, self.momentum_scale);
         ledger.max_energy_error = ledger.max_energy_error.max(energy_error);
         ledger.max_momentum_error = ledger.max_momentum_error.max(momentum_error);
     }

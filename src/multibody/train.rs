@@ -1,5 +1,8 @@
 //! The immutable model: bodies in a row and the interfaces between them.
 
+use std::sync::Arc;
+
+use super::damping::Damping;
 use super::interface::ForceLaw;
 
 /// One mass.
@@ -9,6 +12,50 @@ pub struct Body {
     pub mass_kg: f64,
     /// Initial speed, positive in the direction in which the first train moves.
     pub speed_m_per_s: f64,
+    /// Running and braking resistance; none by default.
+    pub resistance: Resistance,
+}
+
+impl Body {
+    /// A body that runs without resistance.
+    pub fn new(name: impl Into<String>, mass_kg: f64, speed_m_per_s: f64) -> Self {
+        Self { name: name.into(), mass_kg, speed_m_per_s, resistance: Resistance::default() }
+    }
+}
+
+/// Resistance against a body's motion over the track,
+/// `R = m (A + B|v| + C v² + μ g) sgn(v)`, with `sgn` smoothed to `tanh(v / 0.05 m/s)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Resistance {
+    /// `A` of the running resistance (Davis' equation per mass), in m/s².
+    pub constant_m_per_s2: f64,
+    /// `B`, in 1/s.
+    pub linear_per_s: f64,
+    /// `C`, in 1/m.
+    pub quadratic_per_m: f64,
+    /// Coefficient of friction `μ` of the brakes, over the whole weight.
+    pub braking: f64,
+}
+
+/// Standard gravity in m/s² (CGPM 1901).
+pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
+/// Speed over which the sign of the velocity is smoothed, in m/s.
+const SMOOTH_M_PER_S: f64 = 0.05;
+
+impl Resistance {
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Force against the motion of `mass_kg` at `v_m_per_s`, with its sign, in N.
+    pub fn force_n(&self, mass_kg: f64, v_m_per_s: f64) -> f64 {
+        let v = v_m_per_s.abs();
+        let rate = self.constant_m_per_s2
+            + self.linear_per_s * v
+            + self.quadratic_per_m * v * v
+            + self.braking * STANDARD_GRAVITY_M_PER_S2;
+        mass_kg * rate * (v_m_per_s / SMOOTH_M_PER_S).tanh()
+    }
 }
 
 /// The interface in front of a body.
@@ -16,9 +63,45 @@ pub struct Body {
 pub struct Interface {
     /// `A1|A2`, `A1|wall`.
     pub name: String,
-    pub law: ForceLaw,
+    /// Under compression.
+    pub law: Arc<ForceLaw>,
     /// Free distance before contact, in m.
     pub gap_m: f64,
+    /// Under tension, where the bodies are coupled.
+    pub tension: Option<Tension>,
+    /// Parallel to the law, while it is in contact.
+    pub damping: Option<Damping>,
+}
+
+/// A law on the extension beyond the distance at which the bodies stand at first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tension {
+    pub law: Arc<ForceLaw>,
+    /// Extension before the coupling pulls, in m.
+    pub slack_m: f64,
+}
+
+impl Interface {
+    /// An interface that only pushes.
+    pub fn new(name: impl Into<String>, law: impl Into<Arc<ForceLaw>>, gap_m: f64) -> Self {
+        Self { name: name.into(), law: law.into(), gap_m, tension: None, damping: None }
+    }
+
+    /// The same with a law that also pulls.
+    pub fn with_tension(self, law: impl Into<Arc<ForceLaw>>, slack_m: f64) -> Self {
+        Self { tension: Some(Tension { law: law.into(), slack_m }), ..self }
+    }
+
+    /// The same with a damper.
+    pub fn with_damping(self, damping: Damping) -> Self {
+        Self { damping: Some(damping), ..self }
+    }
+
+    /// Largest stiffness of all that acts here, in N/m.
+    pub fn max_stiffness_n_per_m(&self) -> f64 {
+        let pulls = self.tension.as_ref().map_or(0.0, |t| t.law.max_stiffness_n_per_m());
+        self.law.max_stiffness_n_per_m().max(pulls)
+    }
 }
 
 /// Bodies from back to front (increasing x), each with the interface to the next one.
@@ -42,8 +125,10 @@ pub enum ChainError {
     Mass { name: String, mass_kg: f64 },
     #[error("the speed of {name} is {speed_m_per_s} m/s: expected a finite number")]
     Speed { name: String, speed_m_per_s: f64 },
-    #[error("the gap of {name} is {gap_m} m: expected 0 or more")]
-    Gap { name: String, gap_m: f64 },
+    #[error("the {what} of {name} is {length_m} m: expected 0 or more")]
+    Length { what: &'static str, name: String, length_m: f64 },
+    #[error("the resistance of {name} has the term {value}: expected 0 or more")]
+    Resistance { name: String, value: f64 },
 }
 
 impl Chain {
@@ -60,18 +145,28 @@ impl Chain {
             return Err(ChainError::Interfaces { bodies, interfaces });
         }
         for body in &bodies {
-            let Body { name, mass_kg, speed_m_per_s } = body.clone();
+            let Body { mass_kg, speed_m_per_s, resistance, .. } = *body;
+            let name = || body.name.clone();
             if !(mass_kg > 0.0 && mass_kg.is_finite()) {
-                return Err(ChainError::Mass { name, mass_kg });
+                return Err(ChainError::Mass { name: name(), mass_kg });
             }
             if !speed_m_per_s.is_finite() {
-                return Err(ChainError::Speed { name, speed_m_per_s });
+                return Err(ChainError::Speed { name: name(), speed_m_per_s });
+            }
+            let Resistance { constant_m_per_s2, linear_per_s, quadratic_per_m, braking } =
+                resistance;
+            for value in [constant_m_per_s2, linear_per_s, quadratic_per_m, braking] {
+                if !(value >= 0.0 && value.is_finite()) {
+                    return Err(ChainError::Resistance { name: name(), value });
+                }
             }
         }
         for interface in &interfaces {
-            if !(interface.gap_m >= 0.0 && interface.gap_m.is_finite()) {
-                let (name, gap_m) = (interface.name.clone(), interface.gap_m);
-                return Err(ChainError::Gap { name, gap_m });
+            let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
+            for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
+                if !(length_m >= 0.0 && length_m.is_finite()) {
+                    return Err(ChainError::Length { what, name: interface.name.clone(), length_m });
+                }
             }
         }
         Ok(Self { bodies, interfaces })
@@ -85,15 +180,32 @@ impl Chain {
         &self.interfaces
     }
 
-    /// Longest time step, `0.03 sqrt(m_min / k_max)` in s; infinite for interfaces without
-    /// stiffness.
-    ///
-    /// Verlet's energy swings by about `(ω h)²/8` with `ω² ≤ 4 k_max/m_min`, so this keeps
-    /// the ledger within its 1e-3; the usual `0.1` would not.
-    pub fn longest_step_s(&self) -> f64 {
-        let lightest = self.bodies.iter().map(|b| b.mass_kg).fold(f64::INFINITY, f64::min);
-        let stiffest =
-            self.interfaces.iter().map(|i| i.law.max_stiffness_n_per_m()).fold(0.0, f64::max);
-        0.03 * (lightest / stiffest).sqrt()
+    /// Whether the row ends at a rigid wall.
+    pub fn has_wall(&self) -> bool {
+        self.interfaces.len() == self.bodies.len()
+    }
+
+    /// Whether forces depend on speeds: dampers, resistance.
+    pub fn has_rates(&self) -> bool {
+        self.interfaces.iter().any(|i| i.damping.is_some())
+            || self.bodies.iter().any(|b| !b.resistance.is_none())
+    }
+
+    /// Shortest `sqrt(m/k)` of all interfaces in s, with the lighter of the two bodies and the
+    /// stiffest part of the law (a damper counts as `m/c`), and the interface's index;
+    /// infinite for interfaces without stiffness.
+    pub fn shortest_time_s(&self) -> (f64, usize) {
+        let mass = |i: usize| self.bodies.get(i).map_or(f64::INFINITY, |b| b.mass_kg);
+        let mut shortest = (f64::INFINITY, 0);
+        for (k, interface) in self.interfaces.iter().enumerate() {
+            let lighter = mass(k).min(mass(k + 1));
+            let spring = (lighter / interface.max_stiffness_n_per_m()).sqrt();
+            let damper = interface.damping.as_ref().map_or(f64::INFINITY, |d| lighter / d.largest());
+            let time = spring.min(damper);
+            if time < shortest.0 {
+                shortest = (time, k);
+            }
+        }
+        shortest
     }
 }

@@ -5,7 +5,6 @@ use crate::curve::rating::l1_ratio;
 use crate::curve::resample::interpolate;
 use crate::curve::{Case, Envelope};
 use crate::history::derivative;
-use crate::multibody::integrator::DEFAULT_STEP_S;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
     Unloading, simulate,
@@ -113,8 +112,7 @@ impl Reference {
     /// # Errors
     /// [`MotionError`] if the curve makes no run.
     pub fn run(&self, driver: &Driver) -> Result<Run, MotionError> {
-        let body =
-            Body { name: "body".into(), mass_kg: self.mass_kg, speed_m_per_s: self.speed_m_per_s };
+        let body = Body::new("body", self.mass_kg, self.speed_m_per_s);
         let envelope = driver.envelope.clone();
         let stiffness_n_per_m = driver.stiffness_n_per_m.unwrap_or_else(|| envelope.max_slope());
         let unloading = match stiffness_n_per_m > 0.0 {
@@ -122,17 +120,13 @@ impl Reference {
             // A curve that never rises has no line to unload on.
             false => Unloading::Elastic,
         };
-        let interface = Interface {
-            name: "body|wall".into(),
-            law: ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold),
-            gap_m: 0.0,
-        };
+        let law = ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold);
+        let interface = Interface::new("body|wall", law, 0.0);
         let chain = Chain::new(vec![body], vec![interface])?;
         let output_interval_s = self.time_s[1] - self.time_s[0];
         // One output more than is compared, so that rounding cannot make it too short.
         let duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
-        let settings = RunSettings { duration_s, output_interval_s, step_s: DEFAULT_STEP_S };
-        Ok(simulate(&chain, &settings)?)
+        Ok(simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?)
     }
 
     /// Errors of a run's first body.

@@ -1,0 +1,71 @@
+//! Dampers: a coefficient over the closing speed.
+
+/// A damper's coefficient over the magnitude of its speed, piecewise linear, held beyond its
+/// ends.
+///
+/// Invariant: at least one point; speeds at least 0 and strictly increasing; coefficients
+/// finite and at least 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Damping {
+    speed_m_per_s: Vec<f64>,
+    coefficient_n_s_per_m: Vec<f64>,
+}
+
+/// Why two columns are no damper.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DampingError {
+    #[error("a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}")]
+    Lengths { speeds: usize, coefficients: usize },
+    #[error("point {point} of the damper is ({speed_m_per_s} m/s, {coefficient_n_s_per_m} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more")]
+    Point { point: usize, speed_m_per_s: f64, coefficient_n_s_per_m: f64 },
+}
+
+impl Damping {
+    /// # Errors
+    /// [`DampingError`] names the first point that breaks the invariant, counted from 1.
+    pub fn new(
+        speed_m_per_s: Vec<f64>,
+        coefficient_n_s_per_m: Vec<f64>,
+    ) -> Result<Self, DampingError> {
+        let (speeds, coefficients) = (speed_m_per_s.len(), coefficient_n_s_per_m.len());
+        if speeds != coefficients || speeds == 0 {
+            return Err(DampingError::Lengths { speeds, coefficients });
+        }
+        let mut before = -f64::MIN_POSITIVE;
+        for (i, (&v, &c)) in speed_m_per_s.iter().zip(&coefficient_n_s_per_m).enumerate() {
+            if !(v > before && v >= 0.0 && v.is_finite() && c >= 0.0 && c.is_finite()) {
+                return Err(DampingError::Point {
+                    point: i + 1,
+                    speed_m_per_s: v,
+                    coefficient_n_s_per_m: c,
+                });
+            }
+            before = v;
+        }
+        Ok(Self { speed_m_per_s, coefficient_n_s_per_m })
+    }
+
+    /// The same coefficient in N s/m at all speeds.
+    ///
+    /// # Errors
+    /// [`DampingError::Point`] for a coefficient below 0.
+    pub fn constant(coefficient_n_s_per_m: f64) -> Result<Self, DampingError> {
+        Self::new(vec![0.0], vec![coefficient_n_s_per_m])
+    }
+
+    /// Coefficient in N s/m at a speed of either sign.
+    pub fn at(&self, speed_m_per_s: f64) -> f64 {
+        let (v, c) = (&self.speed_m_per_s, &self.coefficient_n_s_per_m);
+        let speed = speed_m_per_s.abs();
+        match v.partition_point(|&v| v <= speed) {
+            0 => c[0],
+            i if i == v.len() => c[i - 1],
+            i => c[i - 1] + (c[i] - c[i - 1]) * (speed - v[i - 1]) / (v[i] - v[i - 1]),
+        }
+    }
+
+    /// Largest coefficient, in N s/m.
+    pub fn largest(&self) -> f64 {
+        self.coefficient_n_s_per_m.iter().copied().fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,270 @@
+//! Reference integrator: extrapolation with adaptive order and step, independent of the
+//! engine's pieces.
+//!
+//! Gragg's modified midpoint rule, extrapolated in h² (E. Hairer, S. P. Nørsett, G. Wanner,
+//! Solving Ordinary Differential Equations I, II.8 and II.9). Memory advances on accepted steps
+//! only; inside a step the force takes the larger of memory and deflection.
+
+use super::integrator::{Record, Run, RunSettings, SimulationError};
+use super::interface::ForceLaw;
+use super::ledger::Account;
+use super::train::Chain;
+use super::watch::Watch;
+
+/// Error per step, relative to the speeds and crushes of the run.
+const TOLERANCE: f64 = 1e-12;
+/// Rows of the extrapolation, with `2 (j + 1)` substeps each.
+const ROWS: usize = 8;
+/// Below this step something is no function.
+const SHORTEST_S: f64 = 1e-15;
+
+struct Motion<'a> {
+    chain: &'a Chain,
+    /// Largest deflection and extension so far.
+    pushed_m: Vec<f64>,
+    pulled_m: Vec<f64>,
+}
+
+/// Deflection, extension and net force at an interface.
+struct Contact {
+    deflection_m: f64,
+    extension_m: f64,
+    spring_n: f64,
+    damper_n: f64,
+    closing: f64,
+}
+
+impl Motion<'_> {
+    fn contact(&self, y: &[f64], k: usize) -> Contact {
+        let n = self.chain.bodies().len();
+        let interface = &self.chain.interfaces()[k];
+        let at = |i: usize, speed: bool| match i < n {
+            true => y[if speed { n + i } else { i }],
+            false => 0.0,
+        };
+        let moved = at(k, false) - at(k + 1, false);
+        let closing = at(k, true) - at(k + 1, true);
+        let deflection_m = moved - interface.gap_m;
+        let force = |law: &ForceLaw, d: f64, largest: f64| law.force_n(d, largest.max(d).max(0.0));
+        let pushes = force(&interface.law, deflection_m, self.pushed_m[k]);
+        let (mut extension_m, mut pulls) = (-1.0, 0.0);
+        if let Some(tension) = &interface.tension {
+            extension_m = -moved - tension.slack_m;
+            pulls = force(&tension.law, extension_m, self.pulled_m[k]);
+        }
+        let spring_n = pushes - pulls;
+        let mut damper_n = 0.0;
+        if let Some(damping) = &interface.damping
+            && spring_n != 0.0
+        {
+            damper_n = damping.at(closing) * closing;
+            if interface.tension.is_none() {
+                damper_n = damper_n.max(-spring_n);
+            }
+        }
+        Contact { deflection_m, extension_m, spring_n, damper_n, closing }
+    }
+
+    /// Rates of positions, speeds, then of the impulse of wall and track, of damped and of
+    /// resisted energy.
+    fn rates(&self, y: &[f64]) -> Vec<f64> {
+        let bodies = self.chain.bodies();
+        let n = bodies.len();
+        let mut rates = vec![0.0; 2 * n + 3];
+        let mut behind = 0.0;
+        for (i, body) in bodies.iter().enumerate() {
+            let mut ahead = 0.0;
+            if i < self.chain.interfaces().len() {
+                let contact = self.contact(y, i);
+                ahead = contact.spring_n + contact.damper_n;
+                rates[2 * n + 1] += contact.damper_n * contact.closing;
+            }
+            let v = y[n + i];
+            let resistance = body.resistance.force_n(body.mass_kg, v);
+            rates[i] = v;
+            rates[n + i] = (behind - ahead - resistance) / body.mass_kg;
+            rates[2 * n] += resistance;
+            rates[2 * n + 2] += resistance * v;
+            behind = ahead;
+        }
+        if self.chain.has_wall() {
+            rates[2 * n] += behind;
+        }
+        rates
+    }
+
+    /// Gragg's rule over `h` with `2 (row + 1)` substeps.
+    fn midpoint(&self, y: &[f64], first: &[f64], h: f64, row: usize) -> Vec<f64> {
+        let substeps = 2 * (row + 1);
+        let step = h / substeps as f64;
+        let mut before = y.to_vec();
+        let mut now: Vec<f64> = y.iter().zip(first).map(|(y, f)| y + step * f).collect();
+        for _ in 1..substeps {
+            let rates = self.rates(&now);
+            for ((before, now), rate) in before.iter_mut().zip(&mut now).zip(&rates) {
+                let next = *before + 2.0 * step * rate;
+                (*before, *now) = (*now, next);
+            }
+        }
+        let rates = self.rates(&now);
+        before.iter().zip(&now).zip(&rates).map(|((b, n), r)| 0.5 * (b + n + step * r)).collect()
+    }
+
+    /// The state after `h`, and its error over the tolerance.
+    fn step(&self, y: &[f64], h: f64, scale: &[f64]) -> (Vec<f64>, f64) {
+        let first = self.rates(y);
+        let mut table: Vec<Vec<f64>> = Vec::with_capacity(ROWS);
+        let mut error = f64::INFINITY;
+        for row in 0..ROWS {
+            let mut value = self.midpoint(y, &first, h, row);
+            // Aitken and Neville in h², along the last row of the table.
+            for (back, previous) in table.iter_mut().enumerate().rev().map(|(k, t)| (row - k, t)) {
+                let ratio = ((row + 1) as f64 / (row + 1 - back) as f64).powi(2);
+                error = 0.0;
+                for ((v, p), s) in value.iter_mut().zip(previous.iter_mut()).zip(scale) {
+                    let improved = *v + (*v - *p) / (ratio - 1.0);
+                    error = error.max((improved - *v).abs() / (TOLERANCE * s));
+                    (*p, *v) = (*v, improved);
+                }
+            }
+            table.push(value);
+            if error <= 1.0 {
+                break;
+            }
+        }
+        (table.pop().unwrap_or_else(|| y.to_vec()), error)
+    }
+}
+
+/// Runs the chain; extremes are those at the outputs.
+pub(super) fn run(
+    chain: &Chain,
+    settings: &RunSettings,
+    run: &mut Run,
+    outputs: usize,
+) -> Result<(), SimulationError> {
+    let (bodies, interfaces) = (chain.bodies(), chain.interfaces());
+    let n = bodies.len();
+    let start = super::engine::first_contact(chain);
+    let mut y = vec![0.0; 2 * n + 3];
+    for i in 0..n {
+        (y[i], y[n + i]) = (start[i], bodies[i].speed_m_per_s);
+    }
+    let none = vec![0.0; interfaces.len()];
+    let mut motion = Motion { chain, pushed_m: none.clone(), pulled_m: none };
+    let fastest = bodies.iter().map(|b| b.speed_m_per_s.abs()).fold(1e-3, f64::max);
+    let heaviest = bodies.iter().map(|b| b.mass_kg).fold(0.0, f64::max);
+    let momentum = fastest * heaviest;
+    let scale: Vec<f64> = (0..2 * n + 3)
+        .map(|i| match i {
+            _ if i < n => fastest * 0.1,
+            _ if i < 2 * n => fastest,
+            _ if i == 2 * n => momentum,
+            _ => momentum * fastest,
+        })
+        .collect();
+    let mut account = Account::open(chain);
+    let mut watch = Watch::new(chain);
+    let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
+    record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
+    for output in 1..=outputs {
+        let end_s = output as f64 * settings.output_interval_s;
+        let mut time_s = (output - 1) as f64 * settings.output_interval_s;
+        while time_s < end_s {
+            let left = end_s - time_s;
+            let last = h >= left;
+            let step = if last { left } else { h };
+            let (next, error) = motion.step(&y, step, &scale);
+            if error <= 1.0 {
+                y = next;
+                time_s = if last { end_s } else { time_s + step };
+                for k in 0..interfaces.len() {
+                    let contact = motion.contact(&y, k);
+                    if interfaces[k].law.is_beyond_end(contact.deflection_m) {
+                        return Err(SimulationError::CurveEnd {
+                            interface: interfaces[k].name.clone(),
+                            deflection_m: contact.deflection_m,
+                            time_s,
+                            end_m: interfaces[k].law.end_m(),
+                        });
+                    }
+                    motion.pushed_m[k] = motion.pushed_m[k].max(contact.deflection_m);
+                    motion.pulled_m[k] = motion.pulled_m[k].max(contact.extension_m);
+                }
+                if !last || error < 0.01 {
+                    h = (1.5 * h).min(settings.output_interval_s);
+                }
+            } else {
+                h = 0.3 * step;
+            }
+            if !y.iter().all(|y| y.is_finite()) {
+                let i = (0..n).find(|&i| !y[n + i].is_finite()).unwrap_or(0);
+                return Err(SimulationError::Diverged { body: bodies[i].name.clone(), time_s });
+            }
+            if h < SHORTEST_S {
+                return Err(SimulationError::Stuck { step_s: SHORTEST_S, time_s });
+            }
+        }
+        record(&motion, &y, end_s, settings.record, run, &mut account, &mut watch);
+    }
+    watch.close(run, settings.record, settings.output_interval_s);
+    run.ledger = account.close();
+    Ok(())
+}
+
+fn record(
+    motion: &Motion<'_>,
+    y: &[f64],
+    time_s: f64,
+    what: Record,
+    run: &mut Run,
+    account: &mut Account,
+    watch: &mut Watch,
+) {
+    let chain = motion.chain;
+    let n = chain.bodies().len();
+    let rates = motion.rates(y);
+    let histories = what == Record::Histories;
+    account.begin();
+    for (k, history) in run.interfaces.iter_mut().enumerate() {
+        let interface = &chain.interfaces()[k];
+        let contact = motion.contact(y, k);
+        let (mut stored, mut dissipated) =
+            interface.law.energies_j(contact.deflection_m, motion.pushed_m[k]);
+        if let Some(tension) = &interface.tension {
+            let pulls = tension.law.energies_j(contact.extension_m, motion.pulled_m[k]);
+            (stored, dissipated) = (stored + pulls.0, dissipated + pulls.1);
+        }
+        account.interface(stored, dissipated);
+        let force_n = contact.spring_n + contact.damper_n;
+        watch.output_interface(k, contact.deflection_m, force_n, time_s);
+        if histories {
+            history.deflection_m.push(contact.deflection_m);
+            history.force_n.push(force_n);
+            history.largest_deflection_m.push(motion.pushed_m[k]);
+            history.stored_j.push(stored);
+            history.dissipated_j.push(dissipated);
+        }
+        if contact.spring_n != 0.0 {
+            for i in [k, k + 1] {
+                if i < n {
+                    watch.body(i, true, time_s, y[n + i]);
+                }
+            }
+        }
+    }
+    for (i, history) in run.bodies.iter_mut().enumerate() {
+        account.body(chain.bodies()[i].mass_kg, y[n + i]);
+        watch.output_body(i, y[n + i], rates[n + i], time_s);
+        history.v_m_per_s.push(y[n + i]);
+        if histories {
+            history.x_m.push(y[i]);
+            history.a_m_per_s2.push(rates[n + i]);
+        }
+    }
+    if histories {
+        run.time_s.push(time_s);
+    }
+    account.rates(y[2 * n + 1], y[2 * n + 2]);
+    account.end(y[2 * n]);
+}
