@@ -45,6 +45,8 @@ pub mod build;
 
 pub mod dataset;
 
+mod stream;
+
 pub mod forest;
 
 pub mod surrogate;
