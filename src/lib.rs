@@ -53,6 +53,8 @@ pub mod surrogate;
 
 pub mod multibody;
 
+pub mod nsdm;
+
 pub mod export;
 
 pub mod scenario;
