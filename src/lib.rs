@@ -45,11 +45,15 @@ pub mod build;
 
 pub mod dataset;
 
+mod stream;
+
 pub mod forest;
 
 pub mod surrogate;
 
 pub mod multibody;
+
+pub mod nsdm;
 
 pub mod export;
 

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use super::grow::{Table, grow};
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
 use super::quantiles::Members;
-use super::stream::Stream;
 use super::tree::{Tree, TreeError};
 use super::walk::{BATCH, Rows, Walk, groups};
+use crate::stream::Stream;
 
 /// A fitted regression forest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,8 +7,8 @@ use linfa::Float;
 use super::criterion::{Sums, stops};
 use super::params::ForestValidParams;
 use super::splitter::{self, Drawn, Room, Rules};
-use super::stream::Stream;
 use super::tree::Tree;
+use crate::stream::Stream;
 
 /// Training data by columns; shared by all trees.
 ///

@@ -27,7 +27,6 @@ mod onnx;
 mod params;
 mod quantiles;
 mod splitter;
-mod stream;
 mod tree;
 mod walk;
 

@@ -4,7 +4,7 @@ use linfa::Float;
 
 use super::criterion::Sums;
 use super::params::{FeaturesPerSplit, ForestValidParams, Thresholds, Ties};
-use super::stream::Stream;
+use crate::stream::Stream;
 
 /// A drawn sample in a feature's order. What a scan reads stands side by side, so that it
 /// goes through memory in one direction.

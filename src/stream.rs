@@ -1,17 +1,17 @@
-//! One random stream per tree, keyed by seed and tree, independent of threads.
+//! Random streams keyed by seed and number: one per tree or individual, whichever thread draws.
 
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Random draws of one tree.
+/// Random draws of one tree of a forest, or of one pair of parents.
 pub struct Stream(Xoshiro256PlusPlus);
 
 impl Stream {
-    /// The stream of tree `tree` under `seed`: the two are mixed by SplitMix64, whose
+    /// The stream number `number` under `seed`: the two are mixed by SplitMix64, whose
     /// output function is a bijection with full avalanche, so neighbouring keys give
     /// unrelated streams.
-    pub fn new(seed: u64, tree: u64) -> Self {
-        let key = mix(seed).wrapping_add(mix(tree.wrapping_add(0x9E37_79B9_7F4A_7C15)));
+    pub fn new(seed: u64, number: u64) -> Self {
+        let key = mix(seed).wrapping_add(mix(number.wrapping_add(0x9E37_79B9_7F4A_7C15)));
         Self(Xoshiro256PlusPlus::seed_from_u64(mix(key)))
     }
 
@@ -39,8 +39,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn streams_depend_on_seed_and_tree() {
-        let first = |seed, tree| Stream::new(seed, tree).below(usize::MAX);
+    fn streams_depend_on_seed_and_number() {
+        let first = |seed, number| Stream::new(seed, number).below(usize::MAX);
         assert_eq!(first(1, 2), first(1, 2));
         assert_ne!(first(1, 2), first(2, 1));
         assert_ne!(first(1, 2), first(1, 3));

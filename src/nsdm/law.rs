@@ -1,0 +1,275 @@
+//! The law of the nonlinear spring-damper: two piecewise linear functions.
+
+use serde::{Deserialize, Serialize};
+
+use super::NsdmError;
+use crate::curve::{Envelope, EnvelopeError};
+
+/// Largest difference between [`Nsdm::envelope`] and the spring, as a share of its peak.
+const ENVELOPE_ERROR: f64 = 1e-4;
+
+/// A continuous, piecewise linear function of a magnitude; its last value is held beyond.
+///
+/// Invariant: as many values as nodes, at least two; nodes finite and strictly increasing
+/// from 0; values finite and not below 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PiecewiseLinear {
+    nodes: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl PiecewiseLinear {
+    /// Checks the invariant once.
+    ///
+    /// # Errors
+    /// [`NsdmError::NodeCount`], [`NsdmError::Node`], naming the first bad node from 1.
+    pub fn new(nodes: Vec<f64>, values: Vec<f64>) -> Result<Self, NsdmError> {
+        if nodes.len() != values.len() || nodes.len() < 2 {
+            return Err(NsdmError::NodeCount { nodes: nodes.len(), values: values.len() });
+        }
+        for (i, (&at, &value)) in nodes.iter().zip(&values).enumerate() {
+            let ordered = if i == 0 { at == 0.0 } else { at > nodes[i - 1] };
+            if !(ordered && at.is_finite() && value >= 0.0 && value.is_finite()) {
+                return Err(NsdmError::Node { node: i + 1, at, value });
+            }
+        }
+        Ok(Self { nodes, values })
+    }
+
+    pub fn nodes(&self) -> &[f64] {
+        &self.nodes
+    }
+
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Value at `|u|`; the last value beyond the last node.
+    pub fn at(&self, u: f64) -> f64 {
+        let u = u.abs();
+        let i = self.nodes.partition_point(|&node| node <= u);
+        if i >= self.nodes.len() {
+            return self.values[self.values.len() - 1];
+        }
+        // Nodes begin at 0, so one lies at or before any magnitude; a NaN takes the first segment.
+        let i = i.max(1);
+        let share = (u - self.nodes[i - 1]) / (self.nodes[i] - self.nodes[i - 1]);
+        self.values[i - 1] + share * (self.values[i] - self.values[i - 1])
+    }
+
+    /// Where the last value begins to hold.
+    pub fn end(&self) -> f64 {
+        self.nodes[self.nodes.len() - 1]
+    }
+}
+
+/// Spring and damper of one mass: `m x'' + c(|x'|) x' + k(|x|) x = 0`.
+///
+/// `k` multiplies `x`: it is a secant stiffness. The stiffness ends at the largest
+/// displacement of the motion that the law was fitted to, the damping at its impact speed;
+/// beyond either, the last value is held, also when the law is applied at a higher speed.
+///
+/// As JSON: `deflection_m`, `stiffness_N_per_m`, `speed_m_per_s`, `damping_N_s_per_m`;
+/// reading checks the invariants of both functions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Columns", into = "Columns")]
+pub struct Nsdm {
+    /// `k` in N/m over `|x|` in m.
+    pub stiffness: PiecewiseLinear,
+    /// `c` in N s/m over `|x'|` in m/s.
+    pub damping: PiecewiseLinear,
+}
+
+/// The law as a file has it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Columns {
+    deflection_m: Vec<f64>,
+    #[serde(rename = "stiffness_N_per_m")]
+    stiffness_n_per_m: Vec<f64>,
+    speed_m_per_s: Vec<f64>,
+    #[serde(rename = "damping_N_s_per_m")]
+    damping_n_s_per_m: Vec<f64>,
+}
+
+impl TryFrom<Columns> for Nsdm {
+    type Error = NsdmError;
+
+    fn try_from(columns: Columns) -> Result<Self, NsdmError> {
+        Ok(Self {
+            stiffness: PiecewiseLinear::new(columns.deflection_m, columns.stiffness_n_per_m)?,
+            damping: PiecewiseLinear::new(columns.speed_m_per_s, columns.damping_n_s_per_m)?,
+        })
+    }
+}
+
+impl From<Nsdm> for Columns {
+    fn from(law: Nsdm) -> Self {
+        Self {
+            deflection_m: law.stiffness.nodes,
+            stiffness_n_per_m: law.stiffness.values,
+            speed_m_per_s: law.damping.nodes,
+            damping_n_s_per_m: law.damping.values,
+        }
+    }
+}
+
+impl Nsdm {
+    /// `k(|x|) x` in N, at `x` in m.
+    pub fn spring_force_n(&self, x_m: f64) -> f64 {
+        self.stiffness.at(x_m) * x_m
+    }
+
+    /// `c(|x'|)` in N s/m, at a speed in m/s.
+    pub fn damping_n_s_per_m(&self, speed_m_per_s: f64) -> f64 {
+        self.damping.at(speed_m_per_s)
+    }
+
+    /// The spring alone as an envelope, within 1e-4 of its peak force.
+    ///
+    /// Between two nodes the force is a parabola, so each segment is cut as finely as its
+    /// curvature asks for. The table goes to twice the last node: there the force is a straight
+    /// line through the origin, which an interface continues by `EnvelopeEnd::Slope`.
+    ///
+    /// # Errors
+    /// [`EnvelopeError`] for stiffnesses whose force is beyond a double.
+    pub fn envelope(&self) -> Result<Envelope, EnvelopeError> {
+        let nodes = self.stiffness.nodes();
+        let segments: Vec<Parabola> = (1..nodes.len()).map(|i| self.parabola(i)).collect();
+        let peak = segments.iter().map(Parabola::peak_n).fold(0.0, f64::max);
+        let (mut deflection_m, mut force_n) = (vec![0.0], vec![0.0]);
+        for segment in &segments {
+            // A chord over δ leaves a parabola of curvature 2b by at most bδ²/4.
+            let length_m = segment.to_m - segment.from_m;
+            let pieces = length_m * (segment.b.abs() / (4.0 * ENVELOPE_ERROR * peak)).sqrt();
+            // At most 100, because no force is below 0: bδ²/4 over the whole segment is then no
+            // more than the peak. Without any force the root is that of 0/0, which `max` drops.
+            let pieces = pieces.ceil().max(1.0) as usize;
+            for j in 1..=pieces {
+                let share = j as f64 / pieces as f64;
+                let d = if j == pieces { segment.to_m } else { segment.from_m + share * length_m };
+                deflection_m.push(d);
+                force_n.push(self.spring_force_n(d));
+            }
+        }
+        let end_m = 2.0 * self.stiffness.end();
+        deflection_m.push(end_m);
+        force_n.push(self.spring_force_n(end_m));
+        Envelope::new(deflection_m, force_n)
+    }
+
+    /// The spring force between node `i − 1` and node `i`.
+    fn parabola(&self, i: usize) -> Parabola {
+        let (x, k) = (self.stiffness.nodes(), self.stiffness.values());
+        let b = (k[i] - k[i - 1]) / (x[i] - x[i - 1]);
+        Parabola { from_m: x[i - 1], to_m: x[i], a: k[i - 1] - b * x[i - 1], b }
+    }
+}
+
+/// `F = a x + b x²` between two deflections.
+struct Parabola {
+    from_m: f64,
+    to_m: f64,
+    a: f64,
+    b: f64,
+}
+
+impl Parabola {
+    /// Largest force, which may lie between the nodes.
+    fn peak_n(&self) -> f64 {
+        let force = |x: f64| (self.a + self.b * x) * x;
+        let top = (-0.5 * self.a / self.b).clamp(self.from_m, self.to_m);
+        // A straight segment has no top: 0/0 is dropped by `max`.
+        force(self.from_m).max(force(self.to_m)).max(force(top))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub fn law() -> Nsdm {
+        Nsdm {
+            stiffness: PiecewiseLinear::new(vec![0.0, 0.1, 0.5, 1.0], vec![9e7, 1e7, 2e6, 3e6])
+                .unwrap(),
+            damping: PiecewiseLinear::new(vec![0.0, 5.0, 13.0], vec![0.0, 2e4, 1e5]).unwrap(),
+        }
+    }
+
+    #[test]
+    fn values_between_nodes_and_beyond() {
+        let law = law();
+        assert_eq!(law.spring_force_n(0.05), 5e7 * 0.05);
+        assert_eq!(law.spring_force_n(-0.05), -5e7 * 0.05);
+        assert_eq!(law.spring_force_n(2.0), 6e6);
+        assert_eq!(law.damping_n_s_per_m(-9.0), 6e4);
+        assert_eq!(law.damping_n_s_per_m(20.0), 1e5);
+    }
+
+    #[test]
+    fn wrong_nodes_are_named() {
+        let refused = |nodes: &[f64], values: &[f64]| {
+            PiecewiseLinear::new(nodes.to_vec(), values.to_vec()).unwrap_err().to_string()
+        };
+        assert_eq!(
+            refused(&[0.0, 1.0], &[1.0]),
+            "a law needs a value at each of at least 2 nodes, found 2 nodes and 1 values"
+        );
+        let expected = "expected nodes that increase from 0 and values of 0 or more, all finite";
+        assert_eq!(
+            refused(&[0.0, 1.0, 1.0], &[1.0, 1.0, 2.0]),
+            format!("node 3 of a law is (1, 2): {expected}")
+        );
+        assert_eq!(
+            refused(&[0.5, 1.0], &[1.0; 2]),
+            format!("node 1 of a law is (0.5, 1): {expected}")
+        );
+        assert_eq!(
+            refused(&[0.0, 1.0], &[1.0, -1.0]),
+            format!("node 2 of a law is (1, -1): {expected}")
+        );
+        assert!(PiecewiseLinear::new(vec![0.0, f64::INFINITY], vec![1.0; 2]).is_err());
+        assert!(PiecewiseLinear::new(vec![0.0, 1.0], vec![f64::NAN, 1.0]).is_err());
+    }
+
+    #[test]
+    fn survives_json_and_refuses_a_damaged_one() {
+        let text = serde_json::to_string(&law()).unwrap();
+        assert_eq!(serde_json::from_str::<Nsdm>(&text).unwrap(), law());
+        let damaged = text.replace("[0.0,5.0,13.0]", "[0.0,15.0,13.0]");
+        assert_ne!(damaged, text);
+        let error = serde_json::from_str::<Nsdm>(&damaged).unwrap_err().to_string();
+        assert!(error.starts_with("node 3 of a law is (13, 100000)"), "{error}");
+    }
+
+    #[test]
+    fn envelope_is_the_spring() {
+        let law = law();
+        let envelope = law.envelope().unwrap();
+        // The peak up to the last node is the force there.
+        let peak = 3e6;
+        let mut worst = 0.0_f64;
+        for i in 0..=20_000 {
+            let x = 1e-4 * f64::from(i);
+            worst = worst.max((envelope.force_at(x) - law.spring_force_n(x)).abs());
+        }
+        assert!(worst <= 1e-4 * peak, "{worst} N");
+        assert!(worst > 0.5e-4 * peak, "no finer than asked for: {worst} N");
+        assert_eq!(envelope.end_m(), 2.0);
+        assert!(envelope.deflection_m().len() < 500, "{}", envelope.deflection_m().len());
+    }
+
+    /// Two nodes far apart in stiffness: the peak lies inside the first segment.
+    #[test]
+    fn envelope_of_a_steep_fall() {
+        let stiffness = PiecewiseLinear::new(vec![0.0, 0.2, 1.0], vec![1e8, 1e5, 1e5]).unwrap();
+        let law = Nsdm { stiffness, ..law() };
+        let envelope = law.envelope().unwrap();
+        let peak = law.spring_force_n(0.1001);
+        for i in 0..=20_000 {
+            let x = 5e-5 * f64::from(i);
+            let off = (envelope.force_at(x) - law.spring_force_n(x)).abs();
+            assert!(off <= 1e-4 * peak, "{off} N at {x} m");
+        }
+    }
+}

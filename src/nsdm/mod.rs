@@ -1,0 +1,390 @@
+//! NSDM: a nonlinear spring and damper, fitted to a recorded motion.
+//!
+//! The reference method of the literature on train crashes beside prescribed curves: one mass with
+//! `m x'' + c(|x'|) x' + k(|x|) x = 0`, `x(0) = 0`, `x'(0) = v₀`. `k` is continuous and
+//! piecewise linear with 10 segments up to the reference's largest displacement, `c` with 5
+//! segments up to its impact speed. The 30 node values and positions are found by a genetic
+//! algorithm and a simplex search behind it; see [`fit`]. What the law gives at another speed
+//! is [`Nsdm::run`]; as spring and damper stand in for each other, fit with several seeds
+//! and look at their [`Identifiability`].
+//!
+//! ```
+//! use crumple::nsdm::{Settings, Target, fit};
+//!
+//! // A mass of 24 t that bounces off a spring of 40 MN/m.
+//! let omega = (40e6_f64 / 24e3).sqrt();
+//! let time_s: Vec<f64> = (0..80).map(|i| 0.75e-3 * f64::from(i)).collect();
+//! let velocity = time_s.iter().map(|t| 10.0 * (omega * t).cos()).collect();
+//! let acceleration = time_s.iter().map(|t| -10.0 * omega * (omega * t).sin()).collect();
+//!
+//! let target = Target::new(24e3, 10.0, time_s, velocity, acceleration)?;
+//! let settings = Settings { population: 30, generations: 20, ..Settings::default() };
+//! let fit = fit(&target, &settings, 1)?;
+//! assert!(fit.velocity_l1 < 0.05);
+//! # Ok::<(), crumple::nsdm::NsdmError>(())
+//! ```
+
+mod genes;
+mod genetic;
+mod law;
+mod motion;
+mod simplex;
+mod spread;
+mod start;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::curve::rating::l1_ratio;
+use crate::stream::Stream;
+use genes::{Genes, Scales};
+pub use law::{Nsdm, PiecewiseLinear};
+pub use motion::Motion;
+use motion::Steps;
+pub use spread::{Identifiability, LawSpread, Range};
+
+/// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
+pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
+/// Bounds of the damping at its nodes, in N s/m.
+pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
+/// What a law is worth whose motion is not finite: more than any other, and comparable.
+const PENALTY: f64 = f64::MAX;
+/// One in so many of the first population begins at least squares, if asked for.
+const LEAST_SQUARES_SHARE: usize = 4;
+/// More would be a mistyped number.
+const MAX_POPULATION: usize = 1_000_000;
+const FEWEST_SAMPLES: usize = 3;
+
+/// What a law is fitted to: the motion of one mass from contact on.
+///
+/// Invariant: at least 3 samples, columns of one length, all finite; time strictly increasing
+/// from 0 or later; mass and speed above 0; the mass moves forwards at least once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    mass_kg: f64,
+    speed_m_per_s: f64,
+    time_s: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+    displacement_m: Vec<f64>,
+    largest_m: f64,
+}
+
+/// Why there is no target, law, motion or fit.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NsdmError {
+    #[error("a motion needs at least {FEWEST_SAMPLES} samples, found {samples}")]
+    TooShort { samples: usize },
+    #[error(
+        "columns differ in length: {time} times, {velocity} velocities, {acceleration} accelerations"
+    )]
+    Lengths { time: usize, velocity: usize, acceleration: usize },
+    #[error("the {column} of sample {sample} is {value}: expected a finite number")]
+    NotFinite { column: &'static str, sample: usize, value: f64 },
+    #[error("time does not increase at sample {sample}: {time_s} s follows {before_s} s")]
+    TimeOrder { sample: usize, time_s: f64, before_s: f64 },
+    #[error("the first time is {time_s} s: times count from contact, so expected 0 or more")]
+    BeforeContact { time_s: f64 },
+    #[error(
+        "no sample for {interval_s} s before {time_s} s, too long to follow: expected times in seconds"
+    )]
+    Interval { interval_s: f64, time_s: f64 },
+    #[error("the {what} is {value}: expected a finite number above 0")]
+    NotPositive { what: &'static str, value: f64 },
+    #[error("the reference never moves forwards: is the velocity positive at contact?")]
+    NoDisplacement,
+    #[error(
+        "a law needs a value at each of at least 2 nodes, found {nodes} nodes and {values} values"
+    )]
+    NodeCount { nodes: usize, values: usize },
+    #[error(
+        "node {node} of a law is ({at}, {value}): expected nodes that increase from 0 and values of 0 or more, all finite"
+    )]
+    Node { node: usize, at: f64, value: f64 },
+    #[error("the motion of {mass_kg} kg is not finite: it is too light for this spring or damper")]
+    Diverged { mass_kg: f64 },
+    #[error("the population is {population}: expected 4 to {MAX_POPULATION}")]
+    Population { population: usize },
+    #[error("{count} generations: expected fewer than 2^32")]
+    Generations { count: usize },
+    #[error(
+        "the weight of the velocity is {weight_per_s2} 1/s²: expected a finite number of 0 or more"
+    )]
+    Weight { weight_per_s2: f64 },
+    #[error("{seeds} fits show no spread: at least {fewest} seeds are needed")]
+    Seeds { seeds: usize, fewest: usize },
+}
+
+impl Target {
+    /// `mass_kg` and `speed_m_per_s` above 0; `time_s` from contact on; `velocity` in m/s,
+    /// positive on the way in, and `acceleration` in m/s² at these times.
+    ///
+    /// The displacement is the integral of the velocity by the trapezoidal rule; before a first
+    /// time later than 0 the mass moves with the impact speed.
+    ///
+    /// # Errors
+    /// [`NsdmError`] names the first sample that breaks the invariant, counted from 1.
+    pub fn new(
+        mass_kg: f64,
+        speed_m_per_s: f64,
+        time_s: Vec<f64>,
+        velocity: Vec<f64>,
+        acceleration: Vec<f64>,
+    ) -> Result<Self, NsdmError> {
+        let samples = time_s.len();
+        if velocity.len() != samples || acceleration.len() != samples {
+            let (velocity, acceleration) = (velocity.len(), acceleration.len());
+            return Err(NsdmError::Lengths { time: samples, velocity, acceleration });
+        }
+        if samples < FEWEST_SAMPLES {
+            return Err(NsdmError::TooShort { samples });
+        }
+        check_mass_and_speed(mass_kg, speed_m_per_s)?;
+        check_finite("velocity", &velocity)?;
+        check_finite("acceleration", &acceleration)?;
+        check_times(&time_s)?;
+        let mut displacement_m = vec![time_s[0] * speed_m_per_s];
+        for i in 1..samples {
+            let step = 0.5 * (velocity[i - 1] + velocity[i]) * (time_s[i] - time_s[i - 1]);
+            displacement_m.push(displacement_m[i - 1] + step);
+        }
+        let largest_m = displacement_m.iter().copied().fold(0.0, f64::max);
+        if !(largest_m > 0.0 && largest_m.is_finite()) {
+            return Err(NsdmError::NoDisplacement);
+        }
+        Ok(Self {
+            mass_kg,
+            speed_m_per_s,
+            time_s,
+            velocity,
+            acceleration,
+            displacement_m,
+            largest_m,
+        })
+    }
+
+    /// Displacement at each time, in m.
+    pub fn displacement_m(&self) -> &[f64] {
+        &self.displacement_m
+    }
+
+    fn scales(&self) -> Scales {
+        Scales { displacement_m: self.largest_m, speed_m_per_s: self.speed_m_per_s }
+    }
+
+    /// `Σ (a − a_ref)² + w Σ (v − v_ref)²` of a law; [`PENALTY`] if that is not finite.
+    fn objective(&self, genes: &Genes, steps: &Steps, weight_per_s2: f64) -> f64 {
+        let laws = self.scales().laws(genes, self.mass_kg);
+        let mut reference = self.acceleration.iter().zip(&self.velocity);
+        let (mut acceleration, mut velocity) = (0.0, 0.0);
+        laws.integrate(self.speed_m_per_s, steps, |_, v, a| {
+            if let Some((a_ref, v_ref)) = reference.next() {
+                acceleration += (a - a_ref) * (a - a_ref);
+                velocity += (v - v_ref) * (v - v_ref);
+            }
+        });
+        let sum = acceleration + weight_per_s2 * velocity;
+        if sum.is_finite() { sum } else { PENALTY }
+    }
+}
+
+/// Where the search begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// Drawn evenly, as the reference method has it.
+    #[default]
+    Random,
+    /// A quarter of the first population takes the node values that fit the accelerations best
+    /// along the reference's own motion, on the nodes drawn; the first one on even nodes.
+    LeastSquares,
+}
+
+/// How long and for what to search; the default is the reference method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Individuals of a generation, at least 4.
+    pub population: usize,
+    /// Generations of the genetic algorithm; 0 leaves the first population.
+    pub generations: usize,
+    /// Most evaluations of the simplex search from the best individual; 0 leaves it out.
+    pub simplex_evaluations: usize,
+    /// Weight of the squared differences of velocity, in 1/s²; 0 fits accelerations alone.
+    pub velocity_weight_per_s2: f64,
+    pub start: Start,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            population: 120,
+            generations: 400,
+            simplex_evaluations: 10_000,
+            velocity_weight_per_s2: 0.0,
+            start: Start::Random,
+        }
+    }
+}
+
+/// A fitted law and how it was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    pub model: Nsdm,
+    pub seed: u64,
+    /// `Σ (a − a_ref)² + w Σ (v − v_ref)²`, in m²/s⁴.
+    pub objective: f64,
+    /// `Σ|p − r|/Σ|r|` of the velocity against the target.
+    pub velocity_l1: f64,
+    /// The same of the acceleration, the law's own at each time, not filtered.
+    pub acceleration_l1: f64,
+    /// Motions computed.
+    pub evaluations: usize,
+    pub generations: usize,
+    /// Best objective of the first population and after each generation.
+    pub history: Vec<f64>,
+}
+
+/// Fits a law to the target.
+///
+/// The genetic algorithm (tournaments of 3, simulated binary crossover with probability 0.9 and
+/// η = 15, polynomial mutation with probability 1/30 and η = 20, 2 elites) is followed by
+/// Nelder–Mead with adaptive coefficients. Runs on all threads of rayon's pool; the same seed
+/// gives the same bits for any number of them.
+///
+/// # Errors
+/// [`NsdmError`] for settings out of range, or if no law found has a finite motion
+/// ([`NsdmError::Diverged`]).
+pub fn fit(target: &Target, settings: &Settings, seed: u64) -> Result<Fit, NsdmError> {
+    let Settings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } = *settings;
+    if !(2 * genetic::ELITES..=MAX_POPULATION).contains(&population) {
+        return Err(NsdmError::Population { population });
+    }
+    if u32::try_from(generations).is_err() {
+        return Err(NsdmError::Generations { count: generations });
+    }
+    if !(weight_per_s2 >= 0.0 && weight_per_s2.is_finite()) {
+        return Err(NsdmError::Weight { weight_per_s2 });
+    }
+    let steps = Steps::new(&target.time_s)?;
+    let objective = |genes: &Genes| target.objective(genes, &steps, weight_per_s2);
+    let start = first_individuals(target, settings, seed);
+    let evolved = genetic::minimise(objective, &start, population, generations, seed);
+    let (best, used) = simplex::polish(objective, evolved.best, settings.simplex_evaluations);
+    if best.objective == PENALTY {
+        return Err(NsdmError::Diverged { mass_kg: target.mass_kg });
+    }
+    let model = target.scales().law(&best.genes)?;
+    let motion = model.run(target.mass_kg, target.speed_m_per_s, &target.time_s)?;
+    Ok(Fit {
+        model,
+        seed,
+        objective: best.objective,
+        velocity_l1: l1_ratio(&target.velocity, &motion.v_m_per_s),
+        acceleration_l1: l1_ratio(&target.acceleration, &motion.a_m_per_s2),
+        evaluations: evolved.evaluations + used,
+        generations,
+        history: evolved.history,
+    })
+}
+
+/// Fits with several seeds, in their order; see [`Identifiability::of`] for what they tell.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_seeds(
+    target: &Target,
+    settings: &Settings,
+    seeds: &[u64],
+) -> Result<Vec<Fit>, NsdmError> {
+    seeds.par_iter().map(|&seed| fit(target, settings, seed)).collect()
+}
+
+/// Individuals at least squares, if the settings ask for them.
+fn first_individuals(target: &Target, settings: &Settings, seed: u64) -> Vec<Genes> {
+    let count = match settings.start {
+        Start::Random => 0,
+        Start::LeastSquares => settings.population.div_ceil(LEAST_SQUARES_SHARE),
+    };
+    let individual = |i: usize| {
+        // A number that no individual of the search has.
+        let mut stream = Stream::new(seed, u64::MAX - i as u64);
+        let mut genes: Genes = std::array::from_fn(|_| if i == 0 { 0.5 } else { stream.unit() });
+        start::least_squares(&mut genes, target);
+        genes
+    };
+    (0..count).into_par_iter().map(individual).collect()
+}
+
+fn check_mass_and_speed(mass_kg: f64, speed_m_per_s: f64) -> Result<(), NsdmError> {
+    for (what, value) in [("mass in kg", mass_kg), ("speed in m/s", speed_m_per_s)] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(NsdmError::NotPositive { what, value });
+        }
+    }
+    Ok(())
+}
+
+fn check_finite(column: &'static str, values: &[f64]) -> Result<(), NsdmError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(i) => Err(NsdmError::NotFinite { column, sample: i + 1, value: values[i] }),
+        None => Ok(()),
+    }
+}
+
+/// Finite, strictly increasing, not before contact.
+fn check_times(time_s: &[f64]) -> Result<(), NsdmError> {
+    check_finite("time", time_s)?;
+    if let Some(&time_s) = time_s.first().filter(|&&time_s| time_s < 0.0) {
+        return Err(NsdmError::BeforeContact { time_s });
+    }
+    match time_s.windows(2).position(|w| w[1] <= w[0]) {
+        Some(i) => {
+            Err(NsdmError::TimeOrder { sample: i + 2, time_s: time_s[i + 1], before_s: time_s[i] })
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn target(mass_kg: f64) -> Target {
+        let time_s: Vec<f64> = (0..100).map(|i| 0.75e-3 * f64::from(i)).collect();
+        let velocity: Vec<f64> = time_s.iter().map(|t| 10.0 * (20.0 * t).cos()).collect();
+        let acceleration = time_s.iter().map(|t| -200.0 * (20.0 * t).sin()).collect();
+        Target::new(mass_kg, 10.0, time_s, velocity, acceleration).unwrap()
+    }
+
+    /// A mass so light that some or all laws are too stiff for the steps.
+    #[test]
+    fn laws_that_diverge_are_penalised() {
+        let (light, stiff) = (target(10.0), [1.0; genes::VARIABLES]);
+        let steps = Steps::new(&light.time_s).unwrap();
+        assert_eq!(light.objective(&stiff, &steps, 1.0), PENALTY);
+        let settings = Settings {
+            population: 20,
+            generations: 5,
+            simplex_evaluations: 200,
+            ..Settings::default()
+        };
+        let found = fit(&light, &settings, 1).unwrap();
+        assert!(found.objective < PENALTY && found.history.iter().all(|h| !h.is_nan()));
+        let error = fit(&target(1e-3), &settings, 1).unwrap_err();
+        assert_eq!(error, NsdmError::Diverged { mass_kg: 1e-3 });
+    }
+
+    #[test]
+    fn objective_by_hand() {
+        // At rest in the law's eyes: one sample after no time, so a = −c v/m.
+        let target =
+            Target::new(2.0, 3.0, vec![0.0, 1e-9, 2e-9], vec![3.0, 3.0, 1.0], vec![0.0; 3])
+                .unwrap();
+        let mut genes = [0.0; genes::VARIABLES];
+        // All damping at a millionth of its range: 0.5 N s/m.
+        genes[20..26].fill(1e-6);
+        let steps = Steps::new(&target.time_s).unwrap();
+        let expected = 3.0 * 0.75 * 0.75 + 10.0 * 4.0;
+        let found = target.objective(&genes, &steps, 10.0);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found}, on paper {expected}");
+    }
+}
