@@ -75,7 +75,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let exact = simulate(&chain, &base.with_method(Method::Reference))?;
     let error_of = |velocities: &[Vec<f64>]| {
         let pairs = velocities.iter().zip(&exact.bodies);
-        pairs.flat_map(|(ours, b)| ours.iter().zip(&b.v_m_per_s)).fold(0.0_f64, |e, (a, b)| e.max((a - b).abs()))
+        pairs
+            .flat_map(|(ours, b)| ours.iter().zip(&b.v_m_per_s))
+            .fold(0.0_f64, |e, (a, b)| e.max((a - b).abs()))
     };
     let of = |settings: RunSettings| -> Result<f64, Box<dyn Error>> {
         let run = simulate(&chain, &settings)?;

@@ -19,9 +19,8 @@ fn linear(stiffness: f64) -> Envelope {
 
 /// Bodies (mass, speed) from back to front, `laws` between them or to a wall.
 fn chain(bodies: &[(f64, f64)], laws: &[ForceLaw]) -> Chain {
-    let body = |(i, &(mass_kg, speed)): (usize, &(f64, f64))| {
-        Body::new(format!("B{i}"), mass_kg, speed)
-    };
+    let body =
+        |(i, &(mass_kg, speed)): (usize, &(f64, f64))| Body::new(format!("B{i}"), mass_kg, speed);
     let interface =
         |(i, law): (usize, &ForceLaw)| Interface::new(format!("I{i}"), law.clone(), 0.0);
     Chain::new(

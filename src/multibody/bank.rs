@@ -73,6 +73,16 @@ pub(super) enum Move {
     Opened,
 }
 
+#[inline(always)]
+pub(super) fn each(value: impl Fn(usize) -> f64) -> [f64; LANES] {
+    std::array::from_fn(value)
+}
+
+#[inline(always)]
+fn larger(a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+    each(|j| if a[j] > b[j] { a[j] } else { b[j] })
+}
+
 impl<'a> Bank<'a> {
     /// `gaps_m` and laws of the interfaces, all open; `width` is a multiple of [`LANES`].
     pub fn new(laws: Vec<Option<&'a ForceLaw>>, gaps_m: &[f64], sign: f64, width: usize) -> Self {
@@ -141,7 +151,10 @@ impl<'a> Bank<'a> {
     pub fn place(&mut self, k: usize, deflection_m: f64, closes: bool) {
         self.deflection_m[At::End as usize][k / LANES][k % LANES] = deflection_m;
         // Bodies that touch and close are already on the envelope: a curve may begin above 0.
-        if deflection_m == 0.0 && closes && let Some(law) = self.laws[k] {
+        if deflection_m == 0.0
+            && closes
+            && let Some(law) = self.laws[k]
+        {
             self.contacts[k].stage = Stage::Loading;
             self.set(k, Piece { from_m: 0.0, ..law.envelope_piece(0) }, f64::INFINITY);
             let force = law.envelope_n(0.0);
@@ -171,44 +184,40 @@ impl<'a> Bank<'a> {
     fn pass<const FOLLOW: bool>(&mut self, x_m: &[f64], at: usize) -> bool {
         let sign = self.sign;
         let mut out = [0.0_f64; LANES];
-        let deflections = self.deflection_m[at].iter_mut();
-        let (forces, _) = self.force_n[at][1..].as_chunks_mut::<LANES>();
-        let (here, _) = x_m.as_chunks::<LANES>();
-        let (ahead, _) = x_m[1..].as_chunks::<LANES>();
-        let places = here.iter().zip(ahead);
-        for (((lanes, d), f), (here, ahead)) in
-            self.lanes.iter_mut().zip(deflections).zip(forces).zip(places)
-        {
-            for j in 0..LANES {
-                let deflection = sign * (here[j] - ahead[j]) - lanes.gap_m[j];
-                d[j] = deflection;
-                f[j] = lanes.at_zero_n[j] + lanes.slope_n_per_m[j] * deflection;
-                let below = lanes.from_m[j] - deflection;
-                let above = deflection - lanes.to_m[j];
-                let worse = if below > above { below } else { above };
-                out[j] = if worse > out[j] { worse } else { out[j] };
-                if FOLLOW {
-                    let follow = lanes.follow[j];
-                    let reached = if deflection < follow { deflection } else { follow };
-                    let from = lanes.from_m[j];
-                    lanes.from_m[j] = if from > reached { from } else { reached };
-                }
+        let n = self.lanes.len();
+        let deflections = &mut self.deflection_m[at][..n];
+        let forces = &mut self.force_n[at][1..].as_chunks_mut::<LANES>().0[..n];
+        let (here, ahead) =
+            (&x_m.as_chunks::<LANES>().0[..n], &x_m[1..].as_chunks::<LANES>().0[..n]);
+        for c in 0..n {
+            let (lanes, here, ahead) = (&mut self.lanes[c], &here[c], &ahead[c]);
+            // Whole arrays at a time, which the compiler turns into vectors.
+            let deflection = each(|j| sign * (here[j] - ahead[j]) - lanes.gap_m[j]);
+            forces[c] = each(|j| lanes.at_zero_n[j] + lanes.slope_n_per_m[j] * deflection[j]);
+            let below = each(|j| lanes.from_m[j] - deflection[j]);
+            let above = each(|j| deflection[j] - lanes.to_m[j]);
+            let worse = larger(below, above);
+            out = larger(worse, out);
+            if FOLLOW {
+                let follow = lanes.follow;
+                let reached =
+                    each(|j| if deflection[j] < follow[j] { deflection[j] } else { follow[j] });
+                lanes.from_m = larger(lanes.from_m, reached);
             }
+            deflections[c] = deflection;
         }
         out.iter().any(|&o| o > 0.0)
     }
 
     /// Sets `out_n[k + 1]` to `factor` times the change of the force of `k` along `a`.
     #[inline(always)]
-    pub fn add_gradient(&self, a: &[f64], factor: f64, out_n: &mut [f64]) {
-        let (here, _) = a.as_chunks::<LANES>();
-        let (ahead, _) = a[1..].as_chunks::<LANES>();
-        let (out, _) = out_n[1..].as_chunks_mut::<LANES>();
-        let pairs = here.iter().zip(ahead);
-        for ((lanes, out), (here, ahead)) in self.lanes.iter().zip(out).zip(pairs) {
-            for j in 0..LANES {
-                out[j] = factor * lanes.slope_n_per_m[j] * (here[j] - ahead[j]);
-            }
+    pub fn gradient(&self, a: &[f64], factor: f64, out_n: &mut [f64]) {
+        let n = self.lanes.len();
+        let (here, ahead) = (&a.as_chunks::<LANES>().0[..n], &a[1..].as_chunks::<LANES>().0[..n]);
+        let out = &mut out_n[1..].as_chunks_mut::<LANES>().0[..n];
+        for c in 0..n {
+            let slope = &self.lanes[c].slope_n_per_m;
+            out[c] = each(|j| factor * slope[j] * (here[c][j] - ahead[c][j]));
         }
     }
 
@@ -242,8 +251,8 @@ impl<'a> Bank<'a> {
                 .max(law.peak_between_n(before, contact.index));
             contact.stage = Stage::Below;
         }
-        let loads =
-            deflection > 0.0 && (contact.stage == Stage::Loading || deflection >= contact.branch.largest_m);
+        let loads = deflection > 0.0
+            && (contact.stage == Stage::Loading || deflection >= contact.branch.largest_m);
         let (piece, follow, what) = if loads {
             let begins = contact.stage == Stage::Below;
             let before = contact.index;
@@ -279,12 +288,14 @@ impl<'a> Bank<'a> {
         let Some(law) = self.laws[k] else { return (0.0, 0.0) };
         let (contact, deflection) = (&self.contacts[k], self.deflection_m(at, k));
         match contact.stage {
+            Stage::Below if self.is_open(k) && deflection <= self.opens_at_m(k) => {
+                (0.0, contact.branch.dissipated_j)
+            }
             Stage::Loading => {
                 let i = law.piece_index(contact.index, deflection);
                 let branch = law.branch(i, deflection.max(0.0));
                 (branch.stored_j, branch.dissipated_j)
             }
-            Stage::Below if contact.branch.largest_m <= 0.0 => (0.0, 0.0),
             Stage::Below => law.energies_on_j(contact.index, &contact.branch, deflection),
         }
     }

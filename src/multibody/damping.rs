@@ -14,9 +14,13 @@ pub struct Damping {
 /// Why two columns are no damper.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DampingError {
-    #[error("a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}")]
+    #[error(
+        "a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}"
+    )]
     Lengths { speeds: usize, coefficients: usize },
-    #[error("point {point} of the damper is ({speed_m_per_s} m/s, {coefficient_n_s_per_m} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more")]
+    #[error(
+        "point {point} of the damper is ({speed_m_per_s} m/s, {coefficient_n_s_per_m} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more"
+    )]
     Point { point: usize, speed_m_per_s: f64, coefficient_n_s_per_m: f64 },
 }
 

@@ -228,9 +228,7 @@ impl ForceLaw {
     /// Largest stiffness the integrator meets, in N/m.
     pub fn max_stiffness_n_per_m(&self) -> f64 {
         match self.unloading {
-            Unloading::Elastic => {
-                self.slope_n_per_m.iter().map(|s| s.abs()).fold(0.0, f64::max)
-            }
+            Unloading::Elastic => self.slope_n_per_m.iter().map(|s| s.abs()).fold(0.0, f64::max),
             // Line of stiffness k: slope k. Shape: k × 2 share × its steepest fall.
             Unloading::Memory { .. } => {
                 self.steepest_n_per_m * (2.0 * self.shape.share() * self.shape.steepest()).max(1.0)
@@ -346,9 +344,7 @@ impl ForceLaw {
             Unloading::Elastic => {
                 (self.on_envelope(self.piece_index(near, deflection_m), deflection_m).1, 0.0)
             }
-            Unloading::Memory { .. } => {
-                (self.stored_on(branch, deflection_m), branch.dissipated_j)
-            }
+            Unloading::Memory { .. } => (self.stored_on(branch, deflection_m), branch.dissipated_j),
         }
     }
 

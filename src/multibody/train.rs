@@ -165,7 +165,11 @@ impl Chain {
             let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
             for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
                 if !(length_m >= 0.0 && length_m.is_finite()) {
-                    return Err(ChainError::Length { what, name: interface.name.clone(), length_m });
+                    return Err(ChainError::Length {
+                        what,
+                        name: interface.name.clone(),
+                        length_m,
+                    });
                 }
             }
         }
@@ -200,7 +204,8 @@ impl Chain {
         for (k, interface) in self.interfaces.iter().enumerate() {
             let lighter = mass(k).min(mass(k + 1));
             let spring = (lighter / interface.max_stiffness_n_per_m()).sqrt();
-            let damper = interface.damping.as_ref().map_or(f64::INFINITY, |d| lighter / d.largest());
+            let damper =
+                interface.damping.as_ref().map_or(f64::INFINITY, |d| lighter / d.largest());
             let time = spring.min(damper);
             if time < shortest.0 {
                 shortest = (time, k);

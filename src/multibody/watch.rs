@@ -127,8 +127,7 @@ impl Watch {
             let (last_s, last_v, _) = phase.last;
             phase.end(last_s, last_v);
             history.final_v_m_per_s = last_v;
-            history.moving_mean_deceleration_m_per_s2 =
-                moving_mean(&history.v_m_per_s, interval_s);
+            history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
             }
