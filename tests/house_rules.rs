@@ -11,7 +11,7 @@ use common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 17] = [
+const MAY_NAME: [(&str, &[&str]); 18] = [
     ("unit", &[]),
     ("history", &[]),
     ("file", &[]),
@@ -29,6 +29,7 @@ const MAY_NAME: [(&str, &[&str]); 17] = [
     ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
     ("validate", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
     ("compare", &["validate", "surrogate", "dataset", "curve", "unit"]),
+    ("rating", &["curve", "history"]),
 ];
 
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
@@ -164,6 +165,7 @@ fn schemas_are_those_of_the_types() {
             "validation.schema.json",
             schemars::schema_for!(crumple::surrogate::leave_one_out::Validation),
         ),
+        ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
     ];
     for (name, schema) in schemas {
         let path = root().join("schemas").join(name);
