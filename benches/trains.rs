@@ -177,7 +177,7 @@ fn unloading(envelope: &Envelope) -> f64 {
 /// Two trains of a 24 t lead car and seven 20.24 t vehicles, 40 mm between vehicles.
 fn chain() -> Result<(Chain, Vec<Envelope>), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
-    let mut curve = |group: &str| -> Result<Envelope, Box<dyn Error>> {
+    let curve = |group: &str| -> Result<Envelope, Box<dyn Error>> {
         let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(group);
         let report = build(&study.join("study.toml"), &folder.path().join("c.h5"), |_| {})?;
         let cases = report.database.cases(group);

@@ -63,4 +63,6 @@ pub mod validate;
 
 pub mod compare;
 
+pub mod rating;
+
 pub mod file;

@@ -1,5 +1,5 @@
 //! Outside judges: h5py reads our HDF5, ONNX Runtime our forests, scikit-learn's forest is as
-//! accurate as ours.
+//! accurate as ours, objective-rating-metrics rates as we do.
 //!
 //! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, as
 //! tests/run sets it.
@@ -258,5 +258,108 @@ fn onnx_runtime_predicts_the_same() {
             let difference = (theirs.as_f64().unwrap() - ours).abs();
             assert!(difference <= ours.abs() * 6e-8, "{record}: {ours} against {theirs}");
         }
+    }
+}
+
+/// Every number of `theirs` must stand in `ours`.
+fn assert_agrees(name: &str, ours: &Value, theirs: &Value) {
+    for (key, theirs) in theirs.as_object().unwrap() {
+        let (place, ours) = (format!("{name}: {key}"), &ours[key]);
+        match theirs {
+            Value::Object(_) => assert_agrees(&place, ours, theirs),
+            _ => {
+                let (ours, theirs) = (ours.as_f64().unwrap(), theirs.as_f64().unwrap());
+                // Sums of thousands of products are rounded in another order.
+                let close = (ours - theirs).abs() <= 1e-9 * theirs.abs().max(1.0);
+                assert!(close, "{place}: {ours} against {theirs}");
+            }
+        }
+    }
+}
+
+/// Reference, prediction, column, begin, end and class of the filter.
+type Rated<'a> = (String, String, &'a str, Option<f64>, Option<f64>, Option<u32>);
+/// A value by time and number of sample.
+type Wave<'a> = &'a dyn Fn(f64, usize) -> f64;
+
+/// ISO/TS 18571 by objective-rating-metrics, the other measures by numpy and scipy: FE runs of
+/// different speeds, and one of them late, early, scaled, turned and with noise.
+///
+/// Left to our own tests, as that package answers by chance or not at all: straight lines, which
+/// correlate equally at every shift, so that rounding chooses (0.1 i against 0.2 i + 0.3: one
+/// sample); and references of zeros (NaN).
+#[test]
+fn objective_rating_metrics_and_numpy_rate_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut pairs: Vec<Rated> = Vec::new();
+    let speeds = ["25", "36", "48", "72"];
+    for speed in speeds {
+        let nodout = fixture(&format!("fe/lead-car-wall/{speed}kmh/nodout"));
+        let output = format!("{speed}.csv");
+        crumple_ok(here, &["histories", nodout.to_str().unwrap(), "-o", &output]);
+    }
+    let file = |speed: &str| format!("{speed}.csv");
+    for (a, b) in [("36", "48"), ("48", "36"), ("25", "72")] {
+        for (column, class) in [
+            ("x_velocity[900001]", None),
+            ("x_acceleration[900001]", Some(60)),
+            ("x_acceleration[900001]", None),
+        ] {
+            pairs.push((file(a), file(b), column, None, None, class));
+            pairs.push((file(a), file(b), column, Some(0.011), Some(0.0984), class));
+        }
+    }
+    let write = |name: &str, samples: usize, value: Wave| {
+        let mut text = String::from("time_s,value\n");
+        for i in 0..samples {
+            let t = i as f64 * 1e-4;
+            writeln!(text, "{t:?},{:?}", value(t, i)).unwrap();
+        }
+        std::fs::write(here.join(name), text).unwrap();
+        name.to_string()
+    };
+    // The check values of public programs.
+    let sine = write("sine.csv", 1501, &|t, _| (20.0 * t).sin());
+    let larger = write("larger.csv", 1501, &|t, _| 1.3 * (20.0 * t).sin());
+    let late = write("late.csv", 1501, &|t, _| (20.0 * (t - 0.01)).sin());
+    pairs.push((sine.clone(), larger, "value", None, None, None));
+    pairs.push((sine, late, "value", Some(0.01), None, None));
+    let pulse = |t: f64| (std::f64::consts::PI * t / 0.1).sin().max(0.0) + 0.3 * (90.0 * t).sin();
+    let reference = write("pulse.csv", 1000, &|t, _| pulse(t));
+    let noise = |i: usize| (0.754_877_666_246_692_7 * i as f64).fract() - 0.5;
+    let others: [(&str, Wave); 6] = [
+        ("early", &|t, _| pulse(t + 0.004)),
+        ("later", &|t, _| pulse(t - 0.015)),
+        ("small", &|t, _| 0.55 * pulse(t)),
+        ("turned", &|t, _| -pulse(t)),
+        ("noisy", &|t, i| pulse(t) + 0.2 * noise(i)),
+        ("all", &|t, i| 1.2 * pulse(0.95 * t - 0.002) + 0.1 * noise(i)),
+    ];
+    for (name, value) in others {
+        let other = write(&format!("{name}.csv"), 1000, value);
+        pairs.push((reference.clone(), other.clone(), "value", None, None, None));
+        pairs.push((reference.clone(), other, "value", Some(0.02), Some(0.0312), None));
+    }
+    let places: Vec<Value> = pairs
+        .iter()
+        .map(|(a, b, column, from, to, class)| {
+            serde_json::json!([here.join(a), here.join(b), column, from, to, class])
+        })
+        .collect();
+    let asked = Value::from(places).to_string();
+    let Some(theirs) = run_python("rating.py", &[&asked]) else { return };
+    for ((a, b, column, from, to, class), theirs) in pairs.iter().zip(theirs.as_array().unwrap()) {
+        let mut arguments = vec!["rate", a, b, "--column", column, "--json"];
+        let from = from.map(|t| format!("--from={t}s"));
+        let to = to.map(|t| format!("--to={t}s"));
+        let class = class.map(|c| format!("--cfc={c}"));
+        arguments.extend([&from, &to, &class].into_iter().flatten().map(String::as_str));
+        let ours: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
+        println!(
+            "{arguments:?}: R {} against {}",
+            ours["iso18571"]["rating"], theirs["iso18571"]["rating"]
+        );
+        assert_agrees(&format!("{arguments:?}"), &ours, theirs);
     }
 }

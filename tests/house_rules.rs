@@ -11,7 +11,7 @@ use common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 19] = [
+const MAY_NAME: [(&str, &[&str]); 20] = [
     ("unit", &[]),
     ("history", &[]),
     ("file", &[]),
@@ -20,6 +20,7 @@ const MAY_NAME: [(&str, &[&str]); 19] = [
     ("forest", &["stream"]),
     ("solver", &["history", "unit"]),
     ("curve", &["history", "unit"]),
+    ("rating", &["curve", "history"]),
     ("study", &["curve", "solver", "history", "manifest", "unit"]),
     ("database", &["curve", "solver", "history", "file", "unit"]),
     ("build", &["study", "database", "curve", "manifest"]),
@@ -166,6 +167,7 @@ fn schemas_are_those_of_the_types() {
             "validation.schema.json",
             schemars::schema_for!(crumple::surrogate::leave_one_out::Validation),
         ),
+        ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
     ];
     for (name, schema) in schemas {
         let path = root().join("schemas").join(name);

@@ -210,9 +210,9 @@ fn a_spring_moves_alike_in_a_chain() {
     let law = Nsdm { stiffness, damping: no_damper };
     let law_in_chain =
         ForceLaw::new(law.envelope().unwrap(), Unloading::Elastic, EnvelopeEnd::Slope);
-    let body = Body { name: "car".into(), mass_kg: MASS_KG, speed_m_per_s: SPEED_M_PER_S };
-    let interface = Interface { name: "car|wall".into(), law: law_in_chain, gap_m: 0.0 };
-    let settings = RunSettings { duration_s: 0.11251, output_interval_s: 0.75e-3, step_s: 1e-5 };
+    let body = Body::new("car", MASS_KG, SPEED_M_PER_S);
+    let interface = Interface::new("car|wall", law_in_chain, 0.0);
+    let settings = RunSettings::new(0.11251, 0.75e-3);
     let run = simulate(&Chain::new(vec![body], vec![interface]).unwrap(), &settings).unwrap();
     let motion = law.run(MASS_KG, SPEED_M_PER_S, &run.time_s).unwrap();
     assert!(motion.x_m.iter().any(|&x| x > 0.9), "beyond twice the last node");

@@ -13,6 +13,7 @@ mod output;
 mod plot;
 mod predict;
 mod progress;
+mod rate;
 mod shell;
 mod simulate;
 mod train;
@@ -68,6 +69,7 @@ enum Command {
     Predict(predict::Args),
     Simulate(simulate::Args),
     Compare(compare::Args),
+    Rate(Box<rate::Args>),
     Export(export::Args),
     Demo(demo::Args),
     Completions(shell::Completions),
@@ -138,6 +140,7 @@ pub fn main() -> ExitCode {
         Command::Predict(args) => predict::run(&args, manners),
         Command::Simulate(args) => simulate::run(&args, manners),
         Command::Compare(args) => compare::run(&args, manners),
+        Command::Rate(args) => rate::run(&args, manners),
         Command::Export(args) => export::run(&args, manners),
         Command::Demo(args) => demo::run(&args, manners),
         Command::Completions(args) => shell::completions(&args, manners),

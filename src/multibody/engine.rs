@@ -445,7 +445,7 @@ impl<'a> Engine<'a> {
     /// Records the state at the end of an output interval, with `v` in step with `x`.
     fn output(&mut self, run: &mut Run, account: &mut Account, record: Record, time_s: f64) {
         let histories = record == Record::Histories;
-        let audits = histories || self.outputs_left % 8 == 0;
+        let audits = histories || self.outputs_left.is_multiple_of(8);
         account.begin();
         let forces = self.net_n.as_deref().unwrap_or(self.push.forces_n(At::End));
         for (k, history) in run.interfaces.iter_mut().enumerate() {

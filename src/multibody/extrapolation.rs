@@ -178,14 +178,14 @@ pub(super) fn run(
             if error <= 1.0 {
                 y = next;
                 time_s = if last { end_s } else { time_s + step };
-                for k in 0..interfaces.len() {
+                for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
-                    if interfaces[k].law.is_beyond_end(contact.deflection_m) {
+                    if interface.law.is_beyond_end(contact.deflection_m) {
                         return Err(SimulationError::CurveEnd {
-                            interface: interfaces[k].name.clone(),
+                            interface: interface.name.clone(),
                             deflection_m: contact.deflection_m,
                             time_s,
-                            end_m: interfaces[k].law.end_m(),
+                            end_m: interface.law.end_m(),
                         });
                     }
                     motion.pushed_m[k] = motion.pushed_m[k].max(contact.deflection_m);

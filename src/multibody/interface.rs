@@ -47,7 +47,7 @@ impl UnloadingShape {
     /// above 0. `None` if that leaves fewer than three points or no force.
     pub fn of_branch(deflection_m: &[f64], force_n: &[f64]) -> Option<Self> {
         let (&top_m, &top_n) = (deflection_m.first()?, force_n.first()?);
-        if !(top_n > 0.0) {
+        if top_n.is_nan() || top_n <= 0.0 {
             return None;
         }
         let mut points = vec![(top_m, 1.0)];

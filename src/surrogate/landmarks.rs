@@ -2,10 +2,8 @@
 
 use super::CaseCurve;
 use super::curves::least_squares;
-use crate::curve::rating::peaks;
+use crate::curve::rating::{PROMINENCE, peaks};
 
-/// A peak counts if it stands out by this share of the largest force.
-pub const PROMINENCE: f64 = 0.1;
 /// Landmarks of neighbouring cases match if they lie no further apart than this share of
 /// the larger maximal crush.
 const NEAR: f64 = 0.15;

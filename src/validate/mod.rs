@@ -7,12 +7,11 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::curve::rating::{l1_ratio, peaks};
+use crate::curve::rating::{l1_ratio, matched_peaks};
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{DatasetError, OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
 use crate::surrogate::band::{self, Band, Residuals};
 use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::landmarks::PROMINENCE;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
@@ -20,10 +19,6 @@ use crate::surrogate::{Model, ModelError, Options, PredictedCurve, Query, predic
 use choose::choose;
 use motion::{Driver, MotionError, MotionErrors, Reference};
 
-/// Peaks of FE's curve that are looked for in the prediction.
-const PEAKS: usize = 2;
-/// A predicted peak matches if it lies no further off than this share of the crush.
-const MATCH: f64 = 0.1;
 /// Fewest steps along FE's crush at which forces are compared.
 const STEPS: usize = 400;
 
@@ -456,24 +451,15 @@ fn best_rule(options: &Options, trials: &[&Trial]) -> Option<MaxCrushRule> {
 
 /// The first two peaks of FE's force and the predicted peaks nearest to them.
 fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakError> {
-    let prominent =
-        |force: &[f64]| peaks(force, PROMINENCE * force.iter().copied().fold(0.0, f64::max));
-    let found = prominent(predicted);
-    let near = MATCH * along[along.len() - 1];
-    prominent(reference)
+    matched_peaks(along, reference, predicted)
         .into_iter()
-        .take(PEAKS)
         .map(|peak| {
-            let shift = |&i: &usize| along[i] - along[peak];
-            let matched = found
-                .iter()
-                .filter(|i| shift(i).abs() <= near)
-                .min_by(|a, b| shift(a).abs().total_cmp(&shift(b).abs()));
+            let (deflection_m, force_n) = peak.reference;
             PeakError {
-                deflection_m: along[peak],
-                force_n: reference[peak],
-                force_error: matched.map(|&i| predicted[i] / reference[peak] - 1.0),
-                shift_m: matched.map(shift),
+                deflection_m,
+                force_n,
+                force_error: peak.prediction.map(|(_, force)| force / force_n - 1.0),
+                shift_m: peak.prediction.map(|(at, _)| at - deflection_m),
             }
         })
         .collect()

@@ -1,0 +1,380 @@
+//! Rating: every measure of how far a prediction is from its reference.
+//!
+//! Two signals over time are filtered if asked, brought to common times at 10 kHz, and rated by
+//! all measures at once. Whatever the unit of the values, both have the same.
+
+pub mod cora;
+pub mod corridor;
+pub mod deceleration;
+pub mod differences;
+pub mod iso18571;
+pub mod magnitude_phase;
+pub mod shift;
+mod signal;
+pub mod table;
+pub mod warping;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::curve::rating::{MatchedPeak, l1_ratio, matched_peaks};
+use cora::{Cora, cora};
+use deceleration::Deceleration;
+use differences::{MaxAbs, Pointwise, integral_error, max_abs, peak_norm, pointwise, rms_ratio};
+use iso18571::{Iso18571, iso18571};
+use magnitude_phase::{MagnitudePhase, russell, sprague_geers};
+pub use signal::{INTERVAL_S, Pair, Signal, SignalError};
+
+/// What two signals are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    /// Means of the deceleration are rated as well.
+    Acceleration,
+    #[default]
+    Other,
+}
+
+impl Quantity {
+    /// Tells an acceleration by a column's name: `x_acceleration[900001]`, `a_m_per_s2[A1]`.
+    pub fn named(column: &str) -> Self {
+        let column = column.to_ascii_lowercase();
+        let is_acceleration = column.contains("acceleration") || column.starts_with("a_m_per_s2");
+        if is_acceleration { Self::Acceleration } else { Self::Other }
+    }
+}
+
+/// How two signals are rated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    pub quantity: Quantity,
+    /// Class of a CFC filter for both, such as 60.
+    pub cfc: Option<u32>,
+    /// Begin and end of what is rated, in s; without them all common times.
+    pub from_s: Option<f64>,
+    pub to_s: Option<f64>,
+}
+
+/// A prediction rated against its reference by every measure.
+///
+/// `r` is the reference, `p` the prediction, at the same times. Errors are 0 and scores 1 where
+/// they agree. What has no meaning, such as a ratio to zeros, is null.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Rating {
+    pub reference: Rated,
+    pub prediction: Rated,
+    pub quantity: Quantity,
+    /// Class of the filter on both signals, run over all their samples; null without one.
+    pub cfc: Option<u32>,
+    /// The common times: both signals are interpolated linearly at these.
+    pub from_s: f64,
+    pub to_s: f64,
+    pub interval_s: f64,
+    pub samples: usize,
+    /// `Σ|p − r|/Σ|r|`, the headline.
+    pub l1_ratio: Option<f64>,
+    /// `‖p − r‖₂/‖r‖₂`.
+    pub rms_ratio: Option<f64>,
+    /// Mean of `|p − r|` over the largest `|r|`.
+    pub peak_norm: Option<f64>,
+    pub pointwise: Option<Pointwise>,
+    pub max_abs: MaxAbs,
+    /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
+    /// downwards; they stand out by at least a tenth of the largest.
+    pub peaks: Vec<Peak>,
+    /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
+    /// change of speed; null where the reference's positive and negative parts nearly cancel.
+    pub integral_error: Option<f64>,
+    pub sprague_geers: Option<MagnitudePhase>,
+    pub russell: Option<MagnitudePhase>,
+    /// Null over more than 2 s.
+    pub iso18571: Option<Iso18571>,
+    /// Null over more than 2 s.
+    pub cora: Option<Cora>,
+    /// Of accelerations: positive where the body is slowed down, so −a.
+    pub deceleration: Option<Decelerations>,
+    pub warnings: Vec<String>,
+}
+
+/// A signal that was rated.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Rated {
+    pub name: String,
+    /// Its own samples, before anything is done to it.
+    pub samples: usize,
+    pub first_s: f64,
+    pub last_s: f64,
+}
+
+impl Rated {
+    fn of(signal: &Signal) -> Self {
+        let (first_s, last_s) = signal.range_s();
+        Self { name: signal.name().into(), samples: signal.values().len(), first_s, last_s }
+    }
+}
+
+/// A peak of the reference and the peak of the prediction that is nearest to it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Peak {
+    pub time_s: f64,
+    /// Value of the reference, in the unit of the signals.
+    pub value: f64,
+    /// Prediction over reference, less 1; null if the prediction has no peak within a tenth of the
+    /// common times: it is missing.
+    pub error: Option<f64>,
+    /// By how much the prediction's peak is later, in s.
+    pub shift_s: Option<f64>,
+}
+
+/// Decelerations of both signals.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Decelerations {
+    pub reference: Deceleration,
+    pub prediction: Deceleration,
+}
+
+/// Rates `prediction` against `reference`.
+///
+/// Signals of other lengths and times are brought to common times, [`INTERVAL_S`] apart as
+/// ISO/TS 18571 wants it, by linear interpolation where both have values; a filter comes before
+/// that. Over more than [`iso18571::MOST_SAMPLES`] samples ISO/TS 18571 and CORA are left out,
+/// with a warning, as their time and memory grow with the square.
+///
+/// # Errors
+/// [`SignalError`] if they have no or too few common times, or cannot be filtered.
+pub fn rate(
+    reference: &Signal,
+    prediction: &Signal,
+    settings: &Settings,
+) -> Result<Rating, SignalError> {
+    let filtered = |signal: &Signal| match settings.cfc {
+        Some(class) => signal.filtered(class),
+        None => Ok(signal.clone()),
+    };
+    let window = (settings.from_s, settings.to_s);
+    let least = iso18571::LEAST_SAMPLES;
+    let pair = Pair::new(&filtered(reference)?, &filtered(prediction)?, window, least)?;
+    let Pair { time_s, reference: r, prediction: p } = &pair;
+    let is_acceleration = settings.quantity == Quantity::Acceleration;
+    let mut rating = Rating {
+        reference: Rated::of(reference),
+        prediction: Rated::of(prediction),
+        quantity: settings.quantity,
+        cfc: settings.cfc,
+        from_s: time_s[0],
+        to_s: time_s[time_s.len() - 1],
+        interval_s: INTERVAL_S,
+        samples: time_s.len(),
+        l1_ratio: Some(l1_ratio(r, p)).filter(|ratio| ratio.is_finite()),
+        rms_ratio: rms_ratio(r, p),
+        peak_norm: peak_norm(r, p),
+        pointwise: pointwise(r, p),
+        max_abs: max_abs(time_s, r, p),
+        peaks: first_peaks(&pair),
+        integral_error: integral_error(time_s, r, p),
+        sprague_geers: sprague_geers(r, p),
+        russell: russell(r, p),
+        iso18571: iso18571(r, p, INTERVAL_S),
+        cora: cora(r, p, INTERVAL_S),
+        deceleration: is_acceleration.then(|| Decelerations {
+            reference: Deceleration::of(time_s, r),
+            prediction: Deceleration::of(time_s, p),
+        }),
+        warnings: Vec::new(),
+    };
+    rating.warnings = warnings(&rating, r);
+    Ok(rating)
+}
+
+/// Peaks in the direction in which the reference is largest.
+fn first_peaks(pair: &Pair) -> Vec<Peak> {
+    let extreme =
+        pair.reference.iter().fold(0.0, |m: f64, &v| if v.abs() > m.abs() { v } else { m });
+    let sign = 1.0_f64.copysign(extreme);
+    let turned = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| sign * v).collect() };
+    let peak = |MatchedPeak { reference: (time_s, value), prediction }: MatchedPeak| Peak {
+        time_s,
+        value: sign * value,
+        error: prediction.map(|(_, found)| found / value - 1.0),
+        shift_s: prediction.map(|(at, _)| at - time_s),
+    };
+    let matched = matched_peaks(&pair.time_s, &turned(&pair.reference), &turned(&pair.prediction));
+    // A peak below zero, between two valleys, has no relative error.
+    matched.into_iter().filter(|peak| peak.reference.1 > 0.0).map(peak).collect()
+}
+
+fn warnings(rating: &Rating, reference: &[f64]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if reference.iter().all(|&r| r == 0.0) {
+        warnings
+            .push("the reference is zero throughout: there is nothing to be relative to".into());
+    }
+    if rating.iso18571.is_none() {
+        warnings.push(format!(
+            "{} samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to {}: ask for a shorter interval, or check the units of time",
+            rating.samples,
+            iso18571::MOST_SAMPLES
+        ));
+    }
+    for (who, of) in rating
+        .deceleration
+        .iter()
+        .flat_map(|d| [("reference", d.reference), ("prediction", d.prediction)])
+    {
+        if of.mean.is_none() {
+            warnings.push(format!(
+                "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the other sign"
+            ));
+        }
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn signal(values: Vec<f64>) -> Signal {
+        let time_s = (0..values.len()).map(|i| i as f64 * 1e-3).collect();
+        Signal::new("a", time_s, values).unwrap()
+    }
+
+    fn plain(reference: &Signal, prediction: &Signal) -> Rating {
+        rate(reference, prediction, &Settings::default()).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(50))]
+
+        #[test]
+        fn a_signal_agrees_with_itself(values in prop::collection::vec(-1e6..1e6_f64, 5..60)) {
+            let a = signal(values);
+            let of = plain(&a, &a);
+            prop_assert_eq!(of.l1_ratio, Some(0.0));
+            prop_assert_eq!(of.rms_ratio, Some(0.0));
+            prop_assert_eq!(of.peak_norm, Some(0.0));
+            prop_assert_eq!(of.pointwise.unwrap().mean, 0.0);
+            prop_assert_eq!(of.max_abs.value, 0.0);
+            prop_assert!(of.integral_error.is_none_or(|e| e == 0.0));
+            prop_assert!(of.peaks.iter().all(|p| p.error == Some(0.0) && p.shift_s == Some(0.0)));
+            prop_assert_eq!(of.sprague_geers.unwrap().combined, 0.0);
+            prop_assert_eq!(of.russell.unwrap().combined, 0.0);
+            let iso = of.iso18571.unwrap();
+            prop_assert!(iso.rating > 1.0 - 1e-12 && iso.grade.name() == "excellent");
+            prop_assert!(of.cora.unwrap().rating > 1.0 - 1e-12);
+        }
+
+        /// The unit of both signals cannot matter.
+        #[test]
+        fn ratings_do_not_depend_on_the_unit(
+            r in prop::collection::vec(-10.0..10.0_f64, 30),
+            p in prop::collection::vec(-10.0..10.0_f64, 30),
+            // Powers of two scale without rounding.
+            power in -20..20_i32,
+        ) {
+            let unit = 2.0_f64.powi(power);
+            let scaled = |v: &[f64]| signal(v.iter().map(|v| v * unit).collect());
+            let (one, other) = (plain(&signal(r.clone()), &signal(p.clone())), plain(&scaled(&r), &scaled(&p)));
+            prop_assert_eq!(one.l1_ratio, other.l1_ratio);
+            prop_assert_eq!(one.iso18571, other.iso18571);
+            prop_assert_eq!(one.cora, other.cora);
+            prop_assert_eq!(one.russell, other.russell);
+            prop_assert_eq!(one.pointwise, other.pointwise);
+            prop_assert_eq!(one.max_abs.value * unit, other.max_abs.value);
+        }
+
+        #[test]
+        fn scores_lie_between_0_and_1(
+            r in prop::collection::vec(-10.0..10.0_f64, 30),
+            p in prop::collection::vec(-10.0..10.0_f64, 30),
+        ) {
+            let of = plain(&signal(r), &signal(p));
+            let (iso, cora) = (of.iso18571.unwrap(), of.cora.unwrap());
+            for score in [
+                iso.corridor, iso.phase, iso.magnitude, iso.slope, iso.rating,
+                cora.corridor, cora.progression, cora.size, cora.phase, cora.rating,
+            ] {
+                prop_assert!((0.0..=1.0).contains(&score), "{:?} {:?}", iso, cora);
+            }
+        }
+    }
+
+    #[test]
+    fn peaks_of_a_negative_pulse_point_down() {
+        let pulse = |late: i32, scale: f64| {
+            let bump = |i: i32| -scale * (-(f64::from(i - 50 - late) / 8.0).powi(2)).exp();
+            signal((0..200).map(bump).collect())
+        };
+        let of = plain(&pulse(0, 10.0), &pulse(5, 12.0));
+        assert_eq!(of.peaks.len(), 1);
+        let peak = of.peaks[0];
+        assert!((peak.time_s - 0.05).abs() < 1e-12 && peak.value == -10.0);
+        assert!((peak.error.unwrap() - 0.2).abs() < 1e-12);
+        assert!((peak.shift_s.unwrap() - 0.005).abs() < 1e-12);
+        assert_eq!(plain(&pulse(0, 10.0), &pulse(40, 12.0)).peaks[0].error, None, "missing");
+    }
+
+    #[test]
+    fn a_filter_comes_before_the_cut() {
+        let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
+        let window = Settings { from_s: Some(0.052), cfc: Some(60), ..Settings::default() };
+        let whole = Settings { from_s: None, ..window };
+        let zero = signal(vec![0.0; 200]);
+        let cut = rate(&zero, &step, &window).unwrap();
+        assert_eq!(cut.from_s, 0.052);
+        // The filter's overshoot behind the step is the largest value either way.
+        assert_eq!(cut.max_abs.value, rate(&zero, &step, &whole).unwrap().max_abs.value);
+        assert!(cut.max_abs.value > 1.01);
+    }
+
+    #[test]
+    fn long_signals_are_rated_without_the_square_measures() {
+        let wave = |late: f64| -> Signal {
+            let values = (0..1_000_000).map(|i| (f64::from(i) * 1e-3 - late).sin()).collect();
+            let time_s = (0..1_000_000).map(|i| f64::from(i) * 1e-5).collect();
+            Signal::new("wave", time_s, values).unwrap()
+        };
+        let of = plain(&wave(0.0), &wave(0.1));
+        assert_eq!(of.samples, 100_000);
+        assert!(of.iso18571.is_none() && of.cora.is_none());
+        assert_eq!(
+            of.warnings,
+            [
+                "100000 samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: ask for a shorter interval, or check the units of time"
+            ]
+        );
+        assert!((of.sprague_geers.unwrap().phase - 0.1 / std::f64::consts::PI).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_longest_that_is_rated_by_all_takes_seconds() {
+        let noise: Vec<f64> = (0..2000).map(|i| f64::from(i * 7919 % 1000)).collect();
+        let a = signal(noise.clone());
+        let b = signal(noise.into_iter().rev().collect());
+        assert_eq!(plain(&a, &b).samples, 19_991);
+        assert!(plain(&a, &b).iso18571.is_some());
+    }
+
+    #[test]
+    fn a_reference_of_zeros_is_said() {
+        let zero = signal(vec![0.0; 20]);
+        let of = plain(&zero, &signal(vec![1.0; 20]));
+        assert_eq!((of.l1_ratio, of.rms_ratio, of.sprague_geers), (None, None, None));
+        assert_eq!(
+            of.warnings,
+            ["the reference is zero throughout: there is nothing to be relative to"]
+        );
+        assert_eq!(plain(&zero, &zero).l1_ratio, Some(0.0));
+    }
+
+    #[test]
+    fn accelerations_are_told_by_their_name() {
+        for name in ["x_acceleration[900001]", "a_m_per_s2[A1]"] {
+            assert_eq!(Quantity::named(name), Quantity::Acceleration, "{name}");
+        }
+        for name in ["x_velocity[1]", "force_N[A|B]", "a"] {
+            assert_eq!(Quantity::named(name), Quantity::Other, "{name}");
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Signals: checked values over time, brought to common times.
+
+use crate::curve::cfc::{self, CfcError};
+use crate::curve::resample::interpolate;
+
+/// Interval of ISO/TS 18571: 10 kHz.
+pub const INTERVAL_S: f64 = 1e-4;
+/// Fewest samples of a signal: fewer are points, not a history.
+const LEAST_SAMPLES: usize = 5;
+/// Most common samples: 500 s, far beyond any collision.
+const MOST_COMMON: f64 = 5e6;
+/// Larger magnitudes are no measured values, and their squares would overflow.
+const LARGEST: f64 = 1e100;
+
+/// A signal: values at times in s.
+///
+/// Invariant: equal lengths of at least five, all finite, time strictly increasing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signal {
+    name: String,
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// Why two columns are no signal, or two signals cannot be rated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SignalError {
+    #[error("{samples} samples are no history: at least {LEAST_SAMPLES} are needed")]
+    TooFew { samples: usize },
+    #[error("columns differ in length: {times} times, {values} values")]
+    Lengths { times: usize, values: usize },
+    #[error("sample {sample}: the value is {value}: expected a finite number up to 1e100")]
+    NotFinite { sample: usize, value: f64 },
+    #[error(
+        "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first"
+    )]
+    TimeGoesBack { sample: usize, time_s: f64, before_s: f64 },
+    #[error("{name}: {}", too_much(source))]
+    Filter { name: String, source: CfcError },
+    #[error(
+        "there are no common times: the reference goes from {0} s to {1} s, the prediction from {2} s to {3} s; check the units of time",
+        reference.0, reference.1, prediction.0, prediction.1
+    )]
+    NoOverlap { reference: (f64, f64), prediction: (f64, f64) },
+    #[error(
+        "what is asked for, from {0} s to {1} s, lies outside the common times from {2} s to {3} s",
+        asked.0, asked.1, common.0, common.1
+    )]
+    Outside { asked: (f64, f64), common: (f64, f64) },
+    #[error(
+        "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
+    )]
+    TooShort { from_s: f64, to_s: f64, samples: usize, least: usize },
+    #[error(
+        "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
+    )]
+    TooLong { from_s: f64, to_s: f64, samples: f64 },
+}
+
+/// What the filter cannot take. The filter's own words name the recipe's entry.
+fn too_much(error: &CfcError) -> String {
+    match error {
+        CfcError::TooCoarse { class, interval_s, longest_s } => format!(
+            "its samples are {interval_s:.2e} s apart, too far for CFC {class}: at most {longest_s:.2e} s; filter with a lower class or not at all"
+        ),
+        CfcError::Uneven { spread_percent } => format!(
+            "its intervals differ by up to {spread_percent:.0} % of their mean, too much for a CFC filter: filter not at all"
+        ),
+    }
+}
+
+impl Signal {
+    /// `name` stands in messages and results; `time_s` in s.
+    ///
+    /// # Errors
+    /// [`SignalError`] with the number of the first wrong sample, counted from 1.
+    pub fn new(name: &str, time_s: Vec<f64>, values: Vec<f64>) -> Result<Self, SignalError> {
+        if time_s.len() != values.len() {
+            return Err(SignalError::Lengths { times: time_s.len(), values: values.len() });
+        }
+        if values.len() < LEAST_SAMPLES {
+            return Err(SignalError::TooFew { samples: values.len() });
+        }
+        let wrong = |v: &f64| !v.is_finite() || v.abs() > LARGEST;
+        for column in [&time_s, &values] {
+            if let Some(i) = column.iter().position(wrong) {
+                return Err(SignalError::NotFinite { sample: i + 1, value: column[i] });
+            }
+        }
+        if let Some(i) = time_s.windows(2).position(|t| t[1] <= t[0]) {
+            let (before_s, time_s) = (time_s[i], time_s[i + 1]);
+            return Err(SignalError::TimeGoesBack { sample: i + 2, time_s, before_s });
+        }
+        Ok(Self { name: name.into(), time_s, values })
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// First and last time, in s.
+    pub fn range_s(&self) -> (f64, f64) {
+        (self.time_s[0], self.time_s[self.time_s.len() - 1])
+    }
+
+    /// The signal behind a CFC filter without phase shift, at its own times.
+    ///
+    /// # Errors
+    /// [`SignalError::Filter`] if its times are too coarse or too uneven.
+    pub fn filtered(&self, class: u32) -> Result<Self, SignalError> {
+        let filtered = cfc::filter(class, &self.time_s, &self.values)
+            .map_err(|source| SignalError::Filter { name: self.name.clone(), source })?;
+        Ok(Self { values: filtered.values, ..self.clone() })
+    }
+}
+
+/// Two signals at common times, [`INTERVAL_S`] apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pair {
+    pub time_s: Vec<f64>,
+    pub reference: Vec<f64>,
+    pub prediction: Vec<f64>,
+}
+
+impl Pair {
+    /// Interpolates linearly from the first common time on, within `from_s` and `to_s`.
+    ///
+    /// # Errors
+    /// [`SignalError`] if there are no common times, or fewer than `least` or too many samples.
+    pub fn new(
+        reference: &Signal,
+        prediction: &Signal,
+        (from_s, to_s): (Option<f64>, Option<f64>),
+        least: usize,
+    ) -> Result<Self, SignalError> {
+        let (r, p) = (reference.range_s(), prediction.range_s());
+        let no_overlap = SignalError::NoOverlap { reference: r, prediction: p };
+        let common = (r.0.max(p.0), r.1.min(p.1));
+        if common.0 >= common.1 {
+            return Err(no_overlap);
+        }
+        let asked = (from_s.unwrap_or(common.0), to_s.unwrap_or(common.1));
+        let (from_s, to_s) = (common.0.max(asked.0), common.1.min(asked.1));
+        if from_s >= to_s {
+            return Err(SignalError::Outside { asked, common });
+        }
+        // Times are rounded: a last sample that is missed by so little still counts.
+        let samples = ((to_s - from_s) / INTERVAL_S + 1e-6).floor() + 1.0;
+        if samples > MOST_COMMON {
+            return Err(SignalError::TooLong { from_s, to_s, samples });
+        }
+        let samples = samples as usize;
+        if samples < least {
+            return Err(SignalError::TooShort { from_s, to_s, samples, least });
+        }
+        let time_s: Vec<f64> =
+            (0..samples).map(|i| (from_s + i as f64 * INTERVAL_S).min(to_s)).collect();
+        let at = |signal: &Signal| interpolate(&signal.time_s, &signal.values, &time_s);
+        // The times lie within both signals.
+        let outside = |_| no_overlap.clone();
+        let reference = at(reference).map_err(outside)?;
+        let prediction = at(prediction).map_err(outside)?;
+        Ok(Self { time_s, reference, prediction })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(first_s: f64, step_s: f64, samples: usize) -> Signal {
+        let time_s: Vec<f64> = (0..samples).map(|i| first_s + step_s * i as f64).collect();
+        let values = time_s.iter().map(|t| 10.0 * t).collect();
+        Signal::new("line", time_s, values).unwrap()
+    }
+
+    #[test]
+    fn common_times_are_the_overlap() {
+        let pair = Pair::new(&line(0.0, 0.75e-3, 400), &line(0.1, 1e-5, 10_001), (None, None), 12)
+            .unwrap();
+        assert_eq!((pair.time_s[0], pair.time_s[1000]), (0.1, 0.2));
+        assert_eq!(pair.time_s.len(), 1001);
+        for (t, (r, p)) in pair.time_s.iter().zip(pair.reference.iter().zip(&pair.prediction)) {
+            assert!((r - 10.0 * t).abs() < 1e-12 && (p - 10.0 * t).abs() < 1e-12);
+        }
+        let a = line(0.0, 1e-3, 400);
+        let pair = Pair::new(&a, &a, (Some(0.05), Some(0.06)), 12).unwrap();
+        assert_eq!((pair.time_s[0], pair.time_s.len()), (0.05, 101));
+    }
+
+    #[test]
+    fn errors_say_what_to_do() {
+        let error = |time: &[f64], values: &[f64]| {
+            Signal::new("x", time.to_vec(), values.to_vec()).unwrap_err().to_string()
+        };
+        assert_eq!(
+            error(&[0.0, 1.0, 2.0, 2.0, 3.0], &[0.0; 5]),
+            "sample 4: time 2 s does not come after 2 s: times must rise strictly, so cut or sort the file first"
+        );
+        assert_eq!(
+            error(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, f64::NAN, 0.0, 0.0, 0.0]),
+            "sample 2: the value is NaN: expected a finite number up to 1e100"
+        );
+        assert_eq!(error(&[0.0], &[0.0]), "1 samples are no history: at least 5 are needed");
+        let none =
+            Pair::new(&line(0.0, 0.125, 5), &line(1.0, 0.125, 5), (None, None), 12).unwrap_err();
+        assert_eq!(
+            none.to_string(),
+            "there are no common times: the reference goes from 0 s to 0.5 s, the prediction from 1 s to 1.5 s; check the units of time"
+        );
+        let a = line(0.0, 0.125, 5);
+        let outside = Pair::new(&a, &a, (Some(2.0), None), 12).unwrap_err();
+        assert_eq!(
+            outside.to_string(),
+            "what is asked for, from 2 s to 0.5 s, lies outside the common times from 0 s to 0.5 s"
+        );
+        let short = Pair::new(&a, &a, (None, Some(0.001)), 12).unwrap_err();
+        assert_eq!(
+            short.to_string(),
+            "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the asked interval"
+        );
+        assert_eq!(
+            a.filtered(60).unwrap_err().to_string(),
+            "line: its samples are 1.25e-1 s apart, too far for CFC 60: at most 1.67e-3 s; filter with a lower class or not at all"
+        );
+        let long = line(0.0, 100.0, 10);
+        assert!(matches!(
+            Pair::new(&long, &long, (None, None), 12),
+            Err(SignalError::TooLong { .. })
+        ));
+    }
+}

@@ -1,0 +1,188 @@
+//! Tables: a signal from a CSV file with a header line, whose first column is the time.
+
+use std::io::Read;
+
+/// Columns of a table that hold a signal: its times as they stand, and its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    pub time_name: String,
+    pub name: String,
+    pub time: Vec<f64>,
+    pub values: Vec<f64>,
+}
+
+/// Why a table holds no signal. Lines and columns count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    #[error("{0}")]
+    Csv(#[from] csv::Error),
+    #[error("the table is empty: expected a header line, then a time and values in every line")]
+    Empty,
+    #[error(
+        "line {line}: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"
+    )]
+    NoHeader { line: u64 },
+    #[error(
+        "line {line}: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"{found}\""
+    )]
+    OneColumn { line: u64, found: String },
+    #[error("there is no column \"{wanted}\": name one of {known}")]
+    NoColumn { wanted: String, known: String },
+    #[error("{count} columns are called \"{name}\": rename all but one")]
+    SameNames { name: String, count: usize },
+    #[error("there are several columns: name one of {known}")]
+    SeveralColumns { known: String },
+    #[error("line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"")]
+    NotANumber { line: u64, column: usize, name: String, found: String },
+    #[error(
+        "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": leave out the lines without a value"
+    )]
+    NotFinite { line: u64, column: usize, name: String, found: String },
+    #[error(
+        "line {line}, column 1 (\"{name}\"): time {found} does not come after {before}: times must rise strictly, so cut or sort the file first"
+    )]
+    TimeGoesBack { line: u64, name: String, found: f64, before: f64 },
+}
+
+/// Reads the first column and the one called `wanted`; without a name, the only other one.
+///
+/// Separated by commas, semicolons or tabs, whichever stand in the header; lines that begin
+/// with `#` are comments. Other columns are not looked at.
+///
+/// # Errors
+/// [`TableError`] with line and column.
+pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, TableError> {
+    let mut text = Vec::new();
+    source.read_to_end(&mut text).map_err(csv::Error::from)?;
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&text);
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .delimiter(delimiter(text))
+        .from_reader(text);
+    let header = reader.headers()?.clone();
+    let line = header.position().map_or(1, csv::Position::line);
+    if header.iter().all(str::is_empty) {
+        return Err(TableError::Empty);
+    }
+    if header.iter().all(|name| name.parse::<f64>().is_ok()) {
+        return Err(TableError::NoHeader { line });
+    }
+    if header.len() < 2 {
+        return Err(TableError::OneColumn { line, found: header[0].into() });
+    }
+    let column = column(&header, wanted)?;
+    let (mut time, mut values) = (Vec::<f64>::new(), Vec::new());
+    for record in reader.records() {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |field: usize| {
+            let found = record.get(field).unwrap_or_default();
+            let place = || (field + 1, header[field].to_string(), found.to_string());
+            match found.parse::<f64>() {
+                Ok(number) if number.is_finite() => Ok(number),
+                Ok(_) => {
+                    let (column, name, found) = place();
+                    Err(TableError::NotFinite { line, column, name, found })
+                }
+                Err(_) => {
+                    let (column, name, found) = place();
+                    Err(TableError::NotANumber { line, column, name, found })
+                }
+            }
+        };
+        let (at, value) = (number(0)?, number(column)?);
+        if let Some(&before) = time.last().filter(|&&before| before >= at) {
+            let name = header[0].to_string();
+            return Err(TableError::TimeGoesBack { line, name, found: at, before });
+        }
+        time.push(at);
+        values.push(value);
+    }
+    Ok(Columns { time_name: header[0].into(), name: header[column].into(), time, values })
+}
+
+/// What separates the columns of the first line that is no comment.
+fn delimiter(text: &[u8]) -> u8 {
+    let lines = text.split(|&byte| byte == b'\n');
+    let header = lines.into_iter().find(|line| !line.is_empty() && line[0] != b'#');
+    let has = |byte: u8| header.is_some_and(|line| line.contains(&byte));
+    [b',', b';', b'\t'].into_iter().find(|&byte| has(byte)).unwrap_or(b',')
+}
+
+/// The column to read.
+fn column(header: &csv::StringRecord, wanted: Option<&str>) -> Result<usize, TableError> {
+    let known = || {
+        let names: Vec<String> = header.iter().skip(1).map(|name| format!("\"{name}\"")).collect();
+        names.join(", ")
+    };
+    let Some(wanted) = wanted else {
+        return match header.len() {
+            2 => Ok(1),
+            _ => Err(TableError::SeveralColumns { known: known() }),
+        };
+    };
+    let found: Vec<usize> = (1..header.len()).filter(|&i| &header[i] == wanted).collect();
+    match found[..] {
+        [column] => Ok(column),
+        [] => Err(TableError::NoColumn { wanted: wanted.into(), known: known() }),
+        _ => Err(TableError::SameNames { name: wanted.into(), count: found.len() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str, wanted: Option<&str>) -> Result<Columns, String> {
+        read(&mut text.as_bytes(), wanted).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn reads_the_named_column() {
+        for text in ["# b\ntime,a,b\n0,1,x\n1,2,y\n", "\u{feff}time;a;b\r\n0;1;x\r\n1;2;\r\n"] {
+            let columns = read_text(text, Some("a")).unwrap();
+            assert_eq!((columns.time, columns.values), (vec![0.0, 1.0], vec![1.0, 2.0]));
+            assert_eq!((&*columns.time_name, &*columns.name), ("time", "a"));
+        }
+        assert_eq!(read_text("t\tv\n0\t7\n", None).unwrap().values, [7.0]);
+    }
+
+    #[test]
+    fn errors_say_where_and_what_to_do() {
+        fn t(text: &str, wanted: Option<&str>, message: &str) {
+            assert_eq!(read_text(text, wanted).unwrap_err(), message, "{text}");
+        }
+        t("t,a,b\n", Some("c"), "there is no column \"c\": name one of \"a\", \"b\"");
+        t("t,a,b\n", None, "there are several columns: name one of \"a\", \"b\"");
+        t("t,a,a\n", Some("a"), "2 columns are called \"a\": rename all but one");
+        t("t,a\n0,1\n1,x\n", None, "line 3, column 2 (\"a\"): expected a number, found \"x\"");
+        t("t,a\n0,1\n1\n", None, "line 3, column 2 (\"a\"): expected a number, found \"\"");
+        t(
+            "t,a\n0,NaN\n",
+            None,
+            "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": leave out the lines without a value",
+        );
+        t(
+            "#\nt,a\n0,1\n2,1\n1,1\n",
+            None,
+            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must rise strictly, so cut or sort the file first",
+        );
+        t(
+            "",
+            None,
+            "the table is empty: expected a header line, then a time and values in every line",
+        );
+        t(
+            "0,1\n1,2\n",
+            None,
+            "line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them",
+        );
+        t(
+            "time a\n0 1\n",
+            None,
+            "line 1: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"time a\"",
+        );
+    }
+}

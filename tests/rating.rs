@@ -1,0 +1,279 @@
+//! `crumple rate` as a user runs it: what it reads, what it says, and how it refuses.
+
+mod common;
+
+use std::fmt::Write;
+use std::path::Path;
+
+use common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use serde_json::Value;
+
+/// Writes a table of `time` and `value` over samples of 1 ms.
+fn write(folder: &Path, name: &str, header: &str, samples: usize, line: impl Fn(f64) -> String) {
+    let mut text = format!("{header}\n");
+    for i in 0..samples {
+        let t = i as f64 / 1000.0;
+        writeln!(text, "{}", line(t)).unwrap();
+    }
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+fn pulse(t: f64) -> f64 {
+    -100.0 * (std::f64::consts::PI * t / 0.1).sin().max(0.0)
+}
+
+/// A folder with a.csv, a half sine of 100 ms as an acceleration, and b.csv, 1.1 times that.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "a.csv", "time_s,a_m_per_s2[A1]", 200, |t| format!("{t:?},{:?}", pulse(t)));
+    write(here, "b.csv", "time_s,v,a_m_per_s2[B1]", 200, |t| {
+        format!("{t:?},x,{:?}", 1.1 * pulse(t))
+    });
+    folder
+}
+
+const COLUMNS: [&str; 2] = ["--column-a=a_m_per_s2[A1]", "--column-b=a_m_per_s2[B1]"];
+
+fn rate(folder: &Path, arguments: &[&str]) -> Value {
+    let all = [&["rate"], arguments, &["--json"]].concat();
+    serde_json::from_str(&crumple_ok(folder, &all)).unwrap()
+}
+
+fn assert_close(value: &Value, expected: f64, tolerance: f64) {
+    let value = value.as_f64().unwrap();
+    assert!((value - expected).abs() < tolerance, "{value} against {expected}");
+}
+
+#[test]
+fn a_scaled_acceleration_by_hand() {
+    let folder = folder();
+    let of = rate(folder.path(), &[&["a.csv", "b.csv"][..], &COLUMNS].concat());
+    assert_eq!(of["quantity"], "acceleration");
+    assert_eq!((&of["samples"], &of["interval_s"]), (&1991.into(), &1e-4.into()));
+    assert_eq!(of["reference"]["name"], "a.csv: a_m_per_s2[A1]");
+    assert_eq!(of["reference"]["samples"], 200);
+    for key in ["l1_ratio", "rms_ratio", "integral_error"] {
+        assert_close(&of[key], 0.1, 1e-12);
+    }
+    assert_close(&of["max_abs"]["value"], 10.0, 1e-9);
+    assert_close(&of["max_abs"]["time_s"], 0.05, 1e-12);
+    assert_close(&of["pointwise"]["mean"], 0.1, 1e-12);
+    assert_close(&of["peaks"][0]["error"], 0.1, 1e-12);
+    assert_close(&of["peaks"][0]["value"], -100.0, 1e-9);
+    assert_close(&of["sprague_geers"]["magnitude"], 0.1, 1e-12);
+    assert_close(&of["cora"]["size"], 1.0 / 1.21, 1e-12);
+    // 200/π over the half sine, a little more from 5 % of the peak on; over 120 ms 100/120 of it.
+    let mean = 200.0 / std::f64::consts::PI;
+    assert_close(&of["deceleration"]["reference"]["mean"], mean, 1.5);
+    let largest = &of["deceleration"]["prediction"]["largest_120ms_mean"];
+    assert_close(largest, 1.1 * mean * 100.0 / 120.0, 0.02);
+    assert_eq!(of["warnings"], serde_json::json!([]));
+}
+
+#[test]
+fn the_table_shows_every_measure() {
+    let folder = folder();
+    let text = crumple_ok(folder.path(), &[&["rate", "a.csv", "b.csv"][..], &COLUMNS].concat());
+    for line in [
+        "interpolated at 1991 common times from 0 ms to 199 ms, 0.1 ms apart (10 kHz)",
+        "l1_ratio              10.00 %  sum|p-r|/sum|r|",
+        "peak 1                10.00 %  of -100.00000 at 50 ms, 0 ms later",
+        "CORA                    0.955  corridor 0.953, cross-correlation 0.957 (progression 1.000, size 0.826, phase 1.000)",
+    ] {
+        assert!(text.lines().any(|l| l == line), "no line {line}\n{text}");
+    }
+    for measure in ["rms_ratio", "peak_norm", "pointwise", "max_abs", "integral", "Sprague-Geers"]
+        .into_iter()
+        .chain(["Russell", "ISO/TS 18571", "mean deceleration", "largest 120 ms mean"])
+    {
+        assert!(text.lines().any(|l| l.starts_with(measure)), "{measure}\n{text}");
+    }
+}
+
+/// The way over crumple histories and the direct one are the same.
+#[test]
+fn a_solver_file_rates_as_its_csv() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let paths = ["36", "48"].map(|s| fixture(&format!("fe/lead-car-wall/{s}kmh/nodout")));
+    let [a, b] = paths.each_ref().map(|path| path.to_str().unwrap());
+    crumple_ok(here, &["histories", b, "-o", "b.csv"]);
+    let direct = rate(here, &[a, b, "--id", "900001", "--component", "x_velocity"]);
+    let mixed = [
+        a,
+        "b.csv",
+        "--id",
+        "900001",
+        "--component",
+        "x_velocity",
+        "--column",
+        "x_velocity[900001]",
+    ];
+    let mixed = rate(here, &mixed);
+    for key in ["l1_ratio", "iso18571", "cora", "peaks", "russell"] {
+        assert_eq!(direct[key], mixed[key], "{key}");
+    }
+    assert!(direct["l1_ratio"].as_f64().unwrap() > 0.4, "they are different runs");
+}
+
+#[test]
+fn units_and_factors_are_those_of_the_arguments() {
+    let folder = folder();
+    let here = folder.path();
+    write(here, "ms.csv", "time [ms],a_mm", 200, |t| {
+        format!("{:?},{:?}", t * 1e3, -1e3 * pulse(t))
+    });
+    let error = crumple_fails(here, 1, &["rate", "a.csv", "ms.csv"]);
+    assert_eq!(
+        error,
+        "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: say --time-unit-b ms\n"
+    );
+    let of = rate(here, &["a.csv", "ms.csv", "--time-unit-b", "ms", "--scale-b", "-1e-3"]);
+    assert!(of["l1_ratio"].as_f64().unwrap() < 1e-12, "{of}");
+    assert_eq!(of["quantity"], "other", "only one name says acceleration");
+    // Nothing in this header tells the unit.
+    write(here, "t.csv", "t,a", 200, |t| format!("{:?},{:?}", t * 1e3, pulse(t)));
+    let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
+    assert_eq!(
+        error,
+        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: say the units with --time-unit-a and --time-unit-b (s, ms or us)\n"
+    );
+    let said = ["a.csv", "t.csv", "--time-unit-a", "s", "--time-unit-b", "ms"];
+    assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
+}
+
+#[test]
+fn filter_and_interval_are_those_asked_for() {
+    let folder = folder();
+    let here = folder.path();
+    let noisy = |t: f64| pulse(t) + 20.0 * (2.0 * std::f64::consts::PI * 400.0 * t).sin();
+    write(here, "noisy.csv", "t,a", 200, |t| format!("{t:?},{:?}", noisy(t)));
+    let window = ["a.csv", "noisy.csv", "--from", "20ms", "--to=0.08s"];
+    let raw = rate(here, &window);
+    assert_eq!(
+        (&raw["from_s"], &raw["samples"], &raw["cfc"]),
+        (&0.02.into(), &601.into(), &Value::Null)
+    );
+    let smooth = rate(here, &[&window[..], &["--cfc", "60"]].concat());
+    assert_eq!(smooth["cfc"], 60);
+    let ratio = |of: &Value| of["rms_ratio"].as_f64().unwrap();
+    assert!(ratio(&raw) > 0.1 && ratio(&smooth) < 0.01, "{} {}", ratio(&raw), ratio(&smooth));
+}
+
+#[test]
+fn wrong_input_says_where_and_what_to_do() {
+    let folder = folder();
+    let here = folder.path();
+    let file = |name: &str, text: &str| std::fs::write(here.join(name), text).unwrap();
+    file("text.csv", "t,a\n0,1\n0.1,n/a\n0.2,1\n");
+    file("nan.csv", "t,a\n0,1\n0.1,NaN\n0.2,1\n");
+    file("back.csv", "t,a\n0,1\n0.2,1\n0.1,1\n");
+    file("few.csv", "t,a\n0,1\n0.1,1\n");
+    file("late.csv", "t,a\n5,1\n5.1,1\n5.2,1\n5.3,1\n5.4,2\n");
+    file("note", "no solver wrote this\n");
+    file("empty.csv", "");
+    let t = |arguments: &[&str], code: i32, message: &str| {
+        let error = crumple_fails(here, code, &[&["rate"], arguments].concat());
+        assert!(error.starts_with(&format!("error: {message}")), "{arguments:?}: {error}");
+    };
+    t(
+        &["a.csv", "b.csv"],
+        1,
+        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" with --column-b",
+    );
+    t(
+        &["a.csv", "b.csv", "--column-a=w"],
+        1,
+        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" with --column-a",
+    );
+    t(&["a.csv", "b.csv", "--column-b=v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
+    t(
+        &["a.csv", "text.csv"],
+        1,
+        "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\"",
+    );
+    t(&["a.csv", "nan.csv"], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number");
+    t(
+        &["a.csv", "back.csv"],
+        1,
+        "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must rise strictly",
+    );
+    t(&["a.csv", "few.csv"], 1, "few.csv: a: 2 samples are no history: at least 5 are needed");
+    t(&["a.csv", "empty.csv"], 1, "empty.csv: the table is empty");
+    t(
+        &["a.csv", "late.csv"],
+        1,
+        "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s",
+    );
+    t(
+        &["a.csv", "a.csv", "--from=0.5s"],
+        1,
+        "what is asked for, from 0.5 s to 0.199 s, lies outside the common times",
+    );
+    t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
+    let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
+    assert!(error.contains("a CSV file has the ending .csv, or --column-b"), "{error}");
+    t(
+        &["a.csv", "a.csv", "--cfc=1000"],
+        1,
+        "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart",
+    );
+    t(
+        &["a.csv", "a.csv", "--id=1"],
+        2,
+        "--id chooses a history of a solver's file, but that is a CSV",
+    );
+    let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
+    let nodout = nodout.to_str().unwrap();
+    t(&[nodout, nodout, "--id=1"], 1, &format!("{nodout}: nodout has no node 1"));
+    t(&[nodout, nodout], 1, &format!("{nodout}: 12 histories fit, from x_displacement[900001]"));
+    t(
+        &[nodout, nodout, "--component=x_velocity", "--column=x"],
+        2,
+        "--column names a column of a CSV file, but that is a solver's",
+    );
+}
+
+/// Signals with nothing in them, and with too much.
+#[test]
+fn degenerate_and_long_signals_are_rated() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "zero.csv", "t,v", 100, |t| format!("{t:?},0"));
+    write(here, "one.csv", "t,v", 50, |t| format!("{t:?},1"));
+    let text = crumple_in(here, &["rate", "zero.csv", "one.csv", "--json", "--strict"]);
+    assert_eq!(text.status.code(), Some(3), "a warning");
+    let of: Value = serde_json::from_slice(&text.stdout).unwrap();
+    assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));
+    assert_eq!(
+        String::from_utf8_lossy(&text.stderr),
+        "warning: the reference is zero throughout: there is nothing to be relative to\n"
+    );
+    let of = rate(here, &["one.csv", "one.csv"]);
+    assert_eq!((&of["iso18571"]["rating"], &of["cora"]["rating"]), (&1.0.into(), &1.0.into()));
+    // 400 s: 200 times as long as the warping takes.
+    write(here, "long.csv", "t,v", 400_000, |t| format!("{t:?},{:?}", t.sin()));
+    let of = rate(here, &["long.csv", "long.csv", "-q"]);
+    assert_eq!((&of["l1_ratio"], &of["iso18571"]), (&0.0.into(), &Value::Null));
+    assert!(of["warnings"][0].as_str().unwrap().contains("too many for ISO/TS 18571 and CORA"));
+}
+
+/// A file of a run that died is rated as far as it goes, and that is said.
+#[test]
+fn damage_of_a_solver_file_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fixture("fe/lead-car-wall/36kmh/nodout");
+    let text = std::fs::read(&path).unwrap();
+    std::fs::write(folder.path().join("nodout"), &text[..text.len() / 2 + 50]).unwrap();
+    let whole = path.to_str().unwrap();
+    let output = crumple_in(
+        folder.path(),
+        &["rate", whole, "nodout", "--component=x_velocity", "--json", "--strict"],
+    );
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("warning: nodout: "));
+    let of: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(of["l1_ratio"], 0.0);
+    assert!(of["to_s"].as_f64().unwrap() < 0.16);
+}
