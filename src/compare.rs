@@ -141,10 +141,7 @@ pub fn compare(
     let curve = predict(&model, &query_of(case, &model).with_rule(rule))?;
     let ddtcm = Candidate {
         declared: curve.envelope()?,
-        driver: Driver {
-            envelope: curve.envelope()?,
-            stiffness_n_per_m: Some(curve.unloading_stiffness_n_per_m),
-        },
+        driver: Driver::new(curve.envelope()?, Some(curve.stiffness_at_end(&curve.envelope()?))),
         truth: &own.envelope,
         time_s: start.elapsed().as_secs_f64(),
     };
@@ -156,7 +153,7 @@ pub fn compare(
     let curve = predict(&model, &query_of(case, &model))?;
     let envelope = curve.driving_envelope()?;
     let best = Candidate {
-        driver: Driver { stiffness_n_per_m: Some(curve.stiffness_at_end(&envelope)), envelope },
+        driver: Driver::new(envelope.clone(), Some(curve.stiffness_at_end(&envelope))),
         declared: curve.envelope()?,
         truth: &own.envelope,
         time_s: start.elapsed().as_secs_f64(),

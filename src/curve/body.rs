@@ -56,6 +56,96 @@ pub fn body_motion(case: &Case) -> Option<BodyMotion> {
     })
 }
 
+/// The force that moved the body as its speeds tell it, loading and unloading, not filtered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedForce {
+    /// Loading branch, in N.
+    pub loading: Envelope,
+    /// Unloading branch from the largest deflection to where the force is first zero.
+    pub unloading_deflection_m: Vec<f64>,
+    pub unloading_force_n: Vec<f64>,
+    /// Stiffness in N/m of the straight line that gives back the energy of the separation.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+}
+
+/// The body still swings after it has left the obstacle: its speed of separation is the mean
+/// over this time, in s.
+const SEPARATION_S: f64 = 0.020;
+
+/// Near the largest deflection the force still swings in time while the deflection hardly
+/// moves: over the last share of it one mean force stands for all, lest the rebound depend on
+/// where exactly a run stops.
+const LAST_SHARE: f64 = 0.005;
+
+/// The mean force between two states from the change of kinetic energy over the change of
+/// deflection, `−m Δ(v²)/2Δd`: a body that runs on it has the recorded speeds at the recorded
+/// deflections. `None` if the sampled states make no loading branch.
+pub fn recorded_force(case: &Case) -> Option<RecordedForce> {
+    let (t, d) = (case.sampled.time_s(), case.sampled.deflection_m());
+    let v = &case.closing_speed_m_per_s;
+    let mass = case.masses.effective_kg();
+    let end = loading_end(&case.sampled);
+    // States whose deflection advances, and the mean forces between them.
+    let mut states = vec![0];
+    let mut reached_m = 0.0;
+    for i in 1..end {
+        if d[i] > reached_m && d[i] <= (1.0 - LAST_SHARE) * d[end] {
+            states.push(i);
+            reached_m = d[i];
+        }
+    }
+    states.push(end);
+    let mean = |i: usize, j: usize| -0.5 * mass * (v[j] * v[j] - v[i] * v[i]) / (d[j] - d[i]);
+    let mut means = Vec::with_capacity(states.len());
+    // A body that swings forward at first would be pulled: what an interface that only pushes
+    // cannot give it is taken from the next pushes.
+    let mut owed_j = 0.0;
+    for w in states.windows(2) {
+        let step = d[w[1]] - d[w[0]];
+        let work_j = mean(w[0], w[1]) * step + owed_j;
+        owed_j = work_j.min(0.0);
+        means.push(work_j.max(0.0) / step);
+    }
+    let top = *means.last()?;
+    // At a state the mean of both sides, low enough that none between two states is below 0;
+    // between them what keeps their energy.
+    let at = |k: usize| match k {
+        0 => 0.0,
+        k if k == means.len() => top,
+        k => (0.5 * (means[k - 1] + means[k])).min(2.0 * means[k - 1]).min(2.0 * means[k]),
+    };
+    let (mut deflection_m, mut force_n) = (vec![0.0], vec![0.0]);
+    for (k, w) in states.windows(2).enumerate() {
+        deflection_m.extend([0.5 * (d[w[0]] + d[w[1]]), d[w[1]]]);
+        force_n.extend([2.0 * means[k] - 0.5 * (at(k) + at(k + 1)), at(k + 1)]);
+    }
+    let (mut unloading_deflection_m, mut unloading_force_n) = (vec![d[end]], vec![top]);
+    let mut parted = None;
+    for i in end..d.len() - 1 {
+        if d[i + 1] >= d[i] {
+            break;
+        }
+        unloading_deflection_m.push(0.5 * (d[i] + d[i + 1]));
+        unloading_force_n.push(mean(i, i + 1));
+        if mean(i, i + 1) <= 0.0 {
+            parted = Some(i);
+            break;
+        }
+    }
+    let separation = parted.map(|from| {
+        let until = t.iter().take_while(|&&time| time <= t[from] + SEPARATION_S).count();
+        -v[from..until].iter().sum::<f64>() / (until - from) as f64
+    });
+    Some(RecordedForce {
+        loading: Envelope::new(deflection_m, force_n).ok()?.pushing(),
+        unloading_deflection_m,
+        unloading_force_n,
+        unloading_stiffness_n_per_m: separation
+            .map(|speed| top * top / (mass * speed * speed))
+            .filter(|k| *k > 0.0 && k.is_finite()),
+    })
+}
+
 /// CFC 60 of values at `time_s`, as they are if their interval is too coarse for it.
 pub fn filtered(time_s: &[f64], values: Vec<f64>) -> Vec<f64> {
     match cfc::filter(CLASS, time_s, &values) {

@@ -124,6 +124,8 @@ pub struct ForceLaw {
     steepest_n_per_m: f64,
     /// `D` at each point of the envelope, in J; empty without memory.
     dissipated_j: Vec<f64>,
+    /// Whether the mean force so far, not the force itself, tells what is stored.
+    by_mean: bool,
 }
 
 /// The unloading branch from the largest deflection so far.
@@ -156,16 +158,40 @@ impl Piece {
 impl ForceLaw {
     /// Forces below zero become zero, because an interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
-        Self::shaped(envelope, unloading, UnloadingShape::line(), end)
+        Self::with(envelope, unloading, UnloadingShape::line(), end, false)
     }
 
-    /// The same with an unloading branch that is no straight line; its energy is that of the
-    /// line of the unloading stiffness.
-    pub fn shaped(
+    /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
+    /// line of the unloading stiffness from the envelope's end.
+    ///
+    /// A recorded force swings, and what a structure has stored does not swing with it.
+    /// Therefore `S` is taken from the mean force `A(δ)/δ`, scaled to that energy at the end,
+    /// and only bounded by `cδF_e`.
+    pub fn recorded(
         envelope: Envelope,
         unloading: Unloading,
         shape: UnloadingShape,
         end: EnvelopeEnd,
+    ) -> Self {
+        let unloading = match unloading {
+            Unloading::Elastic => unloading,
+            Unloading::Memory { stiffness_n_per_m } => {
+                let (top, end_m) = (envelope.force_at(envelope.end_m()), envelope.end_m());
+                let mean = envelope.work() / end_m;
+                let scale = (mean / top).powi(2);
+                let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
+                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m * scale }
+            }
+        };
+        Self::with(envelope, unloading, shape, end, true)
+    }
+
+    fn with(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+        by_mean: bool,
     ) -> Self {
         let envelope = envelope.pushing();
         let n = envelope.deflection_m().len();
@@ -188,12 +214,14 @@ impl ForceLaw {
             slope_n_per_m,
             steepest_n_per_m,
             dissipated_j: Vec::new(),
+            by_mean,
         };
         if let Unloading::Memory { stiffness_n_per_m } = unloading {
             let mut most = 0.0_f64;
             for i in 0..n {
                 let (d, f) = (law.envelope.deflection_m()[i], law.envelope.force_n()[i]);
-                most = most.max(law.envelope.work_j()[i] - law.storable(d, f, stiffness_n_per_m));
+                let work = law.envelope.work_j()[i];
+                most = most.max(work - law.stored_by_rule(d, f, work, stiffness_n_per_m));
                 law.dissipated_j.push(most);
             }
         }
@@ -204,6 +232,15 @@ impl ForceLaw {
     fn storable(&self, deflection_m: f64, force_n: f64, stiffness_n_per_m: f64) -> f64 {
         let bound = self.shape.share().min(0.5) * deflection_m;
         force_n * (0.5 * force_n / stiffness_n_per_m).min(bound)
+    }
+
+    /// `S` by the law's rule.
+    fn stored_by_rule(&self, deflection_m: f64, force_n: f64, work_j: f64, stiffness: f64) -> f64 {
+        if !self.by_mean {
+            return self.storable(deflection_m, force_n, stiffness);
+        }
+        let mean = if deflection_m > 0.0 { work_j / deflection_m } else { 0.0 };
+        (0.5 * mean * mean / stiffness).min(work_j)
     }
 
     pub fn unloading(&self) -> Unloading {
@@ -286,10 +323,15 @@ impl ForceLaw {
             return Branch { largest_m, top_n, stored_j: work, dissipated_j: 0.0, length_m: 0.0 };
         };
         // Within a piece A − S is monotone for either bound, so its ends and δ decide.
-        let dissipated =
-            self.dissipated_j[i].max(work - self.storable(largest_m, top_n, stiffness_n_per_m));
-        let least = self.storable(largest_m, top_n, self.steepest_n_per_m);
-        let stored_j = (work - dissipated).max(least);
+        let stored = self.stored_by_rule(largest_m, top_n, work, stiffness_n_per_m);
+        let dissipated = self.dissipated_j[i].max(work - stored);
+        let stored_j = match self.by_mean {
+            true => (work - dissipated).min(top_n * self.shape.share().min(0.5) * largest_m),
+            false => {
+                let least = self.storable(largest_m, top_n, self.steepest_n_per_m);
+                (work - dissipated).max(least)
+            }
+        };
         let length_m = match top_n > 0.0 && stored_j > 0.0 {
             true => stored_j / (top_n * self.shape.share()),
             false => 0.0, // the envelope itself has no force here

@@ -288,12 +288,18 @@ impl<'a> Held<'a> {
         forces
             .into_iter()
             .map(|(kind, envelope)| {
-                let driver = Driver::rebounding(
-                    envelope.clone(),
-                    self.own.effective_mass_kg,
-                    self.own.motion.rebound_speed_m_per_s,
-                    self.own.unloading_stiffness_n_per_m,
-                );
+                let recorded = match kind {
+                    ForceKind::Body => Driver::recorded(self.case),
+                    ForceKind::Contact => None,
+                };
+                let driver = recorded.unwrap_or_else(|| {
+                    Driver::rebounding(
+                        envelope.clone(),
+                        self.own.effective_mass_kg,
+                        self.own.motion.rebound_speed_m_per_s,
+                        self.own.unloading_stiffness_n_per_m,
+                    )
+                });
                 let errors = self.reference.errors(&self.reference.run(&driver)?)?;
                 Ok(Floor {
                     force: kind.name().into(),
@@ -352,7 +358,7 @@ impl<'a> Held<'a> {
         let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
         let driven = |envelope: Envelope| -> Result<MotionErrors, MotionError> {
             let stiffness_n_per_m = Some(curve.stiffness_at_end(&envelope));
-            let driver = Driver { envelope, stiffness_n_per_m };
+            let driver = Driver::new(envelope, stiffness_n_per_m);
             self.reference.errors(&self.reference.run(&driver)?)
         };
         Ok(Judged {

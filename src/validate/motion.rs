@@ -1,13 +1,13 @@
 //! Motion of a case against a multi-body run of one mass: the errors of a curve in use.
 
-use crate::curve::body::filtered;
+use crate::curve::body::{filtered, recorded_force};
 use crate::curve::rating::l1_ratio;
 use crate::curve::resample::interpolate;
 use crate::curve::{Case, Envelope};
 use crate::history::derivative;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
-    Unloading, simulate,
+    Unloading, UnloadingShape, simulate,
 };
 
 /// The comparison ends this long after FE's largest deflection, so that rebound counts.
@@ -59,9 +59,31 @@ pub struct MotionErrors {
 pub struct Driver {
     pub envelope: Envelope,
     pub stiffness_n_per_m: Option<f64>,
+    /// Of a recorded motion.
+    pub shape: Option<UnloadingShape>,
 }
 
 impl Driver {
+    /// A curve that unloads on a straight line.
+    pub fn new(envelope: Envelope, stiffness_n_per_m: Option<f64>) -> Self {
+        Self { envelope, stiffness_n_per_m, shape: None }
+    }
+
+    /// The force that moved the body of a case, with its own unloading; `None` if the case has
+    /// no loading branch.
+    pub fn recorded(case: &Case) -> Option<Self> {
+        let recorded = recorded_force(case)?;
+        let shape = UnloadingShape::of_branch(
+            &recorded.unloading_deflection_m,
+            &recorded.unloading_force_n,
+        );
+        Some(Self {
+            envelope: recorded.loading,
+            stiffness_n_per_m: recorded.unloading_stiffness_n_per_m,
+            shape: Some(shape.unwrap_or_else(UnloadingShape::line)),
+        })
+    }
+
     /// The stiffness with which a body of `mass_kg` leaves the envelope's end at
     /// `rebound_m_per_s`; `other` if that is not known.
     pub fn rebounding(
@@ -73,7 +95,7 @@ impl Driver {
         let top = envelope.force_at(envelope.end_m());
         let stiffness = rebound_m_per_s.map(|v| top * top / (mass_kg * v * v));
         let stiffness_n_per_m = stiffness.filter(|&k| k > 0.0 && k.is_finite()).or(other);
-        Self { envelope, stiffness_n_per_m }
+        Self::new(envelope, stiffness_n_per_m)
     }
 }
 
@@ -120,7 +142,12 @@ impl Reference {
             // A curve that never rises has no line to unload on.
             false => Unloading::Elastic,
         };
-        let law = ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold);
+        let law = match &driver.shape {
+            None => ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold),
+            Some(shape) => {
+                ForceLaw::recorded(envelope, unloading, shape.clone(), EnvelopeEnd::Hold)
+            }
+        };
         let interface = Interface::new("body|wall", law, 0.0);
         let chain = Chain::new(vec![body], vec![interface])?;
         let output_interval_s = self.time_s[1] - self.time_s[0];
