@@ -642,7 +642,7 @@ fn contact_and_body_force_rebound_alike() {
     let model = train("lead-car-wall", cases, Choice::Options(Options::Linear)).unwrap();
     for case in &cases[1..4] {
         let curve = curve(&model, case.speed.m_per_s);
-        let reference = Reference::of(case).unwrap();
+        let reference = crumple::validate::motion::Reference::of(case).unwrap();
         let rebound = |envelope: crumple::curve::Envelope| {
             let stiffness_n_per_m = Some(curve.stiffness_at_end(&envelope));
             let run = reference.run(&Driver::new(envelope, stiffness_n_per_m)).unwrap();
@@ -668,8 +668,8 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
         let cases = report.database.cases(group);
         assert_eq!(cases.len(), speeds);
         for case in cases {
-            let reference = Reference::of(case).unwrap();
-            let run = reference.run(&Driver::recorded(case).unwrap()).unwrap();
+            let reference = crumple::validate::motion::Reference::of(case).unwrap();
+            let run = reference.run(&crumple::validate::motion::Driver::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
             assert!(errors.velocity_l1 < 0.01, "{group} {}: {errors:?}", case.name);
             assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.name);
