@@ -53,7 +53,11 @@ pub mod multibody;
 
 pub mod export;
 
+pub mod plan;
+
 pub mod scenario;
+
+pub mod sweep;
 
 pub mod validate;
 

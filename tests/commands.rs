@@ -728,6 +728,7 @@ fn every_command_has_help_with_examples() {
         "train",
         "predict",
         "simulate",
+        "sweep",
         "compare",
         "export",
         "demo",

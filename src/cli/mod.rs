@@ -15,6 +15,7 @@ mod predict;
 mod progress;
 mod shell;
 mod simulate;
+mod sweep;
 mod train;
 mod validate;
 
@@ -67,6 +68,7 @@ enum Command {
     Train(train::Args),
     Predict(predict::Args),
     Simulate(simulate::Args),
+    Sweep(sweep::Args),
     Compare(compare::Args),
     Export(export::Args),
     Demo(demo::Args),
@@ -137,6 +139,7 @@ pub fn main() -> ExitCode {
         Command::Train(args) => train::run(&args, manners),
         Command::Predict(args) => predict::run(&args, manners),
         Command::Simulate(args) => simulate::run(&args, manners),
+        Command::Sweep(args) => sweep::run(&args, manners),
         Command::Compare(args) => compare::run(&args, manners),
         Command::Export(args) => export::run(&args, manners),
         Command::Demo(args) => demo::run(&args, manners),

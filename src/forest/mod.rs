@@ -27,7 +27,7 @@ mod onnx;
 mod params;
 mod quantiles;
 mod splitter;
-mod stream;
+pub mod stream;
 mod tree;
 mod walk;
 
