@@ -516,6 +516,8 @@ impl Sides<'_> {
 struct Builder {
     bodies: Vec<Body>,
     interfaces: Vec<Interface>,
+    /// Curves of files, whether at a wall, and the first interface that has their law.
+    made: Vec<(String, bool, usize)>,
     warnings: Vec<String>,
 }
 
@@ -558,6 +560,15 @@ impl Builder {
             return Err(invalid(format!(
                 "interface {name} takes its curve from a model at its own closing speed, which this version does not iterate: write interface_speed = \"train\" in [run], or give curve \"{curve}\" as a file or database case"
             )));
+        }
+        // A file's curve has one law wherever it stands; to copy it takes far less than to make it.
+        let at_wall = matches!(sides, Sides::Wall(..));
+        let made = self.made.iter().find(|(c, wall, _)| c == curve && *wall == at_wall);
+        if let Some(&(_, _, at)) = made {
+            let law = self.interfaces[at].law.clone();
+            let gap_m = gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
+            self.interfaces.push(Interface { name, law, gap_m });
+            return Ok(());
         }
         let source = meeting
             .sources
@@ -609,6 +620,9 @@ impl Builder {
             EndName::Slope => EnvelopeEnd::Slope,
             EndName::Error => EnvelopeEnd::Error,
         };
+        if table.model.is_none() {
+            self.made.push((curve.into(), at_wall, self.interfaces.len()));
+        }
         self.interfaces.push(Interface {
             name,
             law: ForceLaw::new(source.envelope, unloading, end),

@@ -29,8 +29,9 @@ impl Default for Chunk {
 
 /// Bound of the rows that are held at once.
 const MOST_ITEMS: u64 = 8192;
-/// Items that a thread takes at once.
+/// Items that a thread takes at once, at most; of few items fewer, so that all threads work.
 const BLOCK: usize = 8;
+const BLOCKS_PER_THREAD: usize = 4;
 /// Chains that a worker keeps.
 const KEPT_CHAINS: usize = 16;
 
@@ -49,17 +50,20 @@ pub fn rows(
 ) -> Result<(), SweepError> {
     let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names().to_vec()).collect();
     let workers = Mutex::new(Vec::new());
+    let threads = rayon::current_num_threads();
+    let least = (2 * threads) as u64;
     let mut size = match chunk {
         Chunk::Items(items) => items.clamp(1, MOST_ITEMS),
-        Chunk::Time(_) => (BLOCK * rayon::current_num_threads()) as u64,
+        Chunk::Time(_) => least,
     };
     let mut at = items.start;
     while at < items.end {
         let end = items.end.min(at + size);
         let begun = Instant::now();
         let piece: Vec<u64> = (at..end).collect();
+        let block = (piece.len() / (BLOCKS_PER_THREAD * threads)).clamp(1, BLOCK);
         let blocks: Vec<Vec<Written>> = piece
-            .par_chunks(BLOCK)
+            .par_chunks(block)
             .map(|block| {
                 let held = || workers.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut worker = held().pop().unwrap_or_else(|| Worker::new(sweep));
@@ -76,9 +80,9 @@ pub fn rows(
         if let Chunk::Time(wanted) = chunk {
             let took = begun.elapsed();
             if took < wanted / 2 {
-                size = (size * 2).min(MOST_ITEMS);
+                size = (size * 2).min(MOST_ITEMS.max(least));
             } else if took > wanted * 2 {
-                size = (size / 2).max(1);
+                size = (size / 2).max(least);
             }
         }
     }
