@@ -758,6 +758,8 @@ fn json_is_one_document() {
         "train curves.h5 --group lead-car-wall -o lead.model",
         "predict lead.model --speed 50km/h -o b.csv",
         "simulate scenario.toml",
+        "sweep scenario.toml -o sweep.csv",
+        "sweep scenario.toml --dry-run",
         "compare curves.h5 --group lead-car-wall --speed 48km/h",
         "export lead50.json --to csv",
         "export lead50.json --to csv -o c.csv",

@@ -194,11 +194,11 @@ fn band_members_are_between_the_edges() {
     assert!(crush[0] > 1.05 * crush[1] && crush[1] > 1.05 * crush[2], "{crush:?}");
     // The demo's own plan: a model's curve at each speed and member, and with other masses.
     let demo = fs::read_to_string(here.join("scenario.toml")).unwrap();
-    let (own, plan) = demo.split_once("[sweep]").unwrap();
+    let (own, rest) = demo.split_once("[sweep]").unwrap();
     let masses = "    { what = \"mass\", vehicle = \"A1\", values = [\"24t\", \"26t\"] },\n]";
     fs::write(
         here.join("s.toml"),
-        format!("{own}[sweep]{}", plan.replacen("\n]", &format!("\n{masses}"), 1)),
+        format!("{own}[sweep]{}", rest.replacen("\n]", &format!("\n{masses}"), 1)),
     )
     .unwrap();
     crumple_ok(&here, &["sweep", "s.toml", "-q", "-o", "demo.csv"]);
@@ -569,6 +569,22 @@ fn another_sweeps_file_is_not_taken_up() {
     fs::write(folder.path().join("out.csv"), &whole[..whole.len() - 1]).unwrap();
     let error = folder.fails(1, "sweep s.toml -q -o out.csv");
     assert!(error.contains("the row of item 11 is missing or damaged"), "{error}");
+}
+
+/// What cannot be written is said; rows that are there stay for the next time.
+#[cfg(target_os = "linux")]
+#[test]
+fn full_disks_and_missing_folders() {
+    let folder = Folder::new(GRID);
+    let error = folder.fails(1, "sweep s.toml -q -o /dev/full");
+    assert!(error.contains("cannot write /dev/full: No space left on device"), "{error}");
+    let error = folder.fails(1, "sweep s.toml -q -o no/out.csv");
+    assert!(error.contains("cannot write no/out.csv"), "{error}");
+    folder.ok("sweep s.toml -q -o out.csv");
+    folder.ok("sweep s.toml -q -o /dev/null");
+    let error = folder.fails(1, "sweep merge -o no/all.csv out.csv");
+    assert!(error.contains("cannot write no/all.csv"), "{error}");
+    assert_eq!(folder.names(), ["out.csv"]);
 }
 
 #[test]

@@ -93,10 +93,10 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         return Err(Failure::Usage("name the scenario".into()));
     };
     if let Some(output) = &args.output {
-        check_output(output)?;
         for input in [scenario].into_iter().chain(&args.plan) {
             keep_input(input, output)?;
         }
+        check_output(output)?;
         if is_stdout(output) && manners.json {
             let message = "-o - and --json both write to standard output: give one of them";
             return Err(Failure::Usage(message.into()));
@@ -262,11 +262,11 @@ fn say(document: &Document<'_>, manners: Manners, to_stdout: bool) -> CommandRes
 }
 
 fn table(out: &mut dyn Write, columns: &[ColumnStatistics]) -> io::Result<()> {
-    let digits = |value: Option<f64>| value.map_or("-".into(), |v| digits(v));
+    let number = |value: Option<f64>| value.map_or("-".into(), digits);
     let rows: Vec<Vec<String>> = columns
         .iter()
         .map(|c| {
-            let numbers = [c.min, c.p5, c.median, c.p95, c.max, c.mean].map(digits);
+            let numbers = [c.min, c.p5, c.median, c.p95, c.max, c.mean].map(number);
             [c.column.clone()].into_iter().chain(numbers).collect()
         })
         .collect();

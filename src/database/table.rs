@@ -183,7 +183,7 @@ impl Table {
         let failed = |e: hdf5_pure::Error| self.damaged(name, e.to_string());
         let dataset = self.file.dataset(dataset).map_err(failed)?;
         let values = match dataset.datatype().map_err(failed)? {
-            Datatype::String { size, .. } => Values::Text { width: size as usize },
+            Datatype::String { size, .. } if size > 0 => Values::Text { width: size as usize },
             found if found == make_i64_type() => Values::Integer,
             found if found == make_f64_type() => Values::Real,
             _ => return Err(self.damaged(name, "values of an unknown kind".into())),

@@ -79,7 +79,7 @@ impl Truncated {
         let (signed_sd, low, high) = if low > 0.0 { (-sd, -high, -low) } else { (sd, low, high) };
         let below = normal_share(low);
         let between = normal_share(high) - below;
-        if !(between > LEAST_SHARE) {
+        if between.is_nan() || between <= LEAST_SHARE {
             return Err("min and max leave nothing of the distribution".into());
         }
         Ok(Self { mean, sd: signed_sd, min, max, below, between })

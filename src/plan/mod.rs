@@ -98,14 +98,14 @@ pub struct Vary {
     /// Each of `vehicles` by itself, instead of one value for all of them.
     #[serde(default)]
     pub each: bool,
-    /// Of a gap, band, force or curve: the name in [curves].
+    /// Of a gap, band, force or curve: the name among the curves.
     pub curve: Option<String>,
     /// Of a gap: "contact", the first contact.
     pub interface: Option<String>,
     /// Values are factors on what the scenario has. Of a force they always are.
     #[serde(default)]
     pub factor: bool,
-    /// The values; of a curve, names in [curves] that take its place.
+    /// The values; of a curve, names among the curves that take its place.
     pub values: Option<Vec<Entry>>,
     /// First of `steps` even values, or lower end of a distribution.
     pub from: Option<Entry>,

@@ -218,6 +218,16 @@ impl Shelf {
             let message = format!("{} has {} rows, expected {rows}", short.name, short.rows);
             return Err(SweepError::Damaged { path: path.into(), message });
         }
+        // Widths of texts are the file's own, everything else is what this program writes.
+        let is_text = |c: &Column| matches!(c.values, Values::Text { .. });
+        let expected = Widths::new(head.columns.len()).datasets(&head);
+        let is_other = |(found, wanted): &(&Column, &Column)| {
+            is_text(found) != is_text(wanted) || !is_text(found) && found.values != wanted.values
+        };
+        if let Some((other, _)) = table.columns.iter().zip(&expected).find(is_other) {
+            let message = format!("{} does not hold the kind of values it should", other.name);
+            return Err(SweepError::Damaged { path: path.into(), message });
+        }
         Ok(Self { path: path.into(), table, head })
     }
 
