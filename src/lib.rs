@@ -57,7 +57,11 @@ pub mod nsdm;
 
 pub mod export;
 
+pub mod plan;
+
 pub mod scenario;
+
+pub mod sweep;
 
 pub mod validate;
 

@@ -14,6 +14,7 @@ use crate::manifest::{self, ManifestError};
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading,
 };
+use crate::plan::Plan;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
 use crate::surrogate::{Model, ModelError, PredictedCurve, Query, predict};
@@ -32,6 +33,8 @@ pub struct Scenario {
     pub wall: Option<WallTable>,
     /// Between the two noses, or nose and wall.
     pub contact: ContactTable,
+    /// What `crumple sweep` varies; a single run takes no notice of it.
+    pub sweep: Option<Plan>,
 }
 
 /// Times of the run.
@@ -94,6 +97,11 @@ pub struct CurveTable {
     /// mass.
     #[serde(default)]
     pub force: ForceName,
+    /// Of a model or predicted curve: member of its band, from −1 (lower edge) over 0 (the
+    /// curve) to 1 (upper edge).
+    pub band: Option<f64>,
+    /// Factor on the force.
+    pub scale: Option<f64>,
 }
 
 /// Which force of a predicted curve drives an interface.
@@ -370,6 +378,37 @@ pub fn assemble(
     Ok(Prepared { chain, settings, order, warnings: builder.warnings })
 }
 
+/// Gives a chain put together by [`assemble`] the masses, speeds and gaps of `scenario`, which
+/// differs from the one it was made of in nothing else; the force laws stay as they are. That
+/// is right wherever no law depends on these: a model's curve does, on masses and speeds.
+///
+/// # Errors
+/// [`ScenarioError`] as of [`assemble`]; the chain is then not to be run.
+pub fn adjust(
+    path: &Path,
+    scenario: &Scenario,
+    prepared: &mut Prepared,
+) -> Result<(), ScenarioError> {
+    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
+    check(scenario).map_err(invalid)?;
+    let (first, second) = (&scenario.train[0], scenario.train.get(1));
+    let bodies = |train: &TrainTable| {
+        let speed = train.speed.0;
+        train.vehicles.iter().map(move |v| (v.mass.0, speed)).collect::<Vec<_>>()
+    };
+    let mut motions = bodies(first);
+    motions.reverse();
+    motions.extend(second.iter().flat_map(|train| bodies(train)));
+    let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
+    let mut gaps = vec![own(inner(first)); first.vehicles.len() - 1];
+    gaps.push(scenario.contact.gap.map_or_else(|| own(&scenario.contact.curve), |g| g.0));
+    if let Some(second) = second {
+        gaps.resize(gaps.len() + second.vehicles.len() - 1, own(inner(second)));
+    }
+    let failed = |source| ScenarioError::Chain { path: path.into(), source };
+    prepared.chain.adjust(&motions, &gaps).map_err(failed)
+}
+
 fn inner(train: &TrainTable) -> &str {
     train.inner.as_deref().unwrap_or_default()
 }
@@ -473,6 +512,8 @@ impl Sides<'_> {
 struct Builder {
     bodies: Vec<Body>,
     interfaces: Vec<Interface>,
+    /// Curves of files, whether at a wall, and the first interface that has their law.
+    made: Vec<(String, bool, usize)>,
     warnings: Vec<String>,
 }
 
@@ -515,12 +556,23 @@ impl Builder {
                 "interface {name} takes its curve from a model at its own closing speed, which this version does not iterate: write interface_speed = \"train\" in [run], or give curve \"{curve}\" as a file or database case"
             )));
         }
+        // A file's curve has one law wherever it stands; to copy it takes far less than to make it.
+        let at_wall = matches!(sides, Sides::Wall(..));
+        let made = self.made.iter().find(|(c, wall, _)| c == curve && *wall == at_wall);
+        if let Some(&(_, _, at)) = made {
+            let law = self.interfaces[at].law.clone();
+            let gap_m = gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
+            self.interfaces.push(Interface::new(name, law, gap_m));
+            return Ok(());
+        }
         let source = meeting
             .sources
             .curves
             .get(curve)
             .ok_or_else(|| invalid(format!("curve \"{curve}\" has not been read")))?;
         let source = spring(source, table, curve, sides.mass_kg(), meeting)?;
+        let source =
+            source.scaled(table.scale).map_err(|m| invalid(format!("curve \"{curve}\": {m}")))?;
         let expected = match sides {
             Sides::Wall(..) => SpeedKind::Wall,
             Sides::Noses(..) | Sides::Vehicles(..) => SpeedKind::Closing,
@@ -563,6 +615,9 @@ impl Builder {
             EndName::Slope => EnvelopeEnd::Slope,
             EndName::Error => EnvelopeEnd::Error,
         };
+        if table.model.is_none() {
+            self.made.push((curve.into(), at_wall, self.interfaces.len()));
+        }
         let law = ForceLaw::new(source.envelope, unloading, end);
         let gap_m = gap.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
         self.interfaces.push(Interface::new(name, law, gap_m));
@@ -587,9 +642,16 @@ fn spring(
                 parameters: table.parameters.clone(),
                 ..Query::at(meeting.speed_m_per_s)
             };
-            from_curve(&predict(model, &query).map_err(failed)?, table.force).map_err(failed)
+            from_curve(&predict(model, &query).map_err(failed)?, table).map_err(failed)
         }
-        Source::Predicted(curve) => from_curve(curve, table.force).map_err(failed),
+        Source::Predicted(curve) => from_curve(curve, table).map_err(failed),
+        Source::Table(_) | Source::Case(_) if table.band.is_some() => {
+            let path = meeting.path.into();
+            let message = format!(
+                "curve \"{name}\": band needs a model or a predicted curve (.json), which has one"
+            );
+            Err(ScenarioError::Invalid { path, message })
+        }
         Source::Table(envelope) => Ok(Spring {
             envelope: envelope.clone(),
             unloading_n_per_m: None,
@@ -604,11 +666,14 @@ fn spring(
 }
 
 /// The force that was asked for, with the unloading that goes with it.
-fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Spring, PredictError> {
-    let envelope = match force {
+fn from_curve(curve: &PredictedCurve, table: &CurveTable) -> Result<Spring, PredictError> {
+    let mut envelope = match table.force {
         ForceName::Declared => curve.envelope()?,
         ForceName::Body => curve.driving_envelope()?,
     };
+    if let Some(member) = table.band {
+        envelope = band_member(curve, &envelope, member)?;
+    }
     // The force law keeps to its bounds by itself; the one constant is for other tools.
     let unloading_n_per_m = Some(curve.stiffness_at_end(&envelope));
     Ok(Spring {
@@ -617,6 +682,45 @@ fn from_curve(curve: &PredictedCurve, force: ForceName) -> Result<Spring, Predic
         kind: Some(curve.speed_kind),
         warnings: curve.warnings.iter().map(|w| w.to_string()).collect(),
     })
+}
+
+/// Member of the band around `envelope`, a force of `curve`. The band is that of the declared
+/// force; around the body's force it has the same width.
+fn band_member(
+    curve: &PredictedCurve,
+    envelope: &Envelope,
+    member: f64,
+) -> Result<Envelope, PredictError> {
+    if !(-1.0..=1.0).contains(&member) {
+        return Err(PredictError::Damaged(format!("band = {member}: expected from -1 to 1")));
+    }
+    let edge = if member < 0.0 { &curve.force_low_n } else { &curve.force_high_n };
+    let edge = edge.as_ref().ok_or_else(|| {
+        PredictError::Damaged("there is no band around it: leave band away".into())
+    })?;
+    let declared = curve.force_n.iter().zip(edge);
+    let force_n = envelope
+        .force_n()
+        .iter()
+        .zip(declared)
+        .map(|(force, (declared, edge))| (force + member.abs() * (edge - declared)).max(0.0))
+        .collect();
+    Ok(Envelope::new(envelope.deflection_m().to_vec(), force_n)?)
+}
+
+impl Spring {
+    /// With the force times `factor`, and the unloading stiffness with it.
+    fn scaled(mut self, factor: Option<f64>) -> Result<Self, String> {
+        let Some(factor) = factor else { return Ok(self) };
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(format!("scale = {factor}: expected more than 0"));
+        }
+        let force_n = self.envelope.force_n().iter().map(|f| f * factor).collect();
+        self.envelope = Envelope::new(self.envelope.deflection_m().to_vec(), force_n)
+            .map_err(|e| e.to_string())?;
+        self.unloading_n_per_m = self.unloading_n_per_m.map(|k| k * factor);
+        Ok(self)
+    }
 }
 
 fn is_json(path: &Path) -> bool {

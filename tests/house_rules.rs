@@ -11,7 +11,7 @@ use common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 20] = [
+const MAY_NAME: [(&str, &[&str]); 22] = [
     ("unit", &[]),
     ("history", &[]),
     ("file", &[]),
@@ -29,7 +29,12 @@ const MAY_NAME: [(&str, &[&str]); 20] = [
     ("multibody", &["curve", "unit"]),
     ("nsdm", &["curve", "stream"]),
     ("export", &["surrogate", "forest", "curve", "unit"]),
-    ("scenario", &["multibody", "surrogate", "export", "database", "curve", "manifest", "unit"]),
+    ("plan", &["stream", "unit"]),
+    (
+        "scenario",
+        &["plan", "multibody", "surrogate", "export", "database", "curve", "manifest", "unit"],
+    ),
+    ("sweep", &["scenario", "plan", "multibody", "database", "stream", "manifest", "file", "unit"]),
     ("validate", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
     ("compare", &["validate", "surrogate", "dataset", "curve", "unit"]),
 ];
@@ -162,6 +167,7 @@ fn schemas_are_those_of_the_types() {
     let schemas = [
         ("study.schema.json", schemars::schema_for!(crumple::study::Manifest)),
         ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
+        ("plan.schema.json", schemars::schema_for!(crumple::plan::PlanFile)),
         ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
         (
             "validation.schema.json",

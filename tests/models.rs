@@ -637,7 +637,7 @@ fn the_model_file_is_described() {
 /// The rebound is the same, whichever force drives the run.
 #[test]
 fn contact_and_body_force_rebound_alike() {
-    use crumple::validate::motion::{Driver, Reference};
+    use crumple::validate::motion::Driver;
     let cases = databases().cases("lead-car-wall");
     let model = train("lead-car-wall", cases, Choice::Options(Options::Linear)).unwrap();
     for case in &cases[1..4] {

@@ -380,6 +380,7 @@ fn outputs_do_not_destroy_inputs() {
         "export lead50.json --to csv -o lead50.json",
         "export lead.model --to onnx -o lead.model",
         "simulate scenario.toml -o scenario.toml",
+        "sweep scenario.toml -o scenario.toml",
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();
         let error = crumple_fails(&here, 2, &arguments);

@@ -56,6 +56,13 @@ vehicles = [ { name = "A1", mass = "24t" } ]
 
 [contact]
 curve = "nose"
+
+# For crumple sweep: all combinations, the last one changing fastest.
+[sweep]
+vary = [
+    { what = "speed", train = "A", from = "30km/h", to = "70km/h", steps = 5 },
+    { what = "band", curve = "nose", values = [-1, 0, 1] },   # lower edge, curve, upper edge
+]
 "#;
 
 #[derive(Serialize)]

@@ -16,6 +16,7 @@ mod progress;
 mod rate;
 mod shell;
 mod simulate;
+mod sweep;
 mod train;
 mod validate;
 
@@ -68,6 +69,7 @@ enum Command {
     Train(train::Args),
     Predict(predict::Args),
     Simulate(simulate::Args),
+    Sweep(sweep::Args),
     Compare(compare::Args),
     Rate(Box<rate::Args>),
     Export(export::Args),
@@ -139,6 +141,7 @@ pub fn main() -> ExitCode {
         Command::Train(args) => train::run(&args, manners),
         Command::Predict(args) => predict::run(&args, manners),
         Command::Simulate(args) => simulate::run(&args, manners),
+        Command::Sweep(args) => sweep::run(&args, manners),
         Command::Compare(args) => compare::run(&args, manners),
         Command::Rate(args) => rate::run(&args, manners),
         Command::Export(args) => export::run(&args, manners),

@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::time::Duration;
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Manners;
 
@@ -23,6 +23,43 @@ impl Bar {
     pub fn step(&self, done: &str) {
         if let Some(bar) = &self.0 {
             bar.set_message(done.to_string());
+        }
+    }
+
+    pub fn end(self) {
+        if let Some(bar) = self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// A bar over a known number of items, with the time that is left.
+pub struct Count(Option<ProgressBar>);
+
+impl Count {
+    pub fn new(manners: Manners, items: u64) -> Self {
+        let visible = !manners.quiet && std::io::stderr().is_terminal();
+        Self(visible.then(|| {
+            let bar = ProgressBar::new(items);
+            let template = "{wide_bar} {human_pos}/{human_len}, {per_sec}, {eta} left";
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                bar.set_style(style);
+            }
+            bar
+        }))
+    }
+
+    /// Sets where it begins; what was done before says nothing of the time left.
+    pub fn begin(&self, done: u64) {
+        if let Some(bar) = &self.0 {
+            bar.set_position(done);
+            bar.reset_eta();
+        }
+    }
+
+    pub fn set(&self, done: u64) {
+        if let Some(bar) = &self.0 {
+            bar.set_position(done);
         }
     }
 

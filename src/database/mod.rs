@@ -8,6 +8,7 @@ mod histories;
 mod layout;
 mod lock;
 mod skeleton;
+pub mod table;
 
 use std::collections::BTreeMap;
 use std::fs;

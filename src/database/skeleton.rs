@@ -8,7 +8,7 @@
 use std::fs::File;
 use std::io::{self, Write};
 
-use hdf5_pure::{DatasetBuilder, FileBuilder, make_f64_type};
+use hdf5_pure::{DatasetBuilder, Datatype, FileBuilder, make_f64_type};
 
 const MARK: &[u8; 16] = b"VALUESCOMELATER!";
 
@@ -20,17 +20,27 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// Gives a dataset its shape and its place.
+    /// Gives a dataset of doubles its shape and its place.
     pub fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
-        let values = rows * columns;
-        let mut bytes = vec![0u8; values * size_of::<f64>()];
+        let shape = [rows as u64, columns as u64];
+        self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
+    }
+
+    /// Gives a dataset of values of `size` bytes its shape and its place.
+    pub fn reserve_values(
+        &mut self,
+        dataset: &mut DatasetBuilder,
+        datatype: Datatype,
+        size: usize,
+        shape: &[u64],
+    ) {
+        let values = shape.iter().product::<u64>();
+        let mut bytes = vec![0u8; values as usize * size];
         let mark = mark(self.lengths.len());
         let count = mark.len().min(bytes.len());
         bytes[..count].copy_from_slice(&mark[..count]);
         self.lengths.push(bytes.len());
-        dataset
-            .with_raw_data(make_f64_type(), bytes, values as u64)
-            .with_shape(&[rows as u64, columns as u64]);
+        dataset.with_raw_data(datatype, bytes, values).with_shape(shape);
     }
 
     /// Writes everything but the values; where those of each dataset begin. `None` if the

@@ -144,7 +144,31 @@ impl Chain {
             let (bodies, interfaces) = (bodies.len(), interfaces.len());
             return Err(ChainError::Interfaces { bodies, interfaces });
         }
-        for body in &bodies {
+        Self { bodies, interfaces }.checked()
+    }
+
+    /// Gives the bodies other masses and speeds (kg, m/s) and the interfaces other gaps (m), in
+    /// the order of the chain; the force laws stay.
+    ///
+    /// # Errors
+    /// [`ChainError`] names the body or interface whose value breaks the invariant; the chain is
+    /// then not to be run.
+    pub fn adjust(&mut self, motions: &[(f64, f64)], gaps_m: &[f64]) -> Result<(), ChainError> {
+        for (body, (mass_kg, speed_m_per_s)) in self.bodies.iter_mut().zip(motions) {
+            (body.mass_kg, body.speed_m_per_s) = (*mass_kg, *speed_m_per_s);
+        }
+        for (interface, gap_m) in self.interfaces.iter_mut().zip(gaps_m) {
+            interface.gap_m = *gap_m;
+        }
+        self.check()
+    }
+
+    fn checked(self) -> Result<Self, ChainError> {
+        self.check().map(|()| self)
+    }
+
+    fn check(&self) -> Result<(), ChainError> {
+        for body in &self.bodies {
             let Body { mass_kg, speed_m_per_s, resistance, .. } = *body;
             let name = || body.name.clone();
             if !(mass_kg > 0.0 && mass_kg.is_finite()) {
@@ -161,7 +185,7 @@ impl Chain {
                 }
             }
         }
-        for interface in &interfaces {
+        for interface in &self.interfaces {
             let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
             for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
                 if !(length_m >= 0.0 && length_m.is_finite()) {
@@ -173,7 +197,7 @@ impl Chain {
                 }
             }
         }
-        Ok(Self { bodies, interfaces })
+        Ok(())
     }
 
     pub fn bodies(&self) -> &[Body] {

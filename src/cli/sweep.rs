@@ -1,0 +1,335 @@
+//! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
+
+use std::fs::OpenOptions;
+use std::io::{self, BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use crumple::sweep::{
+    self, ColumnStatistics, Report, Settings, Shard, Sweep, SweepError, VariableSummary,
+};
+use serde::Serialize;
+
+use super::output;
+use super::progress::Count;
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
+
+/// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each
+///
+/// What is varied stands in the scenario's [sweep] table or in a file of its own (--plan). Rows
+/// come in order of items and are the same for any number of threads (RAYON_NUM_THREADS) and
+/// shards. A run that was stopped or killed goes on when the same command is given again.
+#[derive(clap::Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:
+  crumple sweep scenario.toml --dry-run
+  crumple sweep scenario.toml -o results.csv
+  crumple sweep scenario.toml --plan plan.toml -o results.h5
+  crumple sweep scenario.toml --shard 2/3 -o part2.csv
+  crumple sweep merge -o results.csv part1.csv part2.csv part3.csv"
+)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Scenario (TOML) with a [sweep] table
+    #[arg(required = true)]
+    scenario: Option<PathBuf>,
+    /// File (TOML) whose [sweep] table takes the place of the scenario's
+    #[arg(long, value_name = "PLAN")]
+    plan: Option<PathBuf>,
+    /// Where to write: .csv, .h5 or .hdf5; \"-\" is CSV on standard output
+    #[arg(short, long, required_unless_present = "dry_run")]
+    output: Option<PathBuf>,
+    /// Run block I of N blocks of the items
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+    /// Begin anew, whatever an earlier run has left
+    #[arg(long)]
+    restart: bool,
+    /// Say what would be run, and run nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Join the files of all shards of a sweep, given in any order
+    #[command(after_help = "Examples:
+  crumple sweep merge -o results.csv part*.csv
+  crumple sweep merge -o results.h5 part*.h5")]
+    Merge {
+        /// Files of all shards
+        #[arg(required = true)]
+        shards: Vec<PathBuf>,
+        /// Where to write: .csv, .h5 or .hdf5
+        #[arg(short, long)]
+        output: PathBuf,
+    },
+}
+
+/// A share of the work: `2/3`.
+fn shard(text: &str) -> Result<Shard, String> {
+    let parsed = text
+        .split_once('/')
+        .and_then(|(index, count)| Shard::new(index.parse().ok()?, count.parse().ok()?));
+    parsed.ok_or_else(|| {
+        format!("\"{text}\" is no shard: write for example 2/3, the second of three")
+    })
+}
+
+/// Rows that a dry run shows.
+const SHOWN: u64 = 5;
+
+pub fn run(args: &Args, manners: Manners) -> CommandResult {
+    if let Some(Command::Merge { shards, output }) = &args.command {
+        return merge(shards, output, manners);
+    }
+    let Some(scenario) = &args.scenario else {
+        return Err(Failure::Usage("name the scenario".into()));
+    };
+    if let Some(output) = &args.output {
+        for input in [scenario].into_iter().chain(&args.plan) {
+            keep_input(input, output)?;
+        }
+        check_output(output)?;
+        if is_stdout(output) && manners.json {
+            let message = "-o - and --json both write to standard output: give one of them";
+            return Err(Failure::Usage(message.into()));
+        }
+    }
+    let begun = Instant::now();
+    let sweep = Sweep::load(scenario, args.plan.as_deref())?;
+    for warning in sweep.warnings() {
+        manners.warn(warning);
+    }
+    let shard = args.shard.unwrap_or(Shard::WHOLE);
+    let output = match &args.output {
+        Some(output) if !args.dry_run => output,
+        _ => return dry_run(&sweep, shard, manners),
+    };
+    let settings = Settings { shard, restart: args.restart, ..Settings::default() };
+    let report = write(&sweep, output, &settings, manners)?;
+    if !report.is_complete() {
+        let message = format!(
+            "stopped behind {} of {} rows; the same command goes on there",
+            report.done, report.rows
+        );
+        return Err(Failure::Failed(message.into()));
+    }
+    let document = Document::new(&report, begun, output);
+    say(&document, manners, is_stdout(output))
+}
+
+/// Both kinds of results, by the name of the file; a device takes CSV.
+fn check_output(output: &Path) -> Result<(), Failure> {
+    let is_device = output.metadata().is_ok_and(|meta| !meta.is_file());
+    match output.extension().and_then(|e| e.to_str()) {
+        _ if is_stdout(output) || is_device => Ok(()),
+        Some("csv" | "h5" | "hdf5") => Ok(()),
+        _ => Err(Failure::Usage(format!(
+            "-o {}: results are written as .csv, .h5 or .hdf5",
+            output.display()
+        ))),
+    }
+}
+
+fn write(
+    sweep: &Sweep,
+    output: &Path,
+    settings: &Settings,
+    manners: Manners,
+) -> Result<Report, Failure> {
+    let items = settings.shard.items(sweep.items());
+    let bar = Count::new(manners, items.end - items.start);
+    let mut begun = false;
+    let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
+    let mut step = |done: u64| match std::mem::replace(&mut begun, true) {
+        true => bar.set(done),
+        false => bar.begin(done),
+    };
+    let report = if is_stdout(output) || is_device {
+        let mut progress = |done| {
+            step(done);
+            ControlFlow::Continue(())
+        };
+        let mut write =
+            |out: &mut dyn Write| sweep::write_rows(sweep, out, output, settings, &mut progress);
+        match is_stdout(output) {
+            true => write(&mut BufWriter::new(io::stdout().lock())),
+            false => {
+                let device = OpenOptions::new().write(true).open(output);
+                let failed = |source| crumple::file::WriteError { path: output.into(), source };
+                write(&mut device.map_err(failed)?)
+            }
+        }
+    } else {
+        let stop = stop_flag();
+        sweep::write(sweep, output, settings, |done| {
+            step(done);
+            match stop.load(Ordering::Relaxed) {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        })
+    };
+    bar.end();
+    Ok(report?)
+}
+
+/// Set by the first Ctrl-C (or SIGTERM), so that a run ends behind the chunk it is at; the
+/// second one ends it at once, which loses that chunk only.
+fn stop_flag() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    let handler = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    // Without a handler Ctrl-C ends the run at once, and nothing is lost either.
+    let _ = ctrlc::set_handler(handler);
+    stop
+}
+
+fn merge(shards: &[PathBuf], output: &Path, manners: Manners) -> CommandResult {
+    check_output(output)?;
+    for input in shards {
+        keep_input(input, output)?;
+    }
+    let begun = Instant::now();
+    let report: Result<Report, SweepError> = sweep::merge(shards, output);
+    say(&Document::new(&report?, begun, output), manners, false)
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    seconds: f64,
+    output: &'a Path,
+}
+
+impl<'a> Document<'a> {
+    fn new(report: &'a Report, begun: Instant, output: &'a Path) -> Self {
+        Self { report, seconds: begun.elapsed().as_secs_f64(), output }
+    }
+}
+
+fn say(document: &Document<'_>, manners: Manners, to_stdout: bool) -> CommandResult {
+    let Document { report, seconds, output } = document;
+    if report.failed > 0 {
+        let mut text =
+            format!("{} of {} items failed; their rows say why", report.failed, report.rows);
+        for (item, message) in &report.messages {
+            text.push_str(&format!("\n  item {item}: {message}"));
+        }
+        manners.warn(&text);
+    }
+    if report.warned > 0 {
+        manners.warn(&format!(
+            "{} of {} items have warnings in their rows",
+            report.warned, report.rows
+        ));
+    }
+    if manners.json {
+        output::print_json(document)?;
+    } else if !to_stdout {
+        output::print(|out| {
+            table(out, &report.columns)?;
+            let resumed = match report.resumed {
+                0 => String::new(),
+                n if n == report.rows => ", all of an earlier run".into(),
+                n => format!(", {n} of them of an earlier run"),
+            };
+            writeln!(
+                out,
+                "{} items{resumed}, {} failed, {seconds:.1} s",
+                report.rows, report.failed
+            )?;
+            match report.resumed == report.rows && report.rows > 0 {
+                true => writeln!(out, "{} is complete: nothing was left to run", output.display()),
+                false => writeln!(out, "wrote {}", output.display()),
+            }
+        })?;
+    }
+    Ok(if report.failed + report.warned > 0 { Outcome::Warned } else { Outcome::Clean })
+}
+
+fn table(out: &mut dyn Write, columns: &[ColumnStatistics]) -> io::Result<()> {
+    let number = |value: Option<f64>| value.map_or("-".into(), digits);
+    let rows: Vec<Vec<String>> = columns
+        .iter()
+        .map(|c| {
+            let numbers = [c.min, c.p5, c.median, c.p95, c.max, c.mean].map(number);
+            [c.column.clone()].into_iter().chain(numbers).collect()
+        })
+        .collect();
+    output::table(out, &["column", "min", "5 %", "median", "95 %", "max", "mean"], &rows)
+}
+
+/// Six digits.
+fn digits(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
+        let before = if value == 0.0 { 1 } else { magnitude.log10().floor() as i32 + 1 };
+        format!("{value:.*}", (6 - before.max(0)).max(0) as usize)
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
+#[derive(Serialize)]
+struct Preview {
+    items: u64,
+    shard: Shard,
+    rows: u64,
+    hash: String,
+    variables: Vec<VariableSummary>,
+    columns: Vec<String>,
+    /// The first items with their varied values.
+    first: Vec<(u64, Vec<String>)>,
+}
+
+fn dry_run(sweep: &Sweep, shard: Shard, manners: Manners) -> CommandResult {
+    let items = shard.items(sweep.items());
+    let preview = Preview {
+        items: sweep.items(),
+        shard,
+        rows: items.end - items.start,
+        hash: sweep.hash().into(),
+        variables: sweep.variables(),
+        columns: sweep.columns(),
+        first: items.clone().take(SHOWN as usize).map(|k| (k, sweep.values(k))).collect(),
+    };
+    if manners.json {
+        output::print_json(&preview)?;
+        return Ok(Outcome::Clean);
+    }
+    output::print(|out| {
+        writeln!(out, "{} items", preview.items)?;
+        if shard != Shard::WHOLE {
+            let (index, count) = (shard.index(), shard.count());
+            writeln!(out, "shard {index}/{count}: {} items from {} on", preview.rows, items.start)?;
+        }
+        for variable in &preview.variables {
+            match variable.values {
+                Some(count) => writeln!(out, "{}: {count} values", variable.column)?,
+                None => writeln!(out, "{}: drawn", variable.column)?,
+            }
+        }
+        writeln!(out, "columns: {}", preview.columns.join(", "))?;
+        let mut heading = vec!["item"];
+        heading.extend(preview.variables.iter().map(|v| v.column.as_str()));
+        let row = |(item, values): &(u64, Vec<String>)| {
+            [item.to_string()].into_iter().chain(values.iter().cloned()).collect()
+        };
+        output::table(out, &heading, &preview.first.iter().map(row).collect::<Vec<_>>())
+    })?;
+    Ok(Outcome::Clean)
+}

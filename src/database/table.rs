@@ -1,0 +1,287 @@
+//! Tables of named columns in HDF5, written and read in pieces of rows.
+
+use std::collections::HashSet;
+use std::fs::File as DiskFile;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use hdf5_pure::{
+    AttrValue, CharacterSet, Datatype, File, FileBuilder, StringPadding, make_f64_type,
+    make_i64_type,
+};
+
+use super::DatabaseError;
+use super::skeleton::{Skeleton, write_all_at};
+use crate::file::write_at;
+
+/// What the values of a column are; all have a fixed number of bytes, little endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Values {
+    /// 64 bits, signed.
+    Integer,
+    /// Doubles.
+    Real,
+    /// UTF-8, filled up with zero bytes.
+    Text { width: usize },
+}
+
+/// A column: a dataset of one dimension.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    pub name: String,
+    pub values: Values,
+    pub rows: u64,
+}
+
+/// An attribute of the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Attribute {
+    Text(String),
+    Integer(i64),
+}
+
+/// Takes values of a column from a row on, as bytes.
+pub type Put<'a> = dyn FnMut(usize, u64, &[u8]) -> io::Result<()> + 'a;
+
+impl Values {
+    /// Bytes of one value.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Integer | Self::Real => 8,
+            Self::Text { width } => width,
+        }
+    }
+
+    fn datatype(self) -> Datatype {
+        match self {
+            Self::Integer => make_i64_type(),
+            Self::Real => make_f64_type(),
+            Self::Text { width } => Datatype::String {
+                size: width as u32,
+                padding: StringPadding::NullPad,
+                charset: CharacterSet::Utf8,
+            },
+        }
+    }
+}
+
+/// Name of the dataset that lists the columns in their order.
+const COLUMNS: &str = "columns";
+/// Tables up to this size are put together in memory.
+const SMALL_BYTES: u64 = 1 << 20;
+
+/// Writes a table to `path` as a whole; `fill` puts the values of all columns, in any order.
+///
+/// A column is a dataset of its name, in which `_` stands for `/`; the dataset `columns` lists
+/// the names in their order. Nothing is held but what `fill` holds, and the same values give
+/// the same bytes in whatever pieces they are put. Columns of a table larger than 1 MiB need
+/// 24 bytes at least.
+///
+/// # Errors
+/// [`DatabaseError`] if the target cannot be written, or of `fill`.
+pub fn write_table(
+    path: &Path,
+    attributes: &[(&str, Attribute)],
+    columns: &[Column],
+    fill: impl FnOnce(&mut Put<'_>) -> io::Result<()>,
+) -> Result<(), DatabaseError> {
+    let mut out = FileBuilder::new();
+    for (name, value) in attributes {
+        let value = match value {
+            Attribute::Text(text) => AttrValue::VarLenString(text.clone()),
+            Attribute::Integer(number) => AttrValue::I64(*number),
+        };
+        out.set_attr(name, value);
+    }
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let failed = |detail: String| DatabaseError::Encode { detail };
+    out.create_dataset(COLUMNS).with_strings(&names).map_err(|e| failed(e.to_string()))?;
+    let datasets = dataset_names(&names);
+    let bytes = |c: &Column| c.rows.saturating_mul(c.values.size() as u64);
+    let total = columns.iter().map(bytes).fold(0, u64::saturating_add);
+    if total <= SMALL_BYTES {
+        let mut held: Vec<Vec<u8>> = columns.iter().map(|c| vec![0; bytes(c) as usize]).collect();
+        fill(&mut |column, row, values| {
+            let from = row as usize * columns[column].values.size();
+            let target = held[column].get_mut(from..from + values.len());
+            target.ok_or(io::ErrorKind::InvalidInput)?.copy_from_slice(values);
+            Ok(())
+        })
+        .map_err(|e| failed(e.to_string()))?;
+        for ((column, name), held) in columns.iter().zip(&datasets).zip(held) {
+            out.create_dataset(name).with_raw_data(column.values.datatype(), held, column.rows);
+        }
+        write_at(path, |file| {
+            let bytes = out.finish().map_err(io::Error::other)?;
+            write_all_at(file, &bytes, 0).map(Some)
+        })?;
+        return Ok(());
+    }
+    let mut skeleton = Skeleton::default();
+    for (column, name) in columns.iter().zip(&datasets) {
+        let (datatype, size) = (column.values.datatype(), column.values.size());
+        skeleton.reserve_values(out.create_dataset(name), datatype, size, &[column.rows]);
+    }
+    let written = write_at(path, |file: &DiskFile| {
+        let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
+        fill(&mut |column, row, values| {
+            let at = offsets[column] + row * columns[column].values.size() as u64;
+            write_all_at(file, values, at)
+        })?;
+        file.sync_all().map(Some)
+    })?;
+    written.ok_or_else(|| failed("a column is too short for a large table".into()))
+}
+
+/// Names that datasets can have, each another.
+fn dataset_names(columns: &[&str]) -> Vec<String> {
+    let mut taken = HashSet::from([COLUMNS.to_string()]);
+    let mut name = |column: &&str| {
+        let mut name = column.replace('/', "_");
+        while taken.contains(&name) || name.is_empty() || name == "." {
+            name.push('_');
+        }
+        taken.insert(name.clone());
+        name
+    };
+    columns.iter().map(&mut name).collect()
+}
+
+/// An open table.
+pub struct Table {
+    path: PathBuf,
+    file: File,
+    datasets: Vec<String>,
+    pub columns: Vec<Column>,
+}
+
+impl Table {
+    /// Opens a table whose root attribute `format` is `format`; values are not read yet.
+    ///
+    /// # Errors
+    /// [`DatabaseError`] if it is not HDF5, or no such table.
+    pub fn open(path: &Path, format: &str) -> Result<Self, DatabaseError> {
+        DiskFile::open(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
+        let file = File::open_streaming(path)
+            .map_err(|e| DatabaseError::NotHdf5 { path: path.into(), detail: e.to_string() })?;
+        let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
+        match table.attribute("format")? {
+            Some(Attribute::Text(found)) if found == format => {}
+            _ => return Err(table.damaged("format", format!("this is no {format}"))),
+        }
+        let names = table.file.dataset(COLUMNS).and_then(|d| d.read_string());
+        let names = names.map_err(|e| table.damaged(COLUMNS, e.to_string()))?;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        table.datasets = dataset_names(&names);
+        for (name, dataset) in names.iter().zip(&table.datasets) {
+            table.columns.push(table.column(name, dataset)?);
+        }
+        Ok(table)
+    }
+
+    fn column(&self, name: &str, dataset: &str) -> Result<Column, DatabaseError> {
+        let failed = |e: hdf5_pure::Error| self.damaged(name, e.to_string());
+        let dataset = self.file.dataset(dataset).map_err(failed)?;
+        let values = match dataset.datatype().map_err(failed)? {
+            Datatype::String { size, .. } if size > 0 => Values::Text { width: size as usize },
+            found if found == make_i64_type() => Values::Integer,
+            found if found == make_f64_type() => Values::Real,
+            _ => return Err(self.damaged(name, "values of an unknown kind".into())),
+        };
+        let rows = dataset.shape().map_err(failed)?;
+        let rows = rows.first().copied().unwrap_or(0);
+        Ok(Column { name: name.into(), values, rows })
+    }
+
+    /// An attribute of the file, if it has it.
+    ///
+    /// # Errors
+    /// [`DatabaseError::Damaged`] if attributes cannot be read.
+    pub fn attribute(&self, name: &str) -> Result<Option<Attribute>, DatabaseError> {
+        let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
+        Ok(match all.remove(name) {
+            Some(AttrValue::VarLenString(text) | AttrValue::String(text)) => {
+                Some(Attribute::Text(text))
+            }
+            Some(AttrValue::I64(number)) => Some(Attribute::Integer(number)),
+            _ => None,
+        })
+    }
+
+    /// Bytes of `rows` values of a column from `row` on.
+    ///
+    /// # Errors
+    /// [`DatabaseError::Damaged`] names the column.
+    pub fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, DatabaseError> {
+        let name = &self.columns[column].name;
+        let dataset = self.file.dataset(&self.datasets[column]);
+        let bytes = dataset.and_then(|d| d.read_raw_rows(row, rows));
+        let bytes = bytes.map_err(|e| self.damaged(name, e.to_string()))?;
+        match bytes.len() as u64 == rows * self.columns[column].values.size() as u64 {
+            true => Ok(bytes),
+            false => Err(self.damaged(name, format!("{} bytes of {rows} rows", bytes.len()))),
+        }
+    }
+
+    fn damaged(&self, place: &str, detail: String) -> DatabaseError {
+        DatabaseError::Damaged { path: self.path.clone(), place: place.into(), detail }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Small and large, put in pieces of any size: the values come back.
+    #[test]
+    fn tables_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        for rows in [0u64, 1, 5, 70_000] {
+            let path = folder.path().join(format!("{rows}.h5"));
+            let column = |name: &str, values| Column { name: name.into(), values, rows };
+            let columns = [
+                column("item", Values::Integer),
+                column("x_m[A/1]", Values::Real),
+                column("name", Values::Text { width: 7 }),
+            ];
+            let value = |c: usize, row: u64| match c {
+                0 => (row as i64 - 3).to_le_bytes().to_vec(),
+                1 => (row as f64 * 0.1).to_le_bytes().to_vec(),
+                _ => format!("{:<7}", row % 1000).into_bytes(),
+            };
+            let bytes = |c: usize, from: u64, to: u64| -> Vec<u8> {
+                (from..to).flat_map(|row| value(c, row)).collect()
+            };
+            let mut files = Vec::new();
+            for piece in [3, 7_777] {
+                write_table(
+                    &path,
+                    &[("format", Attribute::Text("a table".into())), ("n", Attribute::Integer(5))],
+                    &columns,
+                    |put| {
+                        for from in (0..rows).step_by(piece) {
+                            let to = rows.min(from + piece as u64);
+                            for c in 0..3 {
+                                put(c, from, &bytes(c, from, to))?;
+                            }
+                        }
+                        Ok(())
+                    },
+                )
+                .unwrap();
+                files.push(std::fs::read(&path).unwrap());
+            }
+            assert!(files[0] == files[1]);
+            let table = Table::open(&path, "a table").unwrap();
+            assert_eq!(table.columns, columns);
+            assert_eq!(table.attribute("n").unwrap(), Some(Attribute::Integer(5)));
+            for c in 0..3 {
+                assert!(table.read(c, 0, rows).unwrap() == bytes(c, 0, rows));
+                if rows > 2 {
+                    assert!(table.read(c, 1, 2).unwrap() == bytes(c, 1, 3));
+                }
+            }
+            assert!(Table::open(&path, "another").is_err());
+        }
+    }
+}

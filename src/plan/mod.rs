@@ -1,0 +1,604 @@
+//! Plan of a sweep (TOML): what is varied, over which values or distribution.
+//!
+//! What the names in it refer to is the scenario's business; here numbers get their units and
+//! item `k` its values.
+
+pub mod draw;
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::unit::{LENGTH, MASS, SPEED};
+use draw::Distribution;
+
+/// More items than any cluster could run; keeps a mistyped number from passing.
+pub const MAX_ITEMS: u64 = 1_000_000_000_000;
+
+/// A `--plan` file: the `[sweep]` table by itself.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanFile {
+    pub sweep: Plan,
+}
+
+/// The `[sweep]` table: many runs of one scenario.
+///
+/// Variables with `values` or `steps` form a grid: all combinations, the last one listed
+/// changing fastest. Variables with a `distribution` are drawn `samples` times at each point
+/// of the grid.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Of the random draws; 0 if absent.
+    #[serde(default)]
+    pub seed: u64,
+    /// Draws at each point of the grid; needed as soon as one variable has a distribution.
+    pub samples: Option<u64>,
+    #[serde(default)]
+    pub sampling: Sampling,
+    /// Results to keep; all if absent.
+    pub results: Option<Vec<ResultName>>,
+    pub vary: Vec<Vary>,
+}
+
+/// How distributions are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// Each draw by itself (Monte Carlo).
+    #[default]
+    Random,
+    /// One draw in each of as many equally likely ranges as there are samples, for every
+    /// variable.
+    LatinHypercube,
+}
+
+/// A result of each run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ResultName {
+    /// Of each interface.
+    PeakForce,
+    MaxDeflection,
+    MaxDeflectionTime,
+    Restitution,
+    /// Of each body.
+    FinalSpeed,
+    MeanDeceleration,
+    /// Of the run.
+    EnergyError,
+    MomentumError,
+}
+
+/// All results, in the order of their columns.
+pub const RESULTS: [ResultName; 8] = [
+    ResultName::PeakForce,
+    ResultName::MaxDeflection,
+    ResultName::MaxDeflectionTime,
+    ResultName::Restitution,
+    ResultName::FinalSpeed,
+    ResultName::MeanDeceleration,
+    ResultName::EnergyError,
+    ResultName::MomentumError,
+];
+
+/// One thing that is varied.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vary {
+    pub what: What,
+    /// Of a speed: the train.
+    pub train: Option<String>,
+    /// Of a mass: the vehicle.
+    pub vehicle: Option<String>,
+    /// Of a mass: several vehicles, or "all".
+    pub vehicles: Option<Vehicles>,
+    /// Each of `vehicles` by itself, instead of one value for all of them.
+    #[serde(default)]
+    pub each: bool,
+    /// Of a gap, band, force or curve: the name among the curves.
+    pub curve: Option<String>,
+    /// Of a gap: "contact", the first contact.
+    pub interface: Option<String>,
+    /// Values are factors on what the scenario has. Of a force they always are.
+    #[serde(default)]
+    pub factor: bool,
+    /// The values; of a curve, names among the curves that take its place.
+    pub values: Option<Vec<Entry>>,
+    /// First of `steps` even values, or lower end of a distribution.
+    pub from: Option<Entry>,
+    /// Last of `steps` even values, or upper end of a distribution.
+    pub to: Option<Entry>,
+    /// Number of even values, both ends among them.
+    pub steps: Option<u64>,
+    pub distribution: Option<DistributionName>,
+    /// Of the quantity itself, also of a lognormal one, before it is truncated.
+    pub mean: Option<Entry>,
+    /// Standard deviation of the quantity itself, before it is truncated.
+    pub sd: Option<Entry>,
+    /// Of a triangular distribution: the likeliest value.
+    pub mode: Option<Entry>,
+    /// Nothing below is drawn (normal, lognormal).
+    pub min: Option<Entry>,
+    /// Nothing above is drawn (normal, lognormal).
+    pub max: Option<Entry>,
+}
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum What {
+    /// Speed of a train.
+    #[default]
+    Speed,
+    /// Mass of vehicles.
+    Mass,
+    /// Free distance before contact.
+    Gap,
+    /// Member of a curve's band: −1 its lower edge, 0 the curve, 1 its upper edge.
+    Band,
+    /// Factor on a curve's force.
+    Force,
+    /// One of several curves in place of this one.
+    Curve,
+}
+
+impl What {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Mass => "mass",
+            Self::Gap => "gap",
+            Self::Band => "band",
+            Self::Force => "force",
+            Self::Curve => "curve",
+        }
+    }
+}
+
+/// Vehicles by name, or all of them.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
+pub enum Vehicles {
+    List(Vec<String>),
+    Word(String),
+}
+
+/// Distribution of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DistributionName {
+    /// `from`, `to`.
+    Uniform,
+    /// `from`, `mode`, `to`.
+    Triangular,
+    /// `mean`, `sd`, and `min`, `max` if it is truncated.
+    Normal,
+    /// As normal; the logarithm is normal.
+    Lognormal,
+}
+
+/// A number, a number with a unit, or a name, as written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry(pub String);
+
+impl<'de> Deserialize<'de> for Entry {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl serde::de::Visitor<'_> for Visitor {
+            type Value = Entry;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or text such as a number with its unit")
+            }
+
+            fn visit_str<E>(self, text: &str) -> Result<Entry, E> {
+                Ok(Entry(text.into()))
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<Entry, E> {
+                Ok(Entry(number.to_string()))
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<Entry, E> {
+                Ok(Entry(number.to_string()))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl JsonSchema for Entry {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Entry".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": ["string", "number"] })
+    }
+}
+
+/// The values of one variable, in SI.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Spread {
+    List(Vec<f64>),
+    /// Names, of which an item has one by its index.
+    Names(Vec<String>),
+    /// `steps` even values from `from` to `to`.
+    Even {
+        from: f64,
+        to: f64,
+        steps: u64,
+    },
+    Drawn(Distribution),
+}
+
+impl Spread {
+    /// Values along the grid; 1 of a distribution.
+    pub fn len(&self) -> u64 {
+        match self {
+            Self::List(values) => values.len() as u64,
+            Self::Names(names) => names.len() as u64,
+            Self::Even { steps, .. } => *steps,
+            Self::Drawn(_) => 1,
+        }
+    }
+
+    /// Whether there is no value at all; a checked plan has none such.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// The variables of a checked plan, and how many items they make.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    spreads: Vec<Spread>,
+    samples: u64,
+    items: u64,
+    seed: u64,
+    sampling: Sampling,
+}
+
+impl Plan {
+    /// The design of these spreads, one per variable.
+    ///
+    /// # Errors
+    /// A message that names the key, if `samples` is missing or without use, or the items are
+    /// too many.
+    pub fn design(&self, spreads: Vec<Spread>) -> Result<Design, String> {
+        let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
+        let samples = match (self.samples, drawn) {
+            (Some(0), _) => return Err("sweep.samples is 0: expected 1 or more".into()),
+            (Some(samples), true) => samples,
+            (None, true) => {
+                return Err(
+                    "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid".into(),
+                );
+            }
+            (Some(_), false) => {
+                return Err(
+                    "sweep.samples is given, but no variable has a distribution: leave samples away".into(),
+                );
+            }
+            (None, false) => 1,
+        };
+        if self.sampling == Sampling::LatinHypercube && !drawn {
+            return Err(
+                "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"
+                    .into(),
+            );
+        }
+        let items = spreads
+            .iter()
+            .try_fold(samples, |items, spread| items.checked_mul(spread.len()))
+            .filter(|items| *items <= MAX_ITEMS);
+        let items = items.ok_or_else(|| {
+            let factors: Vec<String> = [samples]
+                .into_iter()
+                .chain(spreads.iter().map(Spread::len))
+                .filter(|n| *n > 1)
+                .map(|n| n.to_string())
+                .collect();
+            format!(
+                "the sweep has {} items: {MAX_ITEMS} at most; shorten values, steps or samples",
+                factors.join(" × ")
+            )
+        })?;
+        let (seed, sampling) = (self.seed, self.sampling);
+        Ok(Design { spreads, samples, items, seed, sampling })
+    }
+}
+
+impl Design {
+    pub fn items(&self) -> u64 {
+        self.items
+    }
+
+    pub fn spreads(&self) -> &[Spread] {
+        &self.spreads
+    }
+
+    /// Values of item `item` (`item < items`), one per variable in SI; of names the index.
+    ///
+    /// They depend on nothing but the plan and `item`.
+    pub fn values(&self, item: u64, values: &mut Vec<f64>) {
+        let (point, sample) = (item / self.samples, item % self.samples);
+        values.clear();
+        values.resize(self.spreads.len(), 0.0);
+        let mut rest = point;
+        for (value, spread) in values.iter_mut().zip(&self.spreads).rev() {
+            let count = spread.len();
+            let index = rest % count;
+            rest /= count;
+            *value = match spread {
+                Spread::List(list) => list[index as usize],
+                Spread::Names(_) => index as f64,
+                Spread::Even { to, .. } if index + 1 == count => *to,
+                Spread::Even { from, to, .. } => {
+                    from + (to - from) * (index as f64 / (count - 1) as f64)
+                }
+                Spread::Drawn(_) => 0.0,
+            };
+        }
+        for (k, (value, spread)) in values.iter_mut().zip(&self.spreads).enumerate() {
+            if let Spread::Drawn(distribution) = spread {
+                *value = distribution.quantile(self.share(k as u64, item, point, sample));
+            }
+        }
+    }
+
+    /// Where in (0, 1) variable `k` of an item lies.
+    fn share(&self, k: u64, item: u64, point: u64, sample: u64) -> f64 {
+        let unit = draw::unit(self.seed, k, item);
+        match self.sampling {
+            Sampling::Random => unit,
+            Sampling::LatinHypercube => {
+                let key = draw::key(draw::key(self.seed, k), point);
+                let stratum = draw::permuted(sample, self.samples, key);
+                // The sum may round up to 1 in the last of very many strata.
+                ((stratum as f64 + unit) / self.samples as f64).min(1.0 - f64::EPSILON / 2.0)
+            }
+        }
+    }
+}
+
+impl Vary {
+    /// Its values or distribution.
+    ///
+    /// # Errors
+    /// A message that names the key.
+    pub fn spread(&self) -> Result<Spread, String> {
+        if let Some(name) = self.distribution {
+            self.refuse("distribution", &["values", "steps"])?;
+            return Ok(Spread::Drawn(self.drawn(name)?));
+        }
+        self.refuse("a grid", &["mean", "sd", "mode", "min", "max"])?;
+        match (&self.values, &self.from, &self.to, self.steps) {
+            (Some(values), None, None, None) => {
+                if values.is_empty() {
+                    return Err("values is empty: give one or more".into());
+                }
+                if self.what == What::Curve {
+                    return Ok(Spread::Names(values.iter().map(|v| v.0.clone()).collect()));
+                }
+                let numbers: Result<Vec<f64>, String> =
+                    values.iter().map(|value| self.number("values", value)).collect();
+                Ok(Spread::List(numbers?))
+            }
+            (None, Some(from), Some(to), Some(steps)) => {
+                if self.what == What::Curve {
+                    return Err("a curve needs values = [\"…\"], names in [curves]".into());
+                }
+                if steps < 2 {
+                    return Err(format!("steps is {steps}: expected 2 or more"));
+                }
+                let (from, to) = (self.number("from", from)?, self.number("to", to)?);
+                Ok(Spread::Even { from, to, steps })
+            }
+            _ => Err("give values = […], or from, to and steps, or a distribution".into()),
+        }
+    }
+
+    fn drawn(&self, name: DistributionName) -> Result<Distribution, String> {
+        if self.what == What::Curve {
+            return Err("a curve needs values = [\"…\"], names in [curves]".into());
+        }
+        let ends = || Ok::<_, String>((self.need("from", &self.from)?, self.need("to", &self.to)?));
+        match name {
+            DistributionName::Uniform => {
+                self.refuse("uniform", &["mean", "sd", "mode", "min", "max"])?;
+                let (from, to) = ends()?;
+                Distribution::uniform(from, to)
+            }
+            DistributionName::Triangular => {
+                self.refuse("triangular", &["mean", "sd", "min", "max"])?;
+                let (from, to) = ends()?;
+                Distribution::triangular(from, self.need("mode", &self.mode)?, to)
+            }
+            DistributionName::Normal | DistributionName::Lognormal => {
+                self.refuse("normal and lognormal", &["from", "to", "mode"])?;
+                let (mean, sd) = (self.need("mean", &self.mean)?, self.need("sd", &self.sd)?);
+                let bound = |key, entry: &Option<Entry>, open: f64| {
+                    entry.as_ref().map_or(Ok(open), |entry| self.number(key, entry))
+                };
+                let min = bound("min", &self.min, f64::NEG_INFINITY)?;
+                let max = bound("max", &self.max, f64::INFINITY)?;
+                match name {
+                    DistributionName::Normal => Distribution::normal(mean, sd, min, max),
+                    _ => Distribution::lognormal(mean, sd, min, max),
+                }
+            }
+        }
+    }
+
+    fn need(&self, key: &'static str, entry: &Option<Entry>) -> Result<f64, String> {
+        match entry {
+            Some(entry) => self.number(key, entry),
+            None => Err(format!("the distribution needs {key} = …")),
+        }
+    }
+
+    /// Refuses keys that do not go with `with`.
+    fn refuse(&self, with: &str, keys: &[&str]) -> Result<(), String> {
+        let given = |key: &str| match key {
+            "values" => self.values.is_some(),
+            "from" => self.from.is_some(),
+            "to" => self.to.is_some(),
+            "steps" => self.steps.is_some(),
+            "mean" => self.mean.is_some(),
+            "sd" => self.sd.is_some(),
+            "mode" => self.mode.is_some(),
+            "min" => self.min.is_some(),
+            _ => self.max.is_some(),
+        };
+        match keys.iter().find(|key| given(key)) {
+            Some(key) => Err(format!("{key} does not go with {with}: leave one of them away")),
+            None => Ok(()),
+        }
+    }
+
+    /// SI value of an entry.
+    fn number(&self, key: &str, entry: &Entry) -> Result<f64, String> {
+        let text = &entry.0;
+        let dimension = match (self.what, self.factor) {
+            (What::Speed, false) => Some(&SPEED),
+            (What::Mass, false) => Some(&MASS),
+            (What::Gap, false) => Some(&LENGTH),
+            _ => None,
+        };
+        let value = match dimension {
+            Some(dimension) => dimension.parse(text).map_err(|e| format!("{key}: {e}"))?,
+            None => text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
+                format!("{key}: \"{text}\" is no number: write a plain one, such as 0.9")
+            })?,
+        };
+        let (low, high) = match (self.what, self.factor) {
+            // How far values scatter has no sign of its own to check here.
+            _ if key == "sd" => (0.0, f64::INFINITY),
+            (What::Band, _) => (-1.0, 1.0),
+            // A mean or a bound below zero may be meant: what is drawn is checked by the run.
+            _ if key != "values" && key != "from" && key != "to" => {
+                (f64::NEG_INFINITY, f64::INFINITY)
+            }
+            _ => (0.0, f64::INFINITY),
+        };
+        if value < low || value > high {
+            let expected = match high.is_finite() {
+                true => format!("from {low} to {high}"),
+                false => format!("{low} or more"),
+            };
+            return Err(format!("{key}: {text} is out of range: expected {expected}"));
+        }
+        Ok(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn design(text: &str) -> Result<Design, String> {
+        let plan: Plan = toml::from_str(text).map_err(|e| e.message().to_string())?;
+        let spreads: Result<Vec<Spread>, String> = plan.vary.iter().map(Vary::spread).collect();
+        plan.design(spreads?)
+    }
+
+    fn values(design: &Design, item: u64) -> Vec<f64> {
+        let mut values = Vec::new();
+        design.values(item, &mut values);
+        values
+    }
+
+    #[test]
+    fn the_last_variable_of_a_grid_changes_fastest() {
+        let design = design(
+            "vary = [ { what = \"speed\", values = [\"36km/h\", \"20m/s\"] },\n\
+             { what = \"gap\", from = \"0mm\", to = \"30mm\", steps = 3 } ]",
+        )
+        .unwrap();
+        assert_eq!(design.items(), 6);
+        let all: Vec<Vec<f64>> = (0..6).map(|k| values(&design, k)).collect();
+        assert_eq!(
+            all,
+            [[10.0, 0.0], [10.0, 0.015], [10.0, 0.03], [20.0, 0.0], [20.0, 0.015], [20.0, 0.03]]
+        );
+    }
+
+    /// Latin hypercube: every one of the equally likely ranges is met once, at each grid point.
+    #[test]
+    fn a_latin_hypercube_meets_every_range_once() {
+        let design = design(
+            "seed = 3\nsamples = 100\nsampling = \"latin_hypercube\"\n\
+             vary = [ { what = \"force\", values = [1, 2] },\n\
+             { what = \"band\", distribution = \"uniform\", from = -1, to = 1 },\n\
+             { what = \"force\", distribution = \"uniform\", from = 0, to = 1 } ]",
+        )
+        .unwrap();
+        assert_eq!(design.items(), 200);
+        let mut orders = Vec::new();
+        for point in 0..2 {
+            for variable in [1, 2] {
+                let order: Vec<usize> = (0..100)
+                    .map(|k| values(&design, 100 * point + k)[variable])
+                    .map(|v| if variable == 1 { 0.5 * (v + 1.0) } else { v })
+                    .map(|share| (share * 100.0) as usize)
+                    .collect();
+                let mut sorted = order.clone();
+                sorted.sort();
+                assert_eq!(sorted, (0..100).collect::<Vec<_>>());
+                orders.push(order);
+            }
+        }
+        orders.sort();
+        orders.dedup();
+        assert_eq!(orders.len(), 4, "variables and grid points are shuffled each its own way");
+    }
+
+    #[test]
+    fn says_what_is_wrong_with_a_plan() {
+        fn t(vary: &str, expected: &str) {
+            let text = format!("samples = 2\nvary = [ {{ {vary} }} ]");
+            assert_eq!(design(&text).unwrap_err(), expected);
+        }
+        t(
+            "what = \"mass\", values = [24]",
+            "values: mass \"24\" has no unit: write for example \"24t\" or \"24kg\"",
+        );
+        t(
+            "what = \"mass\", factor = true, values = [\"24t\"]",
+            "values: \"24t\" is no number: write a plain one, such as 0.9",
+        );
+        t("what = \"band\", values = [1.5]", "values: 1.5 is out of range: expected from -1 to 1");
+        t("what = \"force\", values = [-1]", "values: -1 is out of range: expected 0 or more");
+        t("what = \"force\", values = []", "values is empty: give one or more");
+        t("what = \"force\", from = 1, to = 2, steps = 1", "steps is 1: expected 2 or more");
+        t(
+            "what = \"force\", from = 1, to = 2",
+            "give values = […], or from, to and steps, or a distribution",
+        );
+        t("what = \"force\", distribution = \"normal\", mean = 1", "the distribution needs sd = …");
+        t(
+            "what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1",
+            "sd does not go with uniform: leave one of them away",
+        );
+        t(
+            "what = \"force\", values = [1]",
+            "sweep.samples is given, but no variable has a distribution: leave samples away",
+        );
+    }
+
+    #[test]
+    fn too_many_items_are_refused_by_number() {
+        let even = "{ what = \"force\", from = 0, to = 1, steps = 1000000000 }";
+        let error = design(&format!("vary = [ {even}, {even} ]")).unwrap_err();
+        assert_eq!(
+            error,
+            "the sweep has 1000000000 × 1000000000 items: 1000000000000 at most; shorten values, steps or samples"
+        );
+        let one = design(&format!("vary = [ {even} ]")).unwrap();
+        assert_eq!(values(&one, 999_999_999), [1.0]);
+    }
+}

@@ -1,0 +1,418 @@
+//! The rows as HDF5: a dataset per column, described in `schemas/sweep.md`.
+
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::draft::{Tally, each_line};
+use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
+use super::{Shard, SweepError};
+use crate::database::DatabaseError;
+use crate::database::table::{Attribute, Column, Put, Table, Values, write_table};
+
+/// Number of a row's message; 0 is the empty one.
+const MESSAGE_NUMBER: &str = "message_number";
+const MESSAGE: &str = "message";
+/// Bytes of a message at least.
+const LEAST_WIDTH: usize = 24;
+/// Rows that are held at once.
+const ROWS: u64 = 4096;
+
+/// What is known of the text columns before the file is laid out.
+struct Widths {
+    columns: Vec<usize>,
+    message: usize,
+    messages: u64,
+}
+
+impl Widths {
+    fn new(columns: usize) -> Self {
+        Self { columns: vec![1; columns], message: LEAST_WIDTH, messages: 1 }
+    }
+
+    /// The datasets of a file of `head`.
+    fn datasets(&self, head: &Head) -> Vec<Column> {
+        let rows = head.rows().end - head.rows().start;
+        let own = head.columns.len() - 1;
+        let mut datasets: Vec<Column> = (0..own)
+            .map(|c| {
+                let values = match (c, head.is_text(c)) {
+                    (0, _) => Values::Integer,
+                    (_, true) => Values::Text { width: self.columns[c] },
+                    (_, false) => Values::Real,
+                };
+                Column { name: head.columns[c].clone(), values, rows }
+            })
+            .collect();
+        datasets.push(Column { name: MESSAGE_NUMBER.into(), values: Values::Integer, rows });
+        let values = Values::Text { width: self.message };
+        datasets.push(Column { name: MESSAGE.into(), values, rows: self.messages });
+        datasets
+    }
+}
+
+fn attributes(head: &Head) -> [(&'static str, Attribute); 6] {
+    let number = |n: u64| Attribute::Integer(n as i64);
+    [
+        ("format", Attribute::Text(FORMAT.into())),
+        ("layout_version", Attribute::Integer(LAYOUT)),
+        ("written_by", Attribute::Text(format!("crumple {}", head.version))),
+        ("hash", Attribute::Text(head.hash.clone())),
+        ("items", number(head.items)),
+        ("shard", Attribute::Text(format!("{}/{}", head.shard.index(), head.shard.count()))),
+    ]
+}
+
+/// Writes the rows of CSV files, in this order, as one HDF5 file under `head`. The files have
+/// been written by this program and are read twice.
+pub fn convert(files: &[(PathBuf, Head)], head: &Head, output: &Path) -> Result<(), SweepError> {
+    let columns = head.columns.len();
+    let mut widths = Widths::new(columns);
+    let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), SweepError> {
+        for (path, head) in files {
+            let io = |source| SweepError::Read { path: path.clone(), source };
+            let mut reader = BufReader::new(File::open(path).map_err(io)?);
+            Head::read(&mut reader).map_err(io)?;
+            let mut item = head.rows().start;
+            let see = |bytes: &[u8]| {
+                let line = Line::parse(bytes, columns).filter(|line| line.item == item)?;
+                item += 1;
+                see(&line)
+            };
+            each_line(path, &mut reader, see, head)?;
+        }
+        Ok(())
+    };
+    each(&mut |line| {
+        for (k, value) in line.values.iter().enumerate() {
+            widths.columns[k + 1] = widths.columns[k + 1].max(value.len());
+        }
+        widths.columns[columns - 2] = widths.columns[columns - 2].max(line.status.name().len());
+        if !line.message.is_empty() {
+            widths.messages += 1;
+            widths.message = widths.message.max(line.message.len());
+        }
+        Some(())
+    })?;
+    let datasets = widths.datasets(head);
+    let mut failure = None;
+    let written = write_table(output, &attributes(head), &datasets, |put| {
+        let mut block = Block::new(&datasets, put);
+        let mut trouble = None;
+        let read = each(&mut |line| match block.take(line, head) {
+            Ok(taken) => taken,
+            Err(error) => {
+                trouble = Some(error);
+                None
+            }
+        });
+        match (trouble, read) {
+            (Some(error), _) => Err(error),
+            (None, Err(error)) => {
+                failure = Some(error);
+                Err(io::Error::other("the rows cannot be read"))
+            }
+            (None, Ok(())) => block.flush(),
+        }
+    });
+    match failure {
+        Some(error) => Err(error),
+        None => Ok(written?),
+    }
+}
+
+/// Rows on their way into the datasets.
+struct Block<'a, 'p> {
+    datasets: &'a [Column],
+    put: &'a mut Put<'p>,
+    held: Vec<Vec<u8>>,
+    first: u64,
+    rows: u64,
+    messages: u64,
+}
+
+impl<'a, 'p> Block<'a, 'p> {
+    fn new(datasets: &'a [Column], put: &'a mut Put<'p>) -> Self {
+        // Message 0 is empty, as the file is before anything is put.
+        Self {
+            datasets,
+            put,
+            held: vec![Vec::new(); datasets.len()],
+            first: 0,
+            rows: 0,
+            messages: 1,
+        }
+    }
+
+    /// Takes a row; `None` if a field is no number.
+    fn take(&mut self, line: &Line<'_>, head: &Head) -> io::Result<Option<()>> {
+        self.held[0].extend((line.item as i64).to_le_bytes());
+        for (k, field) in line.values.iter().enumerate() {
+            match self.datasets[k + 1].values {
+                Values::Text { width } => pad(&mut self.held[k + 1], field, width),
+                _ => {
+                    let Some(number) = Line::number(field) else { return Ok(None) };
+                    self.held[k + 1].extend(number.to_le_bytes());
+                }
+            }
+        }
+        let status = head.columns.len() - 2;
+        let width = self.datasets[status].values.size();
+        pad(&mut self.held[status], line.status.name(), width);
+        let mut number = 0;
+        if !line.message.is_empty() {
+            number = self.messages;
+            self.messages += 1;
+            let mut bytes = Vec::new();
+            pad(&mut bytes, &line.message, self.datasets[status + 2].values.size());
+            (self.put)(status + 2, number, &bytes)?;
+        }
+        self.held[status + 1].extend((number as i64).to_le_bytes());
+        self.rows += 1;
+        if self.rows == ROWS {
+            self.flush()?;
+        }
+        Ok(Some(()))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        for (column, held) in self.held.iter_mut().enumerate() {
+            if !held.is_empty() {
+                (self.put)(column, self.first, held)?;
+            }
+            held.clear();
+        }
+        self.first += self.rows;
+        self.rows = 0;
+        Ok(())
+    }
+}
+
+fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
+    let end = out.len() + width;
+    out.extend(text.as_bytes());
+    out.resize(end, 0);
+}
+
+/// An HDF5 file of a shard.
+pub struct Shelf {
+    path: PathBuf,
+    table: Table,
+    pub head: Head,
+}
+
+impl Shelf {
+    /// Opens the file of a shard.
+    ///
+    /// # Errors
+    /// [`SweepError::Database`] if it is no HDF5 file, or no sweep's.
+    pub fn open(path: &Path) -> Result<Self, SweepError> {
+        let table = Table::open(path, FORMAT)?;
+        let head = head(&table)?.ok_or_else(|| SweepError::Damaged {
+            path: path.into(),
+            message: "its attributes are not those of a sweep of this layout".into(),
+        })?;
+        let rows = head.rows().end - head.rows().start;
+        let messages = table.columns.len() - 1;
+        if let Some(short) = table.columns[..messages].iter().find(|c| c.rows != rows) {
+            let message = format!("{} has {} rows, expected {rows}", short.name, short.rows);
+            return Err(SweepError::Damaged { path: path.into(), message });
+        }
+        // Widths of texts are the file's own, everything else is what this program writes.
+        let is_text = |c: &Column| matches!(c.values, Values::Text { .. });
+        let expected = Widths::new(head.columns.len()).datasets(&head);
+        let is_other = |(found, wanted): &(&Column, &Column)| {
+            is_text(found) != is_text(wanted) || !is_text(found) && found.values != wanted.values
+        };
+        if let Some((other, _)) = table.columns.iter().zip(&expected).find(is_other) {
+            let message = format!("{} does not hold the kind of values it should", other.name);
+            return Err(SweepError::Damaged { path: path.into(), message });
+        }
+        Ok(Self { path: path.into(), table, head })
+    }
+
+    fn rows(&self) -> u64 {
+        self.head.rows().end - self.head.rows().start
+    }
+
+    /// Rows by blocks: first row, rows, and the bytes of every column but the messages.
+    fn blocks(
+        &self,
+        mut see: impl FnMut(u64, u64, &mut [Vec<u8>]) -> Result<(), SweepError>,
+    ) -> Result<(), SweepError> {
+        let messages = self.table.columns.len() - 1;
+        let mut first = 0;
+        while first < self.rows() {
+            let rows = ROWS.min(self.rows() - first);
+            let columns: Result<Vec<Vec<u8>>, DatabaseError> =
+                (0..messages).map(|c| self.table.read(c, first, rows)).collect();
+            let mut columns = columns?;
+            for (k, item) in columns[0].chunks_exact(8).enumerate() {
+                let expected = self.head.rows().start + first + k as u64;
+                if integer(item) != expected as i64 {
+                    return Err(bad_row(&self.path, expected));
+                }
+            }
+            see(first, rows, &mut columns)?;
+            first += rows;
+        }
+        Ok(())
+    }
+
+    /// Counts all rows.
+    pub fn tally(&self, tally: &mut Tally) -> Result<(), SweepError> {
+        let numbers: Vec<usize> =
+            (1..self.head.columns.len()).filter(|&c| !self.head.is_text(c)).collect();
+        let status = self.head.columns.len() - 2;
+        self.blocks(|first, rows, columns| {
+            for k in 0..rows as usize {
+                let item = self.head.rows().start + first + k as u64;
+                let bytes = |c: usize| {
+                    let size = self.table.columns[c].values.size();
+                    &columns[c][k * size..(k + 1) * size]
+                };
+                let number = |&c: &usize| f64::from_le_bytes(eight(bytes(c)));
+                tally.statistics_see(item, numbers.iter().map(number));
+                let found = text(bytes(status));
+                let found = Status::ALL.into_iter().find(|s| s.name() == found);
+                let found = found.ok_or_else(|| bad_row(&self.path, item))?;
+                let message = match integer(bytes(status + 1)) {
+                    0 => String::new(),
+                    number => text(&self.table.read(status + 2, number as u64, 1)?).into_owned(),
+                };
+                tally.count(item, found, &message);
+            }
+            Ok(())
+        })
+    }
+}
+
+fn eight(bytes: &[u8]) -> [u8; 8] {
+    bytes.try_into().unwrap_or_default()
+}
+
+fn integer(bytes: &[u8]) -> i64 {
+    i64::from_le_bytes(eight(bytes))
+}
+
+fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    let end = bytes.iter().rposition(|b| *b != 0).map_or(0, |at| at + 1);
+    String::from_utf8_lossy(&bytes[..end])
+}
+
+/// The head that a file's attributes and columns tell.
+fn head(table: &Table) -> Result<Option<Head>, DatabaseError> {
+    let mut texts = Vec::new();
+    for name in ["written_by", "hash", "shard"] {
+        match table.attribute(name)? {
+            Some(Attribute::Text(text)) => texts.push(text),
+            _ => return Ok(None),
+        }
+    }
+    if table.attribute("layout_version")? != Some(Attribute::Integer(LAYOUT)) {
+        return Ok(None);
+    }
+    let Some(Attribute::Integer(items)) = table.attribute("items")? else { return Ok(None) };
+    let mut columns: Vec<String> = table.columns.iter().map(|c| c.name.clone()).collect();
+    let at = columns.iter().position(|c| c == MESSAGE_NUMBER);
+    if at.is_none_or(|at| at + 2 != columns.len() || at < 2) {
+        return Ok(None);
+    }
+    at.map(|at| columns.remove(at));
+    let shard = texts[2]
+        .split_once('/')
+        .and_then(|(index, count)| Shard::new(index.parse().ok()?, count.parse().ok()?));
+    let version = texts[0].strip_prefix("crumple ").unwrap_or_default().to_string();
+    let parts = shard.zip(u64::try_from(items).ok());
+    Ok(parts.map(|(shard, items)| Head { version, hash: texts[1].clone(), items, shard, columns }))
+}
+
+/// Checks an output that is there: this sweep's, with all its rows.
+pub fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
+    let foreign = |_| SweepError::Foreign { path: output.into() };
+    let shelf = Shelf::open(output).map_err(foreign)?;
+    if let Some(differs) = shelf.head.differs_from(head) {
+        return Err(SweepError::Changed { path: output.into(), differs });
+    }
+    shelf.tally(tally)
+}
+
+/// Joins the files of all shards, in order, under `head`.
+pub fn join(shelves: &[Shelf], head: &Head, output: &Path) -> Result<(), SweepError> {
+    let columns = head.columns.len();
+    let mut widths = Widths::new(columns);
+    for shelf in shelves {
+        let datasets = &shelf.table.columns;
+        for (width, dataset) in widths.columns.iter_mut().zip(datasets) {
+            *width = (*width).max(dataset.values.size());
+        }
+        widths.message = widths.message.max(datasets[columns].values.size());
+        widths.messages += datasets[columns].rows.saturating_sub(1);
+    }
+    let datasets = widths.datasets(head);
+    let mut failure = None;
+    let written = write_table(output, &attributes(head), &datasets, |put| {
+        let mut messages = 1;
+        for shelf in shelves {
+            let copied = copy(shelf, &datasets, &mut messages, put);
+            if let Err(error) = copied {
+                failure = Some(error);
+                return Err(io::Error::other("a shard cannot be copied"));
+            }
+        }
+        Ok(())
+    });
+    match failure {
+        Some(error) => Err(error),
+        None => Ok(written?),
+    }
+}
+
+fn copy(
+    shelf: &Shelf,
+    datasets: &[Column],
+    messages: &mut u64,
+    put: &mut Put<'_>,
+) -> Result<(), SweepError> {
+    let (number, message) = (datasets.len() - 2, datasets.len() - 1);
+    let mut failed = |column: usize, row: u64, bytes: &[u8]| {
+        put(column, row, bytes)
+            .map_err(|source| SweepError::Read { path: shelf.path.clone(), source })
+    };
+    // Numbers of messages go on where those of the shard before end.
+    let shift = *messages as i64 - 1;
+    shelf.blocks(|first, _, columns| {
+        for number in columns[number].chunks_exact_mut(8) {
+            let own = integer(number);
+            number.copy_from_slice(&(if own == 0 { 0 } else { own + shift }).to_le_bytes());
+        }
+        for (c, bytes) in columns.iter().enumerate() {
+            let widened = widen(bytes, shelf.table.columns[c].values, datasets[c].values);
+            failed(c, shelf.head.rows().start + first, &widened)?;
+        }
+        Ok(())
+    })?;
+    let count = shelf.table.columns[message].rows.saturating_sub(1);
+    let mut first = 0;
+    while first < count {
+        let rows = ROWS.min(count - first);
+        let bytes = shelf.table.read(message, first + 1, rows)?;
+        let widened = widen(&bytes, shelf.table.columns[message].values, datasets[message].values);
+        failed(message, *messages, &widened)?;
+        (first, *messages) = (first + rows, *messages + rows);
+    }
+    Ok(())
+}
+
+/// Texts filled up to a larger width; numbers as they are.
+fn widen(bytes: &[u8], from: Values, to: Values) -> Vec<u8> {
+    let (Values::Text { width: old }, Values::Text { width: new }) = (from, to) else {
+        return bytes.to_vec();
+    };
+    let mut out = Vec::with_capacity(bytes.len() / old * new);
+    for text in bytes.chunks_exact(old) {
+        out.extend_from_slice(text);
+        out.resize(out.len() + new - old, 0);
+    }
+    out
+}

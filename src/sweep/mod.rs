@@ -1,0 +1,288 @@
+//! Sweeps: many runs of one scenario, one row of results each.
+//!
+//! Item `k` has the same row whatever the threads, the pieces or the share of the work
+//! (`shard`) it is run in. Rows stand in order of items and are written as they come, so
+//! nothing grows with their number. The file under work is its own journal: a run that was
+//! stopped goes on behind its last whole row.
+
+mod draft;
+mod hdf5;
+mod merge;
+mod row;
+mod run;
+mod statistics;
+mod variables;
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::database::{DatabaseError, LockError};
+use crate::file::WriteError;
+use crate::manifest::{self, ManifestError};
+use crate::multibody::Chain;
+use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
+use crate::scenario::{self, Prepared, Scenario, ScenarioError, Sources};
+pub use draft::{Settings, write, write_rows};
+pub use merge::merge;
+pub use row::{Head, Row, Status};
+pub use run::Chunk;
+pub use statistics::{ColumnStatistics, Statistics};
+use variables::Variable;
+pub use variables::VariableSummary;
+
+/// A share of a sweep: block `index` of `count` blocks of neighbouring items.
+///
+/// Invariant: `1 ≤ index ≤ count`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Shard {
+    index: u64,
+    count: u64,
+}
+
+impl Shard {
+    /// The whole sweep.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    /// Shard `index` of `count`, counted from 1.
+    pub fn new(index: u64, count: u64) -> Option<Self> {
+        (1 <= index && index <= count).then_some(Self { index, count })
+    }
+
+    pub fn index(self) -> u64 {
+        self.index
+    }
+
+    pub fn count(self) -> u64 {
+        self.count
+    }
+
+    /// Its items of `0..items`.
+    pub fn items(self, items: u64) -> std::ops::Range<u64> {
+        let end =
+            |index: u64| (u128::from(items) * u128::from(index) / u128::from(self.count)) as u64;
+        end(self.index - 1)..end(self.index)
+    }
+}
+
+/// Why a sweep was not run, not written or not merged.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    #[error("{path}: {message}")]
+    Plan { path: PathBuf, message: String },
+    #[error("{path}: {source}")]
+    Read { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    #[error("{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it")]
+    Changed { path: PathBuf, differs: String },
+    #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
+    Foreign { path: PathBuf },
+    #[error("{path}: {message}")]
+    Damaged { path: PathBuf, message: String },
+    #[error("{message}")]
+    Merge { message: String },
+}
+
+/// What has been done.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Items of the whole sweep.
+    pub items: u64,
+    pub shard: Shard,
+    /// Rows of this shard.
+    pub rows: u64,
+    /// Rows that an earlier run had left.
+    pub resumed: u64,
+    /// Rows there are now: fewer than `rows` if the run was stopped.
+    pub done: u64,
+    pub failed: u64,
+    pub warned: u64,
+    /// The first few messages of rows that failed, by item.
+    pub messages: Vec<(u64, String)>,
+    pub columns: Vec<ColumnStatistics>,
+}
+
+impl Report {
+    /// Whether all rows are there.
+    pub fn is_complete(&self) -> bool {
+        self.done == self.rows
+    }
+}
+
+/// A scenario with a plan, checked, its files read.
+pub struct Sweep {
+    path: PathBuf,
+    scenario: Scenario,
+    sources: Sources,
+    design: Design,
+    variables: Vec<Variable>,
+    results: Vec<ResultName>,
+    /// The scenario as it stands, put together.
+    base: Prepared,
+    hash: String,
+}
+
+impl Sweep {
+    /// Loads a scenario with its `[sweep]`, or with that of `plan`, and all it names.
+    ///
+    /// # Errors
+    /// [`SweepError`] names file and key.
+    pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, SweepError> {
+        let text = read_text(path)?;
+        let mut scenario = scenario::parse(path, &text)?;
+        let plan_path = plan.unwrap_or(path);
+        let of_file = match plan {
+            Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
+            None => None,
+        };
+        let invalid = |message: String| SweepError::Plan { path: plan_path.into(), message };
+        let plan = of_file.or(scenario.sweep.take()).ok_or_else(|| {
+            invalid("there is no [sweep]: add one, or give it in another file with --plan".into())
+        })?;
+        let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
+        let results = results(&plan).map_err(invalid)?;
+        let sources = Sources::read(path, &scenario)?;
+        let base = scenario::assemble(path, &scenario, &sources)?;
+        let hash = hash(path, &text, plan_path, &scenario)?;
+        let path = path.to_path_buf();
+        Ok(Self { path, scenario, sources, design, variables, results, base, hash })
+    }
+
+    /// Items of the whole sweep.
+    pub fn items(&self) -> u64 {
+        self.design.items()
+    }
+
+    /// What tells this sweep from any other: BLAKE3 of plan, scenario, the files it names and
+    /// this program's version.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Warnings of the scenario as it stands, without what is varied.
+    pub fn warnings(&self) -> &[String] {
+        &self.base.warnings
+    }
+
+    /// Names of all columns of the result.
+    pub fn columns(&self) -> Vec<String> {
+        let mut columns = vec!["item".to_string()];
+        columns.extend(self.variables.iter().map(|v| v.column.clone()));
+        columns.extend(result_columns(&self.results, &self.base.chain, &self.base.order));
+        columns.extend(["status", "message"].map(String::from));
+        columns
+    }
+
+    /// The variables: columns and how many values they have.
+    pub fn variables(&self) -> Vec<VariableSummary> {
+        self.variables.iter().zip(self.design.spreads()).map(|(v, s)| v.summary(s)).collect()
+    }
+
+    /// The varied values of an item, as they stand in its row.
+    pub fn values(&self, item: u64) -> Vec<String> {
+        let mut values = Vec::new();
+        self.design.values(item, &mut values);
+        let texts = values.iter().enumerate();
+        texts.map(|(k, value)| row::text(*value, self.variables[k].names())).collect()
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, SweepError> {
+    // The checks of size and kind are those of every TOML file.
+    manifest::load::<toml::Table>(path)?;
+    fs::read_to_string(path).map_err(|source| SweepError::Read { path: path.into(), source })
+}
+
+fn results(plan: &Plan) -> Result<Vec<ResultName>, String> {
+    let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
+    let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
+    match kept.len() == asked.len() && !kept.is_empty() {
+        true => Ok(kept),
+        false => Err("sweep.results: name each result once, and at least one".into()),
+    }
+}
+
+/// Columns of the results, named as those of a single run.
+fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec<String> {
+    let of_interfaces = |quantity: &str| -> Vec<String> {
+        chain.interfaces().iter().map(|i| format!("{quantity}[{}]", i.name)).collect()
+    };
+    let of_bodies = |quantity: &str| -> Vec<String> {
+        order.iter().map(|&i| format!("{quantity}[{}]", chain.bodies()[i].name)).collect()
+    };
+    let columns = results.iter().flat_map(|result| match result {
+        ResultName::PeakForce => of_interfaces("peak_force_N"),
+        ResultName::MaxDeflection => of_interfaces("max_deflection_m"),
+        ResultName::MaxDeflectionTime => of_interfaces("max_deflection_time_s"),
+        ResultName::Restitution => of_interfaces("restitution"),
+        ResultName::FinalSpeed => of_bodies("final_v_m_per_s"),
+        ResultName::MeanDeceleration => of_bodies("mean_deceleration_m_per_s2"),
+        ResultName::EnergyError => vec!["energy_error".into()],
+        ResultName::MomentumError => vec!["momentum_error".into()],
+    });
+    columns.collect()
+}
+
+/// BLAKE3 of everything that decides the rows. Comments and order of keys do not.
+fn hash(
+    path: &Path,
+    text: &str,
+    plan_path: &Path,
+    scenario: &Scenario,
+) -> Result<String, SweepError> {
+    let mut table: toml::Table = manifest::parse(path, text)?;
+    if plan_path != path
+        && let Some(plan) = manifest::load::<toml::Table>(plan_path)?.remove("sweep")
+    {
+        table.insert("sweep".into(), plan);
+    }
+    let mut hasher = blake3::Hasher::new();
+    // Each part with its length, so that no two lists of parts run together to the same bytes.
+    let mut part = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
+    };
+    part(concat!("crumple sweep ", env!("CARGO_PKG_VERSION")).as_bytes());
+    part(table.to_string().as_bytes());
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for curve in scenario.curves.values() {
+        for file in [&curve.model, &curve.file, &curve.database].into_iter().flatten() {
+            let file = folder.join(file);
+            let bytes = fs::read(&file)
+                .map_err(|source| SweepError::Read { path: file.clone(), source })?;
+            part(blake3::hash(&bytes).as_bytes());
+        }
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_blocks_that_make_the_whole() {
+        for (items, count) in [(10, 3), (2, 5), (0, 2), (1_000_000_000_000, 7)] {
+            let mut at = 0;
+            for index in 1..=count {
+                let block = Shard::new(index, count).unwrap().items(items);
+                assert_eq!(block.start, at);
+                assert!(block.end - block.start <= items / count + 1);
+                at = block.end;
+            }
+            assert_eq!(at, items);
+        }
+        assert_eq!(Shard::new(0, 3), None);
+        assert_eq!(Shard::new(4, 3), None);
+    }
+}

@@ -1,0 +1,260 @@
+//! A row of results as numbers and as a line of CSV, and what stands above the rows.
+
+use super::{Shard, Sweep, SweepError};
+
+/// First line of every file.
+pub const FORMAT: &str = "crumple sweep";
+pub const LAYOUT: i64 = 1;
+
+/// How an item ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    Ok,
+    /// There is a result, with a warning.
+    Warned,
+    /// There is no result.
+    Failed,
+}
+
+impl Status {
+    pub const ALL: [Self; 3] = [Self::Ok, Self::Warned, Self::Failed];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Warned => "warned",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// One item's row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    pub item: u64,
+    /// Varied values, then results, in SI; NaN where there is none.
+    pub values: Vec<f64>,
+    pub status: Status,
+    /// Why it failed, or its warnings; one line.
+    pub message: String,
+}
+
+/// A value as it stands in a file: shortest digits that read back the same, a name, or nothing.
+pub fn text(value: f64, names: &[String]) -> String {
+    let mut bytes = Vec::new();
+    push(&mut bytes, value, names);
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn push(out: &mut Vec<u8>, value: f64, names: &[String]) {
+    if value.is_nan() {
+        return;
+    }
+    match names.get(value as usize) {
+        Some(name) => out.extend_from_slice(name.as_bytes()),
+        None if value.is_infinite() => {
+            out.extend_from_slice(if value > 0.0 { b"inf" } else { b"-inf" });
+        }
+        None => out.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes()),
+    }
+}
+
+impl Row {
+    /// Appends the row as a line. `names[k]` are those of value `k`, if it is an index.
+    pub fn write(&self, names: &[Vec<String>], out: &mut Vec<u8>) {
+        out.extend_from_slice(self.item.to_string().as_bytes());
+        for (k, value) in self.values.iter().enumerate() {
+            out.push(b',');
+            push(out, *value, names.get(k).map_or(&[], Vec::as_slice));
+        }
+        out.push(b',');
+        out.extend_from_slice(self.status.name().as_bytes());
+        out.push(b',');
+        if self.message.contains([',', '"']) {
+            out.push(b'"');
+            out.extend_from_slice(self.message.replace('"', "\"\"").as_bytes());
+            out.push(b'"');
+        } else {
+            out.extend_from_slice(self.message.as_bytes());
+        }
+        out.push(b'\n');
+    }
+}
+
+/// A line of a file, taken apart; fields of varied values and results are not parsed yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line<'a> {
+    pub item: u64,
+    pub values: Vec<&'a str>,
+    pub status: Status,
+    pub message: std::borrow::Cow<'a, str>,
+}
+
+impl<'a> Line<'a> {
+    /// Takes apart a line with its line feed; `None` if it is not whole.
+    pub fn parse(line: &'a [u8], columns: usize) -> Option<Self> {
+        let text = std::str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
+        // What a disk that lost power leaves in place of text.
+        if text.contains('\0') {
+            return None;
+        }
+        let mut fields = text.splitn(columns, ',');
+        let item = fields.next()?.parse().ok()?;
+        let mut values = Vec::with_capacity(columns);
+        values.extend(fields.by_ref().take(columns.checked_sub(3)?));
+        let (status, message) = (fields.next()?, fields.next()?);
+        let status = Status::ALL.into_iter().find(|s| s.name() == status)?;
+        let message = match message.strip_prefix('"') {
+            Some(quoted) => quoted.strip_suffix('"')?.replace("\"\"", "\"").into(),
+            None => message.into(),
+        };
+        Some(Self { item, values, status, message })
+    }
+
+    /// Number of a field: NaN if it is empty, `None` if it is no number.
+    pub fn number(field: &str) -> Option<f64> {
+        if field.is_empty() {
+            return Some(f64::NAN);
+        }
+        fast_float2::parse(field).ok()
+    }
+}
+
+/// What stands above the rows: which sweep and which part of it they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Head {
+    pub version: String,
+    pub hash: String,
+    pub items: u64,
+    pub shard: Shard,
+    pub columns: Vec<String>,
+}
+
+/// Bounds of a header, so that no other file is read for long.
+const MAX_HEAD_BYTES: usize = 1 << 24;
+
+impl Head {
+    /// The head of a shard of `sweep`.
+    pub fn of(sweep: &Sweep, shard: Shard) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            hash: sweep.hash().into(),
+            items: sweep.items(),
+            shard,
+            columns: sweep.columns(),
+        }
+    }
+
+    /// Items whose rows follow.
+    pub fn rows(&self) -> std::ops::Range<u64> {
+        self.shard.items(self.items)
+    }
+
+    /// Whether the values of a column are text.
+    pub fn is_text(&self, column: usize) -> bool {
+        let name = &self.columns[column];
+        name.starts_with("curve[") || column + 2 >= self.columns.len()
+    }
+
+    pub fn text(&self) -> String {
+        let Shard { index, count } = self.shard;
+        let rows = self.rows();
+        format!(
+            "# {FORMAT}, layout {LAYOUT}\n# written_by: crumple {}\n# hash: {}\n# items: {}\n# shard: {index}/{count}\n# first_item: {}\n# rows: {}\n{}\n",
+            self.version,
+            self.hash,
+            self.items,
+            rows.start,
+            rows.end - rows.start,
+            self.columns.join(",")
+        )
+    }
+
+    /// Reads a head; gives it back with its length in bytes. `None` if it is none of ours, or
+    /// not whole.
+    pub fn read(input: &mut impl std::io::BufRead) -> std::io::Result<Option<(Self, u64)>> {
+        let mut text = String::new();
+        let mut input = std::io::Read::take(input, MAX_HEAD_BYTES as u64);
+        for _ in 0..8 {
+            match std::io::BufRead::read_line(&mut input, &mut text) {
+                Ok(_) => {}
+                // Not even text.
+                Err(e) if e.kind() == std::io::ErrorKind::InvalidData => return Ok(None),
+                Err(e) => return Err(e),
+            }
+        }
+        let head = Self::parse(&text).filter(|head| head.text() == text);
+        Ok(head.map(|head| (head, text.len() as u64)))
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let mut lines = text.lines();
+        lines.next().filter(|l| *l == format!("# {FORMAT}, layout {LAYOUT}"))?;
+        let mut value = |key: &str| {
+            lines
+                .next()?
+                .strip_prefix("# ")?
+                .strip_prefix(key)?
+                .strip_prefix(": ")
+                .map(String::from)
+        };
+        let version = value("written_by")?.strip_prefix("crumple ")?.to_string();
+        let (hash, items, shard) = (value("hash")?, value("items")?, value("shard")?);
+        value("first_item").and(value("rows"))?;
+        let (index, count) = shard.split_once('/')?;
+        let shard = Shard::new(index.parse().ok()?, count.parse().ok()?)?;
+        let columns: Vec<String> = lines.next()?.split(',').map(String::from).collect();
+        let items = items.parse().ok()?;
+        (columns.len() > 3).then_some(Self { version, hash, items, shard, columns })
+    }
+
+    /// Why rows under this head do not belong under `wanted`; `None` if they do.
+    pub fn differs_from(&self, wanted: &Self) -> Option<String> {
+        let shard = |s: Shard| format!("{}/{}", s.index, s.count);
+        if self.version != wanted.version {
+            let (found, this) = (&self.version, &wanted.version);
+            return Some(format!("it is of crumple {found}, this is {this}"));
+        }
+        if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
+        {
+            return Some("plan, scenario or a file it names have changed since".into());
+        }
+        (self.shard != wanted.shard)
+            .then(|| format!("it is shard {}, this is {}", shard(self.shard), shard(wanted.shard)))
+    }
+}
+
+/// The error of a row that cannot be read.
+pub fn bad_row(path: &std::path::Path, item: u64) -> SweepError {
+    SweepError::Damaged {
+        path: path.into(),
+        message: format!(
+            "the row of item {item} is missing or damaged: run its sweep again with --restart"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_from_their_lines() {
+        let names = [vec!["a".to_string(), "b".to_string()], Vec::new()];
+        for (values, status, message, text) in [
+            (vec![1.0, 0.1], Status::Ok, "", "7,b,0.1,ok,\n"),
+            (vec![0.0, f64::NAN], Status::Failed, "no, \"x\"", "7,a,,failed,\"no, \"\"x\"\"\"\n"),
+        ] {
+            let row = Row { item: 7, values, status, message: message.into() };
+            let mut line = Vec::new();
+            row.write(&names, &mut line);
+            assert_eq!(String::from_utf8(line.clone()).unwrap(), text);
+            let parsed = Line::parse(&line, 5).unwrap();
+            assert_eq!((parsed.item, parsed.status, &*parsed.message), (7, status, message));
+            assert!(Line::parse(&line[..line.len() - 1], 5).is_none(), "without its line feed");
+        }
+        assert!(Line::parse(b"7,a,1,ok,\0\n", 5).is_none());
+        assert!(Line::parse(b"7,a,1,okay,\n", 5).is_none());
+        assert_eq!(Line::number("1e-300"), Some(1e-300));
+    }
+}

@@ -1,0 +1,246 @@
+//! From item to row: the varied scenario, its chain, its run.
+
+use std::ops::{ControlFlow, Range};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::row::{Row, Status};
+use super::{Sweep, SweepError};
+use crate::multibody::ledger::{ENERGY_TOLERANCE, MOMENTUM_TOLERANCE};
+use crate::multibody::{Run, simulate};
+use crate::plan::ResultName;
+use crate::scenario::{self, Prepared, Scenario};
+
+/// How many items are run before their rows are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chunk {
+    /// As many as take this long.
+    Time(Duration),
+    Items(u64),
+}
+
+impl Default for Chunk {
+    fn default() -> Self {
+        Self::Time(Duration::from_millis(300))
+    }
+}
+
+/// Bound of the rows that are held at once.
+const MOST_ITEMS: u64 = 8192;
+/// Items that a thread takes at once, at most; of few items fewer, so that all threads work.
+const BLOCK: usize = 8;
+const BLOCKS_PER_THREAD: usize = 4;
+/// Chains that a worker keeps.
+const KEPT_CHAINS: usize = 16;
+
+/// A row with its line.
+pub struct Written {
+    pub row: Row,
+    pub line: Vec<u8>,
+}
+
+/// Runs the items in pieces and hands on the rows of each piece in order, until `give` breaks.
+pub fn rows(
+    sweep: &Sweep,
+    items: Range<u64>,
+    chunk: Chunk,
+    mut give: impl FnMut(&[Written]) -> Result<ControlFlow<()>, SweepError>,
+) -> Result<(), SweepError> {
+    let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names().to_vec()).collect();
+    let workers = Mutex::new(Vec::new());
+    let threads = rayon::current_num_threads();
+    let least = (2 * threads) as u64;
+    let mut size = match chunk {
+        Chunk::Items(items) => items.clamp(1, MOST_ITEMS),
+        Chunk::Time(_) => least,
+    };
+    let mut at = items.start;
+    while at < items.end {
+        let end = items.end.min(at + size);
+        let begun = Instant::now();
+        let piece: Vec<u64> = (at..end).collect();
+        let block = (piece.len() / (BLOCKS_PER_THREAD * threads)).clamp(1, BLOCK);
+        let blocks: Vec<Vec<Written>> = piece
+            .par_chunks(block)
+            .map(|block| {
+                let held = || workers.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut worker = held().pop().unwrap_or_else(|| Worker::new(sweep));
+                let written = block.iter().map(|&item| worker.written(item, &names)).collect();
+                held().push(worker);
+                written
+            })
+            .collect();
+        let rows: Vec<Written> = blocks.into_iter().flatten().collect();
+        if give(&rows)?.is_break() {
+            return Ok(());
+        }
+        at = end;
+        if let Chunk::Time(wanted) = chunk {
+            let took = begun.elapsed();
+            if took < wanted / 2 {
+                size = (size * 2).min(MOST_ITEMS.max(least));
+            } else if took > wanted * 2 {
+                size = (size / 2).max(least);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What one thread works with.
+struct Worker<'a> {
+    sweep: &'a Sweep,
+    scenario: Scenario,
+    values: Vec<f64>,
+    /// Which variables decide the force laws.
+    shaping: Vec<bool>,
+    /// Chains by the values that decided their laws, the latest last.
+    chains: Vec<(Vec<u64>, Prepared)>,
+}
+
+impl<'a> Worker<'a> {
+    fn new(sweep: &'a Sweep) -> Self {
+        let shaping = sweep.variables.iter().map(|v| v.shapes_laws(&sweep.scenario)).collect();
+        let (scenario, values) = (sweep.scenario.clone(), Vec::new());
+        Self { sweep, scenario, values, shaping, chains: Vec::new() }
+    }
+
+    fn written(&mut self, item: u64, names: &[Vec<String>]) -> Written {
+        let row = self.row(item);
+        let mut line = Vec::with_capacity(24 * (row.values.len() + 2));
+        row.write(names, &mut line);
+        Written { row, line }
+    }
+
+    fn row(&mut self, item: u64) -> Row {
+        let sweep = self.sweep;
+        let Self { scenario, values, .. } = self;
+        sweep.design.values(item, values);
+        for variable in &sweep.variables {
+            variable.reset(scenario, &sweep.scenario);
+        }
+        for (variable, value) in sweep.variables.iter().zip(&*values) {
+            variable.apply(scenario, &sweep.scenario, *value);
+        }
+        let mut row =
+            Row { item, values: values.clone(), status: Status::Ok, message: String::new() };
+        let messages = match self.results(&mut row.values) {
+            Ok(warnings) if warnings.is_empty() => return row,
+            Ok(warnings) => {
+                row.status = Status::Warned;
+                warnings
+            }
+            Err(error) => {
+                row.status = Status::Failed;
+                row.values.truncate(self.values.len());
+                let chain = &sweep.base.chain;
+                let columns = super::result_columns(&sweep.results, chain, &sweep.base.order);
+                row.values.resize(self.values.len() + columns.len(), f64::NAN);
+                vec![error]
+            }
+        };
+        row.message = messages.join("; ").replace(|c: char| c.is_control(), " ");
+        row
+    }
+
+    /// Appends the results of the scenario as it stands; gives back warnings, or why it failed.
+    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, String> {
+        let sweep = self.sweep;
+        let prepared = self.prepared()?;
+        let run = simulate(&prepared.chain, &prepared.settings).map_err(|e| e.to_string())?;
+        push_results(&sweep.results, prepared, &run, values);
+        // What holds for the scenario as written has been said once; here it has other numbers.
+        let said = |w: &String| {
+            sweep.base.warnings.iter().any(|b| without_numbers(b).eq(without_numbers(w)))
+        };
+        let mut all: Vec<String> = Vec::new();
+        for warning in prepared.warnings.iter().filter(|w| !said(w)) {
+            if !all.contains(warning) {
+                all.push(warning.clone());
+            }
+        }
+        all.extend(warnings(prepared, &run));
+        Ok(all)
+    }
+
+    /// The chain of the scenario as it stands; laws that do not change are not made again.
+    fn prepared(&mut self) -> Result<&Prepared, String> {
+        // The path is the same for all items and known to whoever reads the message.
+        let said = |e: scenario::ScenarioError| match e {
+            scenario::ScenarioError::Invalid { message, .. } => message,
+            scenario::ScenarioError::Chain { source, .. } => source.to_string(),
+            other => other.to_string(),
+        };
+        let Self { sweep, scenario, values, shaping, chains } = self;
+        let shaping = values.iter().zip(&*shaping).filter(|(_, shapes)| **shapes);
+        let key: Vec<u64> = shaping.map(|(value, _)| value.to_bits()).collect();
+        match chains.iter().position(|(k, _)| *k == key) {
+            Some(at) => {
+                let (_, prepared) = &mut chains[at];
+                scenario::adjust(&sweep.path, scenario, prepared).map_err(said)?;
+                Ok(&chains[at].1)
+            }
+            None => {
+                let made = scenario::assemble(&sweep.path, scenario, &sweep.sources);
+                let made = made.map_err(said)?;
+                if chains.len() == KEPT_CHAINS {
+                    chains.remove(0);
+                }
+                chains.push((key, made));
+                Ok(&chains[chains.len() - 1].1)
+            }
+        }
+    }
+}
+
+fn without_numbers(text: &str) -> impl Iterator<Item = char> {
+    text.chars().filter(|c| !c.is_ascii_digit() && *c != '.')
+}
+
+fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {
+    let bodies = || prepared.order.iter().map(|&i| &run.bodies[i]);
+    for result in results {
+        let interfaces = run.interfaces.iter();
+        match result {
+            ResultName::PeakForce => values.extend(interfaces.map(|i| i.peak_force_n)),
+            ResultName::MaxDeflection => values.extend(interfaces.map(|i| i.max_deflection_m)),
+            ResultName::MaxDeflectionTime => {
+                values.extend(interfaces.map(|i| i.max_deflection_time_s));
+            }
+            ResultName::Restitution => {
+                values.extend(interfaces.map(|i| i.restitution.unwrap_or(f64::NAN)));
+            }
+            ResultName::FinalSpeed => {
+                values.extend(bodies().map(|b| b.v_m_per_s.last().copied().unwrap_or(f64::NAN)));
+            }
+            ResultName::MeanDeceleration => {
+                values.extend(bodies().map(|b| b.mean_deceleration_m_per_s2));
+            }
+            ResultName::EnergyError => values.push(run.ledger.max_energy_error),
+            ResultName::MomentumError => values.push(run.ledger.max_momentum_error),
+        }
+    }
+}
+
+/// What a single run would warn of.
+fn warnings(prepared: &Prepared, run: &Run) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if run.ledger.max_energy_error > ENERGY_TOLERANCE {
+        warnings.push(format!("energy is off by {:.2e}", run.ledger.max_energy_error));
+    }
+    if run.ledger.max_momentum_error > MOMENTUM_TOLERANCE {
+        warnings.push(format!("momentum is off by {:.2e}", run.ledger.max_momentum_error));
+    }
+    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
+        let (crush, end) = (history.max_deflection_m, interface.law.end_m());
+        if crush > end {
+            warnings.push(format!(
+                "interface {} is crushed {crush:.4} m, beyond the end of its curve at {end:.4} m",
+                interface.name
+            ));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,136 @@
+//! What the columns of a sweep hold, followed row by row.
+
+use serde::Serialize;
+
+use crate::stream::mix;
+
+/// Quantiles come from all rows of a sweep up to this size; of a larger one from about as many
+/// rows, chosen by their item.
+const SAMPLE: u64 = 20_000;
+const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
+
+/// Statistics of one column, over the rows that have a number there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnStatistics {
+    pub column: String,
+    pub count: u64,
+    pub min: Option<f64>,
+    pub mean: Option<f64>,
+    pub max: Option<f64>,
+    /// 5 %, by linear interpolation between order statistics.
+    pub p5: Option<f64>,
+    pub median: Option<f64>,
+    pub p95: Option<f64>,
+    /// Rows that the quantiles rest on.
+    pub quantiles_from: u64,
+}
+
+/// Follows columns of numbers.
+#[derive(Clone, Debug)]
+pub struct Statistics {
+    columns: Vec<Column>,
+    /// An item is in the sample if its hash is not above this.
+    threshold: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Column {
+    name: String,
+    count: u64,
+    sum: f64,
+    min: f64,
+    max: f64,
+    sample: Vec<f64>,
+}
+
+impl Statistics {
+    /// Of these columns, over `rows` rows.
+    pub fn new(columns: &[String], rows: u64) -> Self {
+        let column = |name: &String| Column {
+            name: name.clone(),
+            count: 0,
+            sum: 0.0,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            sample: Vec::new(),
+        };
+        let threshold = match rows <= SAMPLE {
+            true => u64::MAX,
+            false => (u64::MAX / rows).saturating_mul(SAMPLE),
+        };
+        Self { columns: columns.iter().map(column).collect(), threshold }
+    }
+
+    /// Takes the numbers of a row, in order of the columns; NaN is none.
+    pub fn see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
+        let sampled = mix(item) <= self.threshold;
+        for (column, value) in self.columns.iter_mut().zip(values) {
+            if value.is_nan() {
+                continue;
+            }
+            column.count += 1;
+            column.sum += value;
+            column.min = column.min.min(value);
+            column.max = column.max.max(value);
+            if sampled {
+                column.sample.push(value);
+            }
+        }
+    }
+
+    /// The statistics so far.
+    pub fn close(self) -> Vec<ColumnStatistics> {
+        self.columns.into_iter().map(Column::close).collect()
+    }
+}
+
+impl Column {
+    fn close(mut self) -> ColumnStatistics {
+        self.sample.sort_by(f64::total_cmp);
+        let quantile = |share: f64| {
+            let last = self.sample.len().checked_sub(1)?;
+            let at = share * last as f64;
+            let (low, high) = (at.floor() as usize, at.ceil() as usize);
+            let (a, b) = (self.sample[low], self.sample[high]);
+            Some(a + (b - a) * (at - at.floor()))
+        };
+        let [p5, median, p95] = SHARES.map(quantile);
+        let some = |value: f64| (self.count > 0).then_some(value);
+        ColumnStatistics {
+            count: self.count,
+            min: some(self.min),
+            mean: some(self.sum / self.count as f64),
+            max: some(self.max),
+            p5,
+            median,
+            p95,
+            quantiles_from: self.sample.len() as u64,
+            column: self.name,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_small_and_large_sweeps() {
+        for rows in [101u64, 200_001] {
+            let mut statistics = Statistics::new(&["x".into(), "y".into()], rows);
+            for item in 0..rows {
+                let x = item as f64 / (rows - 1) as f64;
+                statistics.see(item, [x, f64::NAN].into_iter());
+            }
+            let [x, y] = &statistics.close()[..] else { panic!() };
+            assert_eq!((x.count, x.min, x.max), (rows, Some(0.0), Some(1.0)));
+            assert!((x.mean.unwrap() - 0.5).abs() < 1e-12);
+            let tolerance = if rows == 101 { 1e-12 } else { 0.01 };
+            for (found, expected) in [(x.p5, 0.05), (x.median, 0.5), (x.p95, 0.95)] {
+                assert!((found.unwrap() - expected).abs() < tolerance, "{found:?}");
+            }
+            assert!(x.quantiles_from < 21_000);
+            assert_eq!((y.count, y.mean, y.median), (0, None, None));
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! What the variables of a plan do to a scenario.
+
+use serde::Serialize;
+
+use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
+use crate::scenario::{Scenario, TrainTable};
+use crate::unit::{LengthText, MassText, SpeedText};
+
+/// One column of varied values.
+pub struct Variable {
+    pub column: String,
+    target: Target,
+    /// Values multiply what is there.
+    factor: bool,
+    names: Vec<String>,
+}
+
+/// What a variable changes.
+enum Target {
+    /// Train by number.
+    Speed(usize),
+    /// Vehicles by the numbers of train and vehicle.
+    Mass(Vec<(usize, usize)>),
+    ContactGap,
+    CurveGap(String),
+    Band(String),
+    Force(String),
+    /// Everything that has this curve gets another.
+    Curve(String),
+}
+
+/// A variable for people to look at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VariableSummary {
+    pub column: String,
+    /// Values along the grid; `None` of a distribution.
+    pub values: Option<u64>,
+}
+
+/// The variables of a plan, in order of their columns, and its design.
+///
+/// # Errors
+/// A message that names the variable and key.
+pub fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), String> {
+    if plan.vary.is_empty() {
+        return Err("[sweep] varies nothing: add [[sweep.vary]]".into());
+    }
+    let (mut variables, mut spreads) = (Vec::new(), Vec::new());
+    for (k, vary) in plan.vary.iter().enumerate() {
+        let named = |m: String| format!("sweep.vary {} ({}): {m}", k + 1, vary.what.name());
+        let bound = Binder { vary, scenario, plan }.variables().map_err(named)?;
+        let spread = vary.spread().map_err(named)?;
+        for variable in bound {
+            if variables.iter().any(|v: &Variable| v.column == variable.column) {
+                return Err(named(format!("{} is varied twice", variable.column)));
+            }
+            variables.push(variable);
+            spreads.push(spread.clone());
+        }
+    }
+    let design = plan.design(spreads)?;
+    Ok((variables, design))
+}
+
+struct Binder<'a> {
+    vary: &'a Vary,
+    scenario: &'a Scenario,
+    plan: &'a Plan,
+}
+
+impl Binder<'_> {
+    fn variables(&self) -> Result<Vec<Variable>, String> {
+        let vary = self.vary;
+        self.only_own_keys()?;
+        match vary.what {
+            What::Speed => {
+                let trains = &self.scenario.train;
+                let name = vary.train.as_deref().ok_or("name the train: train = \"…\"")?;
+                let known = trains.iter().map(|t| t.name.as_str());
+                let at = known.clone().position(|t| t == name);
+                let at = at.ok_or_else(|| unknown("train", name, known))?;
+                self.one("speed_m_per_s", "speed_factor", name, Target::Speed(at))
+            }
+            What::Mass => self.masses(),
+            What::Gap => match (&vary.curve, vary.interface.as_deref()) {
+                (Some(curve), None) => {
+                    self.check_curve(curve)?;
+                    if vary.factor && self.scenario.curves[curve].gap.is_none() {
+                        return Err(format!(
+                            "curve \"{curve}\" has no gap that a factor could change"
+                        ));
+                    }
+                    if self.scenario.contact.gap.is_some()
+                        && !self.inner_curves().any(|inner| inner == *curve)
+                    {
+                        return Err(format!(
+                            "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
+                        ));
+                    }
+                    self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
+                }
+                (None, Some("contact")) => {
+                    if vary.factor && self.scenario.contact.gap.is_none() {
+                        return Err("the contact has no gap that a factor could change".into());
+                    }
+                    self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
+                }
+                (None, Some(other)) => Err(format!(
+                    "interface = \"{other}\": expected \"contact\"; gaps inside a train are those of its curve"
+                )),
+                _ => Err("give curve = \"…\" or interface = \"contact\"".into()),
+            },
+            What::Band => {
+                let curve = self.curve()?;
+                let table = &self.scenario.curves[curve];
+                let is_json = |p: &std::path::PathBuf| p.extension().is_some_and(|e| e == "json");
+                if table.model.is_none() && !table.file.as_ref().is_some_and(is_json) {
+                    return Err(format!(
+                        "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
+                    ));
+                }
+                self.one("band", "band", curve, Target::Band(curve.into()))
+            }
+            What::Force => {
+                let curve = self.curve()?;
+                self.one("force_factor", "force_factor", curve, Target::Force(curve.into()))
+            }
+            What::Curve => {
+                let curve = self.curve()?;
+                for value in vary.values.iter().flatten() {
+                    check_name(&value.0)?;
+                    self.known_curve(&value.0)?;
+                }
+                self.one("curve", "curve", curve, Target::Curve(curve.into()))
+            }
+        }
+    }
+
+    /// Refuses keys of other kinds of variables.
+    fn only_own_keys(&self) -> Result<(), String> {
+        let vary = self.vary;
+        let keys = [
+            ("train", vary.train.is_some(), vary.what == What::Speed),
+            ("vehicle", vary.vehicle.is_some(), vary.what == What::Mass),
+            ("vehicles", vary.vehicles.is_some(), vary.what == What::Mass),
+            ("each", vary.each, vary.what == What::Mass),
+            ("interface", vary.interface.is_some(), vary.what == What::Gap),
+            ("curve", vary.curve.is_some(), !matches!(vary.what, What::Speed | What::Mass)),
+            ("factor", vary.factor, matches!(vary.what, What::Speed | What::Mass | What::Gap)),
+        ];
+        match keys.iter().find(|(_, given, own)| *given && !own) {
+            Some((key, ..)) => {
+                Err(format!("{key} does not go with what = \"{}\"", vary.what.name()))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn masses(&self) -> Result<Vec<Variable>, String> {
+        let vehicles = || {
+            let trains = self.scenario.train.iter().enumerate();
+            trains.flat_map(|(t, train)| {
+                train.vehicles.iter().enumerate().map(move |(v, vehicle)| ((t, v), &*vehicle.name))
+            })
+        };
+        let find = |name: &str| {
+            let found = vehicles().find(|(_, n)| *n == name).map(|(place, _)| place);
+            found.ok_or_else(|| unknown("vehicle", name, vehicles().map(|(_, n)| n)))
+        };
+        let named: Vec<(&str, (usize, usize))> = match (&self.vary.vehicle, &self.vary.vehicles) {
+            (Some(name), None) => vec![(name, find(name)?)],
+            (None, Some(Vehicles::Word(word))) if word == "all" => {
+                vehicles().map(|(place, name)| (name, place)).collect()
+            }
+            (None, Some(Vehicles::Word(word))) => {
+                return Err(format!("vehicles = \"{word}\": expected a list, or \"all\""));
+            }
+            (None, Some(Vehicles::List(names))) if !names.is_empty() => {
+                let places: Result<Vec<_>, String> =
+                    names.iter().map(|name| Ok((name.as_str(), find(name)?))).collect();
+                places?
+            }
+            _ => return Err("give vehicle = \"…\", or vehicles = […] or \"all\"".into()),
+        };
+        if let Some(k) = (1..named.len()).find(|&k| named[..k].iter().any(|n| n.0 == named[k].0)) {
+            return Err(format!("vehicles names \"{}\" twice", named[k].0));
+        }
+        if self.vary.each {
+            let each = |(name, place): (&str, (usize, usize))| {
+                self.one("mass_kg", "mass_factor", name, Target::Mass(vec![place]))
+            };
+            let variables: Result<Vec<Vec<Variable>>, String> =
+                named.into_iter().map(each).collect();
+            return variables.map(|v| v.into_iter().flatten().collect());
+        }
+        let all = matches!(self.vary.vehicles, Some(Vehicles::Word(_)));
+        let names: Vec<&str> = named.iter().map(|n| n.0).collect();
+        let name = if all { "all".to_string() } else { names.join(" ") };
+        let places = named.into_iter().map(|n| n.1).collect();
+        self.one("mass_kg", "mass_factor", &name, Target::Mass(places))
+    }
+
+    fn one(
+        &self,
+        absolute: &str,
+        factor: &str,
+        name: &str,
+        target: Target,
+    ) -> Result<Vec<Variable>, String> {
+        check_name(name)?;
+        let quantity = if self.vary.factor { factor } else { absolute };
+        let names = match self.vary.what {
+            What::Curve => self.vary.values.iter().flatten().map(|v| v.0.clone()).collect(),
+            _ => Vec::new(),
+        };
+        let column = format!("{quantity}[{name}]");
+        Ok(vec![Variable { column, target, factor: self.vary.factor, names }])
+    }
+
+    fn curve(&self) -> Result<&str, String> {
+        let curve = self.vary.curve.as_deref().ok_or("name the curve: curve = \"…\"")?;
+        self.check_curve(curve)?;
+        Ok(curve)
+    }
+
+    fn known_curve(&self, curve: &str) -> Result<(), String> {
+        match self.scenario.curves.contains_key(curve) {
+            true => Ok(()),
+            false => Err(unknown("curve", curve, self.scenario.curves.keys().map(String::as_str))),
+        }
+    }
+
+    /// A curve that is there, and that some item uses.
+    fn check_curve(&self, curve: &str) -> Result<(), String> {
+        self.known_curve(curve)?;
+        let replaces = |v: &Vary| {
+            v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
+        };
+        let used = self.scenario.contact.curve == curve
+            || self.inner_curves().any(|inner| inner == curve)
+            || self.plan.vary.iter().any(replaces);
+        match used {
+            true => Ok(()),
+            false => {
+                Err(format!("no interface has curve \"{curve}\", so varying it has no effect"))
+            }
+        }
+    }
+
+    fn inner_curves(&self) -> impl Iterator<Item = &str> {
+        let inner = |train: &'_ TrainTable| train.vehicles.len() > 1;
+        self.scenario.train.iter().filter(move |t| inner(t)).filter_map(|t| t.inner.as_deref())
+    }
+}
+
+fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.collect();
+    format!("there is no {what} \"{name}\": the scenario has {}", known.join(", "))
+}
+
+/// Names stand in the columns of the result.
+fn check_name(name: &str) -> Result<(), String> {
+    let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
+    match name.is_empty() || name.contains(breaks) {
+        true => Err(format!(
+            "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
+            name.escape_debug()
+        )),
+        false => Ok(()),
+    }
+}
+
+impl Variable {
+    /// Names that its values are indices of; none if they are numbers.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub fn summary(&self, spread: &Spread) -> VariableSummary {
+        let values = (!matches!(spread, Spread::Drawn(_))).then(|| spread.len());
+        VariableSummary { column: self.column.clone(), values }
+    }
+
+    /// Whether force laws depend on it. Those of a model's curve depend on masses and speeds.
+    pub fn shapes_laws(&self, scenario: &Scenario) -> bool {
+        match self.target {
+            Target::Band(_) | Target::Force(_) | Target::Curve(_) => true,
+            Target::Speed(_) | Target::Mass(_) => {
+                scenario.curves.values().any(|c| c.model.is_some())
+            }
+            Target::ContactGap | Target::CurveGap(_) => false,
+        }
+    }
+
+    /// Undoes what [`Variable::apply`] did: `scenario` has here what `base` has.
+    pub fn reset(&self, scenario: &mut Scenario, base: &Scenario) {
+        match &self.target {
+            Target::Speed(train) => scenario.train[*train].speed = base.train[*train].speed,
+            Target::Mass(vehicles) => {
+                for &(t, v) in vehicles {
+                    scenario.train[t].vehicles[v].mass = base.train[t].vehicles[v].mass;
+                }
+            }
+            Target::ContactGap => scenario.contact.gap = base.contact.gap,
+            Target::CurveGap(curve) | Target::Band(curve) | Target::Force(curve) => {
+                if let (Some(table), Some(base)) =
+                    (scenario.curves.get_mut(curve), base.curves.get(curve))
+                {
+                    (table.gap, table.band, table.scale) = (base.gap, base.band, base.scale);
+                }
+            }
+            Target::Curve(_) => {
+                scenario.contact.curve.clone_from(&base.contact.curve);
+                for (train, base) in scenario.train.iter_mut().zip(&base.train) {
+                    train.inner.clone_from(&base.inner);
+                }
+            }
+        }
+    }
+
+    /// Gives `scenario` the value, in SI; `base` is the scenario as written.
+    pub fn apply(&self, scenario: &mut Scenario, base: &Scenario, value: f64) {
+        let with = |old: f64| if self.factor { old * value } else { value };
+        match &self.target {
+            Target::Speed(train) => {
+                let train = &mut scenario.train[*train];
+                train.speed = SpeedText(with(train.speed.0));
+            }
+            Target::Mass(vehicles) => {
+                for &(t, v) in vehicles {
+                    let vehicle = &mut scenario.train[t].vehicles[v];
+                    vehicle.mass = MassText(with(vehicle.mass.0));
+                }
+            }
+            Target::ContactGap => {
+                let old = scenario.contact.gap.map_or(0.0, |gap| gap.0);
+                scenario.contact.gap = Some(LengthText(with(old)));
+            }
+            Target::CurveGap(curve) => {
+                if let Some(table) = scenario.curves.get_mut(curve) {
+                    table.gap = Some(LengthText(with(table.gap.map_or(0.0, |gap| gap.0))));
+                }
+            }
+            Target::Band(curve) => {
+                if let Some(table) = scenario.curves.get_mut(curve) {
+                    table.band = Some(value);
+                }
+            }
+            Target::Force(curve) => {
+                if let Some(table) = scenario.curves.get_mut(curve) {
+                    table.scale = Some(table.scale.unwrap_or(1.0) * value);
+                }
+            }
+            Target::Curve(curve) => {
+                let Some(name) = self.names.get(value as usize) else { return };
+                if base.contact.curve == *curve {
+                    scenario.contact.curve.clone_from(name);
+                }
+                for (train, base) in scenario.train.iter_mut().zip(&base.train) {
+                    if base.inner.as_deref() == Some(curve) {
+                        train.inner = Some(name.clone());
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,875 @@
+//! Sweeps: values of items, the same bytes on any number of threads, pieces and shards, runs
+//! that were killed, files that do not belong together, wrong plans.
+
+mod common;
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{crumple_fails, crumple_in, crumple_ok, python, root};
+use crumple::sweep::{Chunk, Settings, Shard, Sweep, SweepError, merge, write};
+use serde_json::Value;
+
+/// Two trains with two cars each; short, with long steps.
+const SCENARIO: &str = "[run]\nduration = \"60ms\"\noutput_interval = \"1ms\"\nstep = \"0.2ms\"\n\
+    [curves]\n\
+    nose = { file = \"nose.csv\", unloading = \"200MN/m\" }\n\
+    soft = { file = \"nose.csv\", unloading = \"200MN/m\", scale = 0.8 }\n\
+    inner = { file = \"inner.csv\", unloading = \"100MN/m\", gap = \"1mm\" }\n\
+    [[train]]\nname = \"A\"\nspeed = \"10m/s\"\ninner = \"inner\"\n\
+    vehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"20t\" } ]\n\
+    [[train]]\nname = \"B\"\nspeed = \"0m/s\"\ninner = \"inner\"\n\
+    vehicles = [ { name = \"B1\", mass = \"24t\" }, { name = \"B2\", mass = \"20t\" } ]\n\
+    [contact]\ncurve = \"nose\"\n";
+
+const GRID: &str = "[sweep]\n\
+    vary = [ { what = \"speed\", train = \"A\", values = [\"36km/h\", \"5m/s\"] },\n\
+    { what = \"curve\", curve = \"nose\", values = [\"nose\", \"soft\"] },\n\
+    { what = \"mass\", vehicle = \"A2\", from = \"10t\", to = \"30t\", steps = 3 } ]\n";
+
+const DRAWN: &str = "[sweep]\nseed = 7\nsamples = 40\n\
+    vary = [ { what = \"mass\", vehicles = \"all\", each = true, factor = true, distribution = \"uniform\", from = 0.9, to = 1.2 },\n\
+    { what = \"force\", curve = \"inner\", values = [1.0, 1.5] },\n\
+    { what = \"gap\", curve = \"inner\", distribution = \"triangular\", from = \"0mm\", mode = \"1mm\", to = \"5mm\" } ]\n";
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new(plan: &str) -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.put("nose.csv", "d_m,force_MN\n0,0\n0.02,3\n0.05,1.6\n0.6,2\n");
+        folder.put("inner.csv", "d_m,force_MN\n0,0\n0.05,1.2\n0.4,1.4\n");
+        folder.put("s.toml", &format!("{SCENARIO}{plan}"));
+        folder
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn put(&self, name: &str, text: &str) {
+        fs::write(self.path().join(name), text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    fn text(&self, name: &str) -> String {
+        String::from_utf8(self.read(name)).unwrap()
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = self.path().read_dir().unwrap();
+        let mut names: Vec<String> =
+            entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.retain(|name| !["nose.csv", "inner.csv", "s.toml"].contains(&name.as_str()));
+        names.sort();
+        names
+    }
+
+    fn ok(&self, line: &str) -> String {
+        crumple_ok(self.path(), &line.split(' ').collect::<Vec<_>>())
+    }
+
+    fn fails(&self, code: i32, line: &str) -> String {
+        crumple_fails(self.path(), code, &line.split(' ').collect::<Vec<_>>())
+    }
+
+    fn json(&self, line: &str) -> Value {
+        serde_json::from_str(&self.ok(line)).unwrap()
+    }
+
+    fn load(&self) -> Sweep {
+        Sweep::load(&self.path().join("s.toml"), None).unwrap()
+    }
+
+    fn write(&self, sweep: &Sweep, name: &str, settings: &Settings) -> Result<u64, SweepError> {
+        write(sweep, &self.path().join(name), settings, |_| ControlFlow::Continue(()))
+            .map(|report| report.resumed)
+    }
+}
+
+/// Header and rows of a result as fields.
+fn rows(text: &str) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let fields = |r: &csv::StringRecord| r.iter().map(String::from).collect::<Vec<_>>();
+    let header = fields(reader.headers().unwrap());
+    (header, reader.records().map(|r| fields(&r.unwrap())).collect())
+}
+
+#[test]
+fn a_grid_is_run_in_its_stated_order() {
+    let folder = Folder::new(GRID);
+    folder.ok("sweep s.toml -q -o out.csv");
+    let (header, rows) = rows(&folder.text("out.csv"));
+    assert_eq!(header[..4], ["item", "speed_m_per_s[A]", "curve[nose]", "mass_kg[A2]"]);
+    assert_eq!(header[4], "peak_force_N[A1|A2]");
+    assert_eq!(header[header.len() - 4..], ["energy_error", "momentum_error", "status", "message"]);
+    let values: Vec<String> = rows.iter().map(|r| r[..4].join(" ")).collect();
+    let mut expected = Vec::new();
+    for speed in ["10.0", "5.0"] {
+        for curve in ["nose", "soft"] {
+            for mass in ["10000.0", "20000.0", "30000.0"] {
+                expected.push(format!("{} {speed} {curve} {mass}", expected.len()));
+            }
+        }
+    }
+    assert_eq!(values, expected);
+}
+
+/// Each row is what `simulate` says of a scenario with these values written into it.
+#[test]
+fn rows_are_those_of_single_runs() {
+    let folder = Folder::new(GRID);
+    folder.ok("sweep s.toml -q -o out.csv");
+    let (header, rows) = rows(&folder.text("out.csv"));
+    for row in &rows {
+        let at = |column: &str| row[header.iter().position(|h| h == column).unwrap()].clone();
+        let text = SCENARIO
+            .replace("speed = \"10m/s\"", &format!("speed = \"{}m/s\"", at("speed_m_per_s[A]")))
+            .replace("curve = \"nose\"", &format!("curve = \"{}\"", at("curve[nose]")))
+            .replace(
+                "{ name = \"A2\", mass = \"20t\" }",
+                &format!("{{ name = \"A2\", mass = \"{}kg\" }}", at("mass_kg[A2]")),
+            );
+        folder.put("one.toml", &text);
+        let run = folder.json("simulate one.toml -q --json");
+        let number = |column: String| at(&column).parse::<f64>().ok();
+        for interface in run["summary"]["interfaces"].as_array().unwrap() {
+            let name = interface["name"].as_str().unwrap();
+            for key in ["peak_force_N", "max_deflection_m", "max_deflection_time_s", "restitution"]
+            {
+                assert_eq!(number(format!("{key}[{name}]")), interface[key].as_f64(), "{key}");
+            }
+        }
+        for body in run["summary"]["bodies"].as_array().unwrap() {
+            let name = body["name"].as_str().unwrap();
+            for key in ["final_v_m_per_s", "mean_deceleration_m_per_s2"] {
+                assert_eq!(number(format!("{key}[{name}]")), body[key].as_f64(), "{key}");
+            }
+        }
+        assert_eq!(number("energy_error".into()), run["ledger"]["max_energy_error"].as_f64());
+    }
+    assert_eq!(rows.len(), 12);
+}
+
+/// A member of a band drives as the band's edge does that another export wrote.
+#[test]
+fn band_members_are_between_the_edges() {
+    let folder = tempfile::tempdir().unwrap();
+    crumple_ok(folder.path(), &["demo"]);
+    let here = folder.path().join("crumple-demo");
+    let csv = fs::read_to_string(here.join("lead50.csv")).unwrap();
+    for (name, column) in [("low", 2), ("high", 3)] {
+        let lines = csv.lines().filter(|l| !l.starts_with('#')).skip(1);
+        let points = lines.map(|l| l.split(',').collect::<Vec<_>>());
+        let points: Vec<String> = points.map(|p| format!("{},{}\n", p[0], p[column])).collect();
+        fs::write(here.join(format!("{name}.csv")), format!("d_m,force_N\n{}", points.concat()))
+            .unwrap();
+    }
+    let scenario = |file: &str, sweep: &str| {
+        format!(
+            "[run]\nduration = \"150ms\"\nstep = \"0.1ms\"\n[curves]\nc = {{ file = \"{file}\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"12m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"c\"\n{sweep}"
+        )
+    };
+    let plan = "[sweep]\nvary = [ { what = \"band\", curve = \"c\", from = -1, to = 1, steps = 3 } ]\nresults = [\"max_deflection\"]\n";
+    fs::write(here.join("s.toml"), scenario("lead50.json", plan)).unwrap();
+    crumple_ok(&here, &["sweep", "s.toml", "-q", "-o", "out.csv"]);
+    let (header, rows) = rows(&fs::read_to_string(here.join("out.csv")).unwrap());
+    assert_eq!(header, ["item", "band[c]", "max_deflection_m[A1|wall]", "status", "message"]);
+    let crush: Vec<f64> = rows.iter().map(|r| r[2].parse().unwrap()).collect();
+    for (row, file) in [(0, "low.csv"), (1, "lead50.json"), (2, "high.csv")] {
+        fs::write(here.join("one.toml"), scenario(file, "")).unwrap();
+        let run = crumple_ok(&here, &["simulate", "one.toml", "-q", "--json"]);
+        let run: Value = serde_json::from_str(&run).unwrap();
+        let expected = run["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap();
+        assert!((crush[row] / expected - 1.0).abs() < 1e-6, "{file}: {} {expected}", crush[row]);
+    }
+    assert!(crush[0] > 1.05 * crush[1] && crush[1] > 1.05 * crush[2], "{crush:?}");
+    // The demo's own plan: a model's curve at each speed and member, and with other masses.
+    let demo = fs::read_to_string(here.join("scenario.toml")).unwrap();
+    let (own, rest) = demo.split_once("[sweep]").unwrap();
+    let masses = "    { what = \"mass\", vehicle = \"A1\", values = [\"24t\", \"26t\"] },\n]";
+    fs::write(
+        here.join("s.toml"),
+        format!("{own}[sweep]{}", rest.replacen("\n]", &format!("\n{masses}"), 1)),
+    )
+    .unwrap();
+    crumple_ok(&here, &["sweep", "s.toml", "-q", "-o", "demo.csv"]);
+    let (header, rows) = self::rows(&fs::read_to_string(here.join("demo.csv")).unwrap());
+    assert_eq!(header[..4], ["item", "speed_m_per_s[A]", "band[nose]", "mass_kg[A1]"]);
+    assert_eq!(rows.len(), 30);
+    for row in [&rows[1], &rows[16], &rows[28]] {
+        let text = own
+            .replace("\"50km/h\"", &format!("\"{}m/s\"", row[1]))
+            .replace("force = \"body\" }", &format!("force = \"body\", band = {} }}", row[2]))
+            .replace("\"24t\"", &format!("\"{}kg\"", row[3]));
+        fs::write(here.join("one.toml"), text).unwrap();
+        let run = crumple_ok(&here, &["simulate", "one.toml", "-q", "--json"]);
+        let run: Value = serde_json::from_str(&run).unwrap();
+        let interface = &run["summary"]["interfaces"][0];
+        assert_eq!(row[4].parse().ok(), interface["peak_force_N"].as_f64(), "{row:?}");
+        assert_eq!(row[5].parse().ok(), interface["max_deflection_m"].as_f64(), "{row:?}");
+    }
+    // What has no band says so.
+    fs::write(here.join("s.toml"), scenario("low.csv", plan)).unwrap();
+    let error = crumple_fails(&here, 1, &["sweep", "s.toml", "-o", "no.csv"]);
+    assert!(
+        error.contains("s.toml: sweep.vary 1 (band): curve \"c\" has no band: only a model"),
+        "{error}"
+    );
+}
+
+/// Factors multiply what the scenario has; `each` draws for every vehicle by itself.
+#[test]
+fn factors_and_each() {
+    let folder = Folder::new(DRAWN);
+    let preview = folder.json("sweep s.toml --dry-run --json");
+    assert_eq!(preview["items"], 80);
+    let columns: Vec<&str> =
+        preview["columns"].as_array().unwrap().iter().map(|c| c.as_str().unwrap()).collect();
+    assert_eq!(
+        columns[..7],
+        [
+            "item",
+            "mass_factor[A1]",
+            "mass_factor[A2]",
+            "mass_factor[B1]",
+            "mass_factor[B2]",
+            "force_factor[inner]",
+            "gap_m[inner]"
+        ]
+    );
+    let first = preview["first"].as_array().unwrap();
+    let values = |k: usize| -> Vec<f64> {
+        let values = first[k][1].as_array().unwrap();
+        values.iter().map(|v| v.as_str().unwrap().parse().unwrap()).collect()
+    };
+    let of_first = values(0);
+    assert!(of_first[..4].iter().all(|f| (0.9..1.2).contains(f)));
+    assert!((1..4).all(|k| of_first[k] != of_first[0]), "{of_first:?}");
+    // One factor for all: twice the masses and forces is the same motion.
+    let folder = Folder::new(
+        "[sweep]\nvary = [ { what = \"mass\", vehicles = \"all\", factor = true, values = [1, 2] },\n\
+         { what = \"force\", curve = \"inner\", values = [1, 2] },\n\
+         { what = \"force\", curve = \"nose\", values = [1, 2] } ]\n",
+    );
+    // An unloading stiffness that is asked for is not scaled, the curve's own is.
+    let text = folder.text("s.toml");
+    folder.put(
+        "s.toml",
+        &text.replace(", unloading = \"200MN/m\"", "").replace(", unloading = \"100MN/m\"", ""),
+    );
+    folder.ok("sweep s.toml -q -o out.csv");
+    let (header, rows) = rows(&folder.text("out.csv"));
+    let at = |row: usize, column: &str| -> f64 {
+        rows[row][header.iter().position(|h| h == column).unwrap()].parse().unwrap()
+    };
+    for column in ["max_deflection_m[A1|B1]", "final_v_m_per_s[B2]", "max_deflection_m[A1|A2]"] {
+        assert!((at(0, column) / at(7, column) - 1.0).abs() < 1e-9, "{column}");
+        assert!((at(0, column) / at(3, column) - 1.0).abs() > 1e-3, "{column}");
+    }
+    assert!((2.0 * at(0, "peak_force_N[A1|B1]") / at(7, "peak_force_N[A1|B1]") - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_same_bytes_for_any_threads_pieces_and_shards() {
+    for plan in [GRID, DRAWN] {
+        let folder = Folder::new(plan);
+        let run = |threads: &str, name: &str| {
+            let status = Command::new(env!("CARGO_BIN_EXE_crumple"))
+                .args(["sweep", "s.toml", "-q", "-o", name])
+                .env("RAYON_NUM_THREADS", threads)
+                .current_dir(folder.path())
+                .stdout(Stdio::null())
+                .status();
+            assert!(status.unwrap().success());
+            folder.read(name)
+        };
+        let whole = run("1", "one.csv");
+        assert!(whole == run("2", "two.csv"));
+        assert!(whole == run("5", "five.csv"));
+        let whole_h5 = run("2", "two.h5");
+        let stdout = crumple_in(folder.path(), &["sweep", "s.toml", "-q", "-o", "-"]);
+        assert!(stdout.stdout == whole);
+        let sweep = folder.load();
+        for items in [1, 3, 1000] {
+            let name = format!("by{items}.csv");
+            let settings = Settings { chunk: Chunk::Items(items), ..Settings::default() };
+            folder.write(&sweep, &name, &settings).unwrap();
+            assert!(folder.read(&name) == whole, "in pieces of {items}");
+        }
+        for count in [1, 2, 3, 7, 100] {
+            for extension in ["csv", "h5"] {
+                let mut parts = Vec::new();
+                for index in 1..=count {
+                    let name = format!("{index}of{count}.{extension}");
+                    let shard = Shard::new(index, count).unwrap();
+                    let settings = Settings { shard, ..Settings::default() };
+                    folder.write(&sweep, &name, &settings).unwrap();
+                    parts.push(folder.path().join(name));
+                }
+                parts.rotate_left(count as usize / 2);
+                let merged = folder.path().join(format!("merged{count}.{extension}"));
+                let report = merge(&parts, &merged).unwrap();
+                assert_eq!(report.done, sweep.items());
+                let expected = if extension == "csv" { &whole } else { &whole_h5 };
+                assert!(fs::read(&merged).unwrap() == *expected, "{count} shards of {extension}");
+            }
+            let parts: Vec<_> =
+                (1..=count).map(|i| folder.path().join(format!("{i}of{count}.csv"))).collect();
+            let merged = folder.path().join("converted.h5");
+            merge(&parts, &merged).unwrap();
+            assert!(fs::read(&merged).unwrap() == whole_h5);
+        }
+    }
+}
+
+/// Values of HDF5 and CSV are the same numbers; h5py is the judge.
+#[test]
+fn hdf5_holds_what_csv_holds() {
+    let Some(mut python) = python() else { return };
+    let folder = Folder::new(FAILING);
+    folder.ok("sweep s.toml -q -o out.csv");
+    folder.ok("sweep s.toml -q -o out.h5");
+    let script = "import csv, h5py, math\n\
+        lines = [l for l in open('out.csv', newline='') if not l.startswith('#')]\n\
+        rows = list(csv.DictReader(lines))\n\
+        f = h5py.File('out.h5')\n\
+        assert f.attrs['format'] == 'crumple sweep' and f.attrs['items'] == len(rows)\n\
+        names = [n.decode() for n in f['columns'][:]]\n\
+        assert names[:-2] == list(rows[0])[:-1], names\n\
+        failed = 0\n\
+        for name in names[:-2]:\n\
+        \x20   column = f[name][:]\n\
+        \x20   assert len(column) == len(rows)\n\
+        \x20   for row, value in zip(rows, column):\n\
+        \x20       if column.dtype.kind in 'SO':\n\
+        \x20           assert value.decode() == row[name]\n\
+        \x20       elif row[name] == '':\n\
+        \x20           assert math.isnan(value); failed += 1\n\
+        \x20       else:\n\
+        \x20           assert float(row[name]) == value\n\
+        for row, number in zip(rows, f['message_number'][:]):\n\
+        \x20   assert f['message'][number].decode() == row['message']\n\
+        print(failed)\n";
+    let output = python.args(["-c", script]).current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let empty: usize = String::from_utf8(output.stdout).unwrap().trim().parse().unwrap();
+    assert!(empty > 20, "{empty}");
+}
+
+/// Of six items two never meet, one has no mass.
+const FAILING: &str = "[sweep]\n\
+    vary = [ { what = \"speed\", train = \"B\", values = [\"0m/s\", \"10m/s\"] },\n\
+    { what = \"mass\", vehicle = \"A1\", values = [\"24t\", \"0t\", \"30t\"] } ]\n";
+
+#[test]
+fn items_that_fail_are_rows_with_their_reason() {
+    let folder = Folder::new(FAILING);
+    let output = crumple_in(folder.path(), &["sweep", "s.toml", "-o", "out.csv"]);
+    assert_eq!(output.status.code(), Some(0));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("4 of 6 items failed; their rows say why"), "{error}");
+    assert!(error.contains("item 1: the mass of A1 is 0 kg: expected more than 0"), "{error}");
+    let (_, rows) = rows(&folder.text("out.csv"));
+    let status: Vec<&str> = rows.iter().map(|r| r[r.len() - 2].as_str()).collect();
+    assert_eq!(status, ["ok", "failed", "ok", "failed", "failed", "failed"]);
+    let message = rows[3].last().unwrap();
+    assert!(
+        message.starts_with("train \"A\" at 36 km/h never meets what is in front"),
+        "{message}"
+    );
+    assert!(rows[3][3..rows[3].len() - 2].iter().all(String::is_empty), "no results");
+    // The same again is done, and --strict says that there are failures.
+    let again = crumple_in(folder.path(), &["sweep", "s.toml", "-q", "--strict", "-o", "out.csv"]);
+    assert_eq!(again.status.code(), Some(3));
+    // A curve that ends.
+    let folder = Folder::new(
+        "[sweep]\nvary = [ { what = \"speed\", train = \"A\", values = [\"3m/s\", \"40m/s\"] } ]\n",
+    );
+    let text = folder.text("s.toml");
+    folder.put(
+        "s.toml",
+        &text.replace("unloading = \"200MN/m\" }", "unloading = \"200MN/m\", end = \"error\" }"),
+    );
+    folder.ok("sweep s.toml -q -o out.csv");
+    assert!(folder.text("out.csv").contains("beyond the end of its curve (0.6000 m)"));
+    // The crush beyond the end of a curve that is held is a warning.
+    folder.put("s.toml", &text);
+    folder.ok("sweep s.toml -q -o held.csv");
+    let text = folder.text("held.csv");
+    assert!(text.contains(",warned,") && text.contains("beyond the end of its curve at 0.6000 m"));
+}
+
+#[test]
+fn the_report_counts_and_summarises() {
+    let folder = Folder::new(FAILING);
+    let report = folder.json("sweep s.toml --json -q -o out.csv");
+    assert_eq!(report["items"], 6);
+    let counts = ["failed", "warned", "done", "resumed"].map(|key| report[key].as_u64().unwrap());
+    assert_eq!(counts, [4, 0, 6, 0]);
+    let columns = report["columns"].as_array().unwrap();
+    let mass = &columns[1];
+    assert_eq!(mass["column"], "mass_kg[A1]");
+    assert_eq!((mass["min"].as_f64(), mass["max"].as_f64()), (Some(0.0), Some(30e3)));
+    assert_eq!((mass["mean"].as_f64(), mass["median"].as_f64()), (Some(18e3), Some(24e3)));
+    let again = folder.json("sweep s.toml --json -q -o out.csv");
+    assert_eq!(again["resumed"], 6);
+    assert_eq!(again["columns"], report["columns"]);
+    let converted = folder.json("sweep s.toml --json -q -o out.h5");
+    let again = folder.json("sweep s.toml --json -q -o out.h5");
+    assert_eq!(converted["columns"], report["columns"]);
+    assert_eq!((&again["columns"], &again["failed"]), (&report["columns"], &report["failed"]));
+    assert_eq!(again["messages"], report["messages"]);
+}
+
+/// Killed at any moment and started again until it is done: the file of a run that was not.
+#[cfg(unix)]
+#[test]
+fn a_killed_run_goes_on_without_loss() {
+    for name in ["out.csv", "out.h5"] {
+        let folder = Folder::new(DRAWN);
+        let text = folder.text("s.toml").replace("samples = 40", "samples = 300");
+        let text = text.replace("\"0.2ms\"", "\"0.01ms\"").replace("\"60ms\"", "\"600ms\"");
+        folder.put("s.toml", &text);
+        let arguments = ["sweep", "s.toml", "-q", "-o", name];
+        let part = folder.path().join(format!("{name}.part"));
+        let length = || fs::metadata(&part).map_or(0, |m| m.len());
+        let mut kills = 0;
+        for round in 0u64.. {
+            let before = length();
+            let mut child = Command::new(env!("CARGO_BIN_EXE_crumple"))
+                .args(arguments)
+                .current_dir(folder.path())
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap();
+            // Each round gets further; then it is killed, at moments that differ.
+            let ended = loop {
+                match child.try_wait().unwrap() {
+                    Some(status) => break Some(status),
+                    None if length() > before + 4000 => break None,
+                    None => std::thread::sleep(Duration::from_millis(1)),
+                }
+            };
+            if let Some(status) = ended {
+                assert!(status.success());
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(round * 7919 % 40_000));
+            child.kill().unwrap();
+            child.wait().unwrap();
+            kills += 1;
+        }
+        assert!(kills >= 1);
+        assert_eq!(folder.names(), [name], "neither part nor lock stays");
+        folder.ok(&format!("sweep s.toml -q -o whole-{name}"));
+        assert!(folder.read(name) == folder.read(&format!("whole-{name}")), "{kills} kills");
+    }
+}
+
+/// What a kill or a lost disk can leave at the end of the file under work.
+#[test]
+fn a_torn_end_is_cut() {
+    let folder = Folder::new(GRID);
+    let sweep = folder.load();
+    let settings = Settings::default();
+    folder.write(&sweep, "whole.csv", &settings).unwrap();
+    let whole = folder.read("whole.csv");
+    let part = folder.path().join("out.csv.part");
+    let go_on = |left: &[u8]| {
+        fs::write(&part, left).unwrap();
+        let resumed = folder.write(&sweep, "out.csv", &settings).unwrap();
+        assert!(folder.read("out.csv") == whole, "after {} bytes", left.len());
+        assert!(!part.exists());
+        fs::remove_file(folder.path().join("out.csv")).unwrap();
+        resumed
+    };
+    let head = whole.split(|b| *b == b'\n').take(8).map(|line| line.len() + 1).sum::<usize>();
+    for length in (0..=head).step_by(13) {
+        assert_eq!(go_on(&whole[..length]), 0);
+    }
+    let lines = |bytes: &[u8]| bytes.iter().filter(|b| **b == b'\n').count() as u64;
+    let last_two = whole.len() - 600;
+    for length in last_two..=whole.len() {
+        assert_eq!(go_on(&whole[..length]), lines(&whole[..length]) - 8);
+    }
+    // Blocks that never reached the disk are zeros.
+    for from in [last_two, last_two + 5, whole.len() - 1] {
+        let mut zeros = whole.clone();
+        zeros[from..].fill(0);
+        assert_eq!(go_on(&zeros), lines(&whole[..from]) - 8);
+    }
+    // A row that is not the next one, and what stands behind the last one.
+    let text = String::from_utf8(whole.clone()).unwrap();
+    let skipped = text.lines().filter(|l| !l.starts_with("5,")).collect::<Vec<_>>().join("\n");
+    assert_eq!(go_on(skipped.as_bytes()), 5);
+    assert_eq!(go_on(format!("{text}12,rest\n").as_bytes()), 12);
+}
+
+#[test]
+fn another_sweeps_file_is_not_taken_up() {
+    let folder = Folder::new(GRID);
+    let sweep = folder.load();
+    let stop = |_| ControlFlow::Break(());
+    let report = write(&sweep, &folder.path().join("out.csv"), &Settings::default(), stop).unwrap();
+    assert!(!report.is_complete());
+    let begun = folder.read("out.csv.part");
+    let text = folder.text("s.toml");
+    let changes: [(&str, &str, &str); 4] = [
+        ("s.toml", "\"30t\"", "\"31t\""),
+        ("s.toml", "\"10t\"", "\"11t\""),
+        ("nose.csv", "0.6,2", "0.6,2.1"),
+        ("s.toml", "duration = \"60ms\"", "duration = \"61ms\""),
+    ];
+    for (file, from, to) in changes {
+        let old = folder.text(file);
+        assert!(old.contains(from));
+        folder.put(file, &old.replace(from, to));
+        let error = folder.fails(1, "sweep s.toml -q -o out.csv");
+        assert!(
+            error.contains("out.csv.part belongs to another sweep: plan, scenario or a file it names have changed since; --restart drops it"),
+            "{error}"
+        );
+        assert!(folder.read("out.csv.part") == begun);
+        folder.put(file, &old);
+    }
+    let error = folder.fails(1, "sweep s.toml -q --shard 1/2 -o out.csv");
+    assert!(error.contains("it is shard 1/1, this is 1/2"), "{error}");
+    // Comments are no change.
+    folder.put("s.toml", &format!("# a comment\n{text}"));
+    folder.ok("sweep s.toml -q -o out.csv");
+    // A complete one of another plan, and files that are none.
+    folder.put("s.toml", &text.replace("\"30t\"", "\"31t\""));
+    let before = folder.read("out.csv");
+    let error = folder.fails(1, "sweep s.toml -q -o out.csv");
+    assert!(error.contains("out.csv belongs to another sweep"), "{error}");
+    assert!(folder.read("out.csv") == before);
+    folder.ok("sweep s.toml -q --restart -o out.csv");
+    assert!(folder.read("out.csv") != before);
+    for name in ["mine.csv", "mine.h5", "new.csv.part"] {
+        folder.put(name, "my own numbers\n");
+        let error =
+            folder.fails(1, &format!("sweep s.toml -q -o {}", name.trim_end_matches(".part")));
+        assert!(
+            error.contains(&format!("{name} is there and is no sweep's: --restart")),
+            "{error}"
+        );
+        assert_eq!(folder.text(name), "my own numbers\n");
+    }
+    // A complete file that lost its end.
+    let whole = folder.read("out.csv");
+    fs::write(folder.path().join("out.csv"), &whole[..whole.len() - 1]).unwrap();
+    let error = folder.fails(1, "sweep s.toml -q -o out.csv");
+    assert!(error.contains("the row of item 11 is missing or damaged"), "{error}");
+}
+
+/// What cannot be written is said; rows that are there stay for the next time.
+#[cfg(target_os = "linux")]
+#[test]
+fn full_disks_and_missing_folders() {
+    let folder = Folder::new(GRID);
+    let error = folder.fails(1, "sweep s.toml -q -o /dev/full");
+    assert!(error.contains("cannot write /dev/full: No space left on device"), "{error}");
+    let error = folder.fails(1, "sweep s.toml -q -o no/out.csv");
+    assert!(error.contains("cannot write no/out.csv"), "{error}");
+    folder.ok("sweep s.toml -q -o out.csv");
+    folder.ok("sweep s.toml -q -o /dev/null");
+    let error = folder.fails(1, "sweep merge -o no/all.csv out.csv");
+    assert!(error.contains("cannot write no/all.csv"), "{error}");
+    assert_eq!(folder.names(), ["out.csv"]);
+}
+
+#[test]
+fn a_second_writer_is_told() {
+    let folder = Folder::new(GRID);
+    let sweep = folder.load();
+    let out = folder.path().join("out.csv");
+    write(&sweep, &out, &Settings::default(), |_| {
+        let error = folder.fails(1, "sweep s.toml -q -o out.csv");
+        assert!(error.contains("out.csv is being written by another process"), "{error}");
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert_eq!(folder.names(), ["out.csv"]);
+}
+
+/// Ctrl-C: what is done stays, and it is said how to go on.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_behind_the_rows_that_are_done() {
+    let folder = Folder::new(DRAWN);
+    let text = folder.text("s.toml").replace("samples = 40", "samples = 100000");
+    folder.put("s.toml", &text);
+    let part = folder.path().join("out.csv.part");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_crumple"))
+        .args(["sweep", "s.toml", "-o", "out.csv"])
+        .current_dir(folder.path())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while fs::metadata(&part).map_or(0, |m| m.len()) < 5000 {
+        assert!(child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupt.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("of 200000 rows; the same command goes on there"), "{error}");
+    let done: usize =
+        error.split("stopped behind ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert_eq!(folder.text("out.csv.part").lines().count(), 8 + done);
+    assert!(!folder.path().join("out.csv").exists());
+}
+
+#[test]
+fn only_all_shards_of_one_sweep_are_merged() {
+    let folder = Folder::new(GRID);
+    for extension in ["csv", "h5"] {
+        for shard in 1..=3 {
+            folder.ok(&format!("sweep s.toml -q --shard {shard}/3 -o p{shard}.{extension}"));
+        }
+        let fails = |parts: &str, expected: &str| {
+            let parts = parts.replace('*', extension);
+            let error = folder.fails(1, &format!("sweep merge -o all.{extension} {parts}"));
+            assert!(error.contains(expected), "{parts}: {error}");
+            assert!(!folder.names().iter().any(|n| n.starts_with("all.")), "nothing is written");
+        };
+        fails("p1.* p3.*", "of 3 shards 2 are given: missing 2");
+        fails("p2.*", "of 3 shards 1 is given: missing 1, 3");
+        fails("p1.* p2.* p1.* p3.*", "are both shard 1: give each once");
+        folder.ok(&format!("sweep s.toml -q --shard 2/2 -o half.{extension}"));
+        fails("p1.* half.*", "is one of 2 shards, ");
+        let old = folder.text("s.toml");
+        folder.put("s.toml", &old.replace("\"30t\"", "\"31t\""));
+        folder.ok(&format!("sweep s.toml -q --shard 3/3 -o foreign.{extension}"));
+        folder.put("s.toml", &old);
+        fails("p1.* p2.* foreign.*", "are of different sweeps");
+        let whole = folder.read(&format!("p2.{extension}"));
+        let cut = format!("cut.{extension}");
+        fs::write(folder.path().join(&cut), &whole[..whole.len() - 700]).unwrap();
+        fails("p1.* cut.* p3.*", &cut);
+        fs::write(folder.path().join(&cut), &whole[..8]).unwrap();
+        fails("p1.* cut.* p3.*", &cut);
+        folder.put("s.csv", "d_m,force_N\n0,0\n1,1\n");
+        fails("s.csv", "s.csv is no result of crumple sweep");
+        folder.put("empty.csv", "");
+        fails("empty.csv", "empty.csv is no result of crumple sweep");
+        fails("no.csv", "no.csv: No such file");
+    }
+    let error = folder.fails(1, "sweep merge -o all.csv p1.csv p2.h5 p3.csv");
+    assert!(error.contains("p1.csv is CSV, p2.h5 is HDF5: merge files of one kind"), "{error}");
+    let error = folder.fails(1, "sweep merge -o all.csv p1.h5 p2.h5 p3.h5");
+    assert!(error.contains("name all.csv .h5 or .hdf5"), "{error}");
+    let error = folder.fails(2, "sweep merge -o p1.csv p1.csv p2.csv p3.csv");
+    assert!(error.contains("names the input itself"), "{error}");
+    // Rows that end early, named by the first that is missing; those of a run that goes on, too.
+    let text = folder.text("p2.csv");
+    let lines: Vec<&str> = text.lines().collect();
+    folder.put("cut.csv", &(lines[..lines.len() - 1].join("\n") + "\n"));
+    let error = folder.fails(1, "sweep merge -o all.csv p3.csv cut.csv p1.csv");
+    assert!(error.contains("cut.csv: its rows end before item 7, they should go on to 7: let its sweep run to the end"), "{error}");
+    folder.put("cut.csv", &text.replace("\n5,", "\n6,"));
+    let error = folder.fails(1, "sweep merge -o all.csv p3.csv cut.csv p1.csv");
+    assert!(error.contains("cut.csv: the row of item 5 is missing or damaged"), "{error}");
+    folder.put("cut.csv", &format!("{text}8,more\n"));
+    let error = folder.fails(1, "sweep merge -o all.csv p3.csv cut.csv p1.csv");
+    assert!(error.contains("there is something behind the last row"), "{error}");
+}
+
+#[test]
+fn wrong_plans_are_named_by_file_and_key() {
+    fn t(plan: &str, expected: &str) {
+        let folder = Folder::new(&format!("[sweep]\n{plan}\n"));
+        let error = folder.fails(1, "sweep s.toml -o out.csv");
+        assert!(error.contains("s.toml: ") && error.contains(expected), "{plan} said:\n{error}");
+        assert_eq!(folder.names(), [""; 0]);
+    }
+    let vary = |vary: &str, expected: &str| t(&format!("vary = [ {{ {vary} }} ]"), expected);
+    t("vary = []", "[sweep] varies nothing: add [[sweep.vary]]");
+    t("vari = []", "line 22, columns 1-4: unknown field `vari`, expected one of `seed`, `samples`");
+    t("seed = -1\nvary = []", "invalid value: integer `-1`");
+    t(
+        "sampling = \"sobol\"\nvary = []",
+        "unknown variant `sobol`, expected `random` or `latin_hypercube`",
+    );
+    t("results = [\"peak\"]\nvary = []", "unknown variant `peak`");
+    vary("what = \"spede\"", "unknown variant `spede`, expected one of `speed`, `mass`");
+    vary("what = \"speed\", value = [1]", "unknown field `value`");
+    vary("what = \"speed\", values = [\"1m/s\"]", "sweep.vary 1 (speed): name the train: train = ");
+    vary(
+        "what = \"speed\", train = \"C\", values = [\"1m/s\"]",
+        "there is no train \"C\": the scenario has A, B",
+    );
+    vary("what = \"speed\", train = \"A\", values = [\"1\"]", "values: speed \"1\" has no unit");
+    vary(
+        "what = \"speed\", train = \"A\", values = [\"-1m/s\"]",
+        "values: -1m/s is out of range: expected 0 or more",
+    );
+    vary(
+        "what = \"speed\", train = \"A\", vehicle = \"A1\"",
+        "vehicle does not go with what = \"speed\"",
+    );
+    vary("what = \"speed\", train = \"A\", values = [true]", "expected a number, or text");
+    vary(
+        "what = \"mass\", values = [\"1t\"]",
+        "give vehicle = \"…\", or vehicles = […] or \"all\"",
+    );
+    vary(
+        "what = \"mass\", vehicle = \"Z9\", values = [\"1t\"]",
+        "there is no vehicle \"Z9\": the scenario has A1, A2, B1, B2",
+    );
+    vary(
+        "what = \"mass\", vehicles = \"some\", values = [\"1t\"]",
+        "vehicles = \"some\": expected a list, or \"all\"",
+    );
+    vary(
+        "what = \"mass\", vehicles = 3, values = [\"1t\"]",
+        "expected a list of vehicles, or \"all\"",
+    );
+    vary(
+        "what = \"mass\", vehicles = [\"A1\", \"A1\"], values = [\"1t\"]",
+        "vehicles names \"A1\" twice",
+    );
+    vary(
+        "what = \"mass\", vehicle = \"A1\", factor = true, values = [\"1t\"]",
+        "values: \"1t\" is no number",
+    );
+    vary(
+        "what = \"gap\", interface = \"A1|A2\", values = [\"1mm\"]",
+        "interface = \"A1|A2\": expected \"contact\"",
+    );
+    vary(
+        "what = \"gap\", curve = \"inner\", values = [\"1t\"]",
+        "length \"1t\" has the unknown unit \"t\"",
+    );
+    vary(
+        "what = \"gap\", interface = \"contact\", factor = true, values = [1]",
+        "the contact has no gap that a factor could change",
+    );
+    vary("what = \"band\", curve = \"nose\", values = [1]", "curve \"nose\" has no band");
+    vary(
+        "what = \"force\", curve = \"soft\", values = [1]",
+        "no interface has curve \"soft\", so varying it has no effect",
+    );
+    vary("what = \"force\", values = [1]", "name the curve: curve = ");
+    vary(
+        "what = \"curve\", curve = \"nose\", values = [\"hard\"]",
+        "there is no curve \"hard\": the scenario has inner, nose, soft",
+    );
+    vary("what = \"curve\", curve = \"nose\", from = 1, to = 2, steps = 2", "a curve needs values");
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"cauchy\"",
+        "unknown variant `cauchy`",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0",
+        "sd must be above 0",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 1, min = 3, max = 2",
+        "min must lie below max",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 1",
+        "from must lie below to",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"triangular\", from = 1, mode = 3, to = 2",
+        "from, mode and to must rise",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2",
+        "add samples = … to [sweep]",
+    );
+    vary(
+        "what = \"force\", curve = \"nose\", from = 1, to = 2, steps = 1000000000000000000",
+        "the sweep has 1000000000000000000 items: 1000000000000 at most",
+    );
+    t(
+        "samples = 0\nvary = [ { what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2 } ]",
+        "sweep.samples is 0",
+    );
+    t(
+        "sampling = \"latin_hypercube\"\nvary = [ { what = \"force\", curve = \"nose\", values = [1] } ]",
+        "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution",
+    );
+    t(
+        "vary = [ { what = \"force\", curve = \"nose\", values = [1] }, { what = \"force\", curve = \"nose\", values = [2] } ]",
+        "sweep.vary 2 (force): force_factor[nose] is varied twice",
+    );
+    // Without a plan, with one elsewhere, with arguments that make no sense.
+    let folder = Folder::new("");
+    let error = folder.fails(1, "sweep s.toml -o out.csv");
+    assert!(
+        error.contains(
+            "s.toml: there is no [sweep]: add one, or give it in another file with --plan"
+        ),
+        "{error}"
+    );
+    folder.put("p.toml", GRID);
+    folder.ok("sweep s.toml -q --plan p.toml -o out.csv");
+    let inside = Folder::new(GRID);
+    inside.ok("sweep s.toml -q -o out.csv");
+    assert!(folder.read("out.csv") == inside.read("out.csv"));
+    folder.put("p.toml", &GRID.replace("\"A2\"", "\"A3\""));
+    let error = folder.fails(1, "sweep s.toml --plan p.toml -o new.csv");
+    assert!(error.contains("p.toml: sweep.vary 3 (mass): there is no vehicle \"A3\""), "{error}");
+    for (line, expected) in [
+        ("sweep s.toml", "--output"),
+        ("sweep", "SCENARIO"),
+        ("sweep s.toml -o out.xyz", "-o out.xyz: results are written as .csv, .h5 or .hdf5"),
+        ("sweep s.toml --shard 0/3 -o a.csv", "\"0/3\" is no shard: write for example 2/3"),
+        ("sweep s.toml --shard 4/3 -o a.csv", "\"4/3\" is no shard"),
+        ("sweep s.toml --json -o -", "both write to standard output"),
+        ("sweep merge -o all.csv", "SHARDS"),
+    ] {
+        let error = folder.fails(2, line);
+        assert!(error.contains(expected), "{line}: {error}");
+    }
+}
+
+/// A sweep larger than any memory is planned, and its last shard run.
+#[test]
+fn nothing_grows_with_the_number_of_items() {
+    let folder = Folder::new(
+        "[sweep]\nsamples = 1000000000000\nsampling = \"latin_hypercube\"\n\
+         vary = [ { what = \"force\", curve = \"nose\", distribution = \"lognormal\", mean = 1, sd = 0.1 } ]\n",
+    );
+    let preview = folder.json("sweep s.toml --dry-run --json --shard 3/3");
+    assert_eq!(preview["items"], 1_000_000_000_000u64);
+    assert_eq!(preview["first"][0][0], 666_666_666_666u64);
+    folder.ok("sweep s.toml -q --shard 250000000000/250000000000 -o out.csv");
+    let (_, rows) = rows(&folder.text("out.csv"));
+    assert_eq!(rows.len(), 4);
+    assert_eq!(rows[3][0], "999999999999");
+}
+
+/// The example's plan is one that runs.
+#[test]
+fn the_example_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["sweep.toml", "nose.csv", "coupler.csv"] {
+        fs::copy(root().join("examples").join(name), folder.path().join(name)).unwrap();
+    }
+    crumple_ok(folder.path(), &["sweep", "sweep.toml", "--strict", "-o", "out.csv"]);
+    let (_, rows) = rows(&fs::read_to_string(folder.path().join("out.csv")).unwrap());
+    assert_eq!(rows.len(), 100);
+}
+
+#[test]
+fn help_has_examples() {
+    for arguments in [&["sweep", "--help"][..], &["sweep", "merge", "--help"]] {
+        let help = crumple_ok(Path::new("."), arguments);
+        assert!(help.contains("Examples:") && help.contains("crumple sweep merge -o"), "{help}");
+    }
+}
