@@ -63,10 +63,10 @@ pub mod scenario;
 
 pub mod sweep;
 
+pub mod rating;
+
 pub mod validate;
 
 pub mod compare;
-
-pub mod rating;
 
 pub mod file;

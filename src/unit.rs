@@ -345,6 +345,10 @@ text_quantity!(
     SpeedText, |t: &str| SPEED.parse_not_negative(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
 );
 text_quantity!(
+    /// A speed in m/s of either direction, written like `"-18km/h"`.
+    SignedSpeedText, |t: &str| SPEED.parse(t), "^-?[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
+);
+text_quantity!(
     /// A speed in m/s, above zero, written like `"36km/h"`.
     ImpactSpeedText, |t: &str| SPEED.parse_positive(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
 );
@@ -359,6 +363,10 @@ text_quantity!(
 text_quantity!(
     /// A time in s, above zero, written like `"0.75ms"`.
     TimeText, |t: &str| TIME.parse_positive(t), "^[0-9.eE+-]+ *(us|ms|s)$"
+);
+text_quantity!(
+    /// A force in N, zero or above, written like `"1.2MN"`.
+    ForceText, |t: &str| FORCE.parse_not_negative(t), "^[0-9.eE+-]+ *(N|kN|MN)$"
 );
 text_quantity!(
     /// A stiffness in N/m, above zero, written like `"80MN/m"`.

@@ -832,8 +832,10 @@ fn scenarios_choose_the_force() {
         "file = \"a.json\"",
         "database = \"curves.h5\", case = \"lead-car-wall/48kmh\"",
     ] {
-        let (declared, body) = (crush(source), crush(&format!("{source}, force = \"body\"")));
+        let with = |force: &str| crush(&format!("{source}, force = \"{force}\""));
+        let (declared, body) = (with("declared"), with("body"));
         assert!(declared < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {declared} and {body}");
+        assert_eq!(crush(source), body, "{source}: a vehicle of one mass needs the body force");
     }
     scenario("file = \"a.csv\", force = \"body\"");
     let error = crumple_fails(here, 1, &["simulate", "s.toml"]);

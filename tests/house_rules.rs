@@ -36,7 +36,22 @@ const MAY_NAME: [(&str, &[&str]); 22] = [
     ),
     ("sweep", &["scenario", "plan", "multibody", "database", "stream", "manifest", "file", "unit"]),
     ("validate", &["multibody", "surrogate", "dataset", "curve", "history", "unit"]),
-    ("compare", &["validate", "surrogate", "dataset", "curve", "unit"]),
+    (
+        "compare",
+        &[
+            "validate",
+            "scenario",
+            "nsdm",
+            "rating",
+            "multibody",
+            "surrogate",
+            "dataset",
+            "database",
+            "curve",
+            "history",
+            "unit",
+        ],
+    ),
 ];
 
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {

@@ -57,6 +57,7 @@ fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Ca
         sampled: curve.clone(),
         closing_speed_m_per_s: speeds,
         contact_time_s: 0.0,
+        solver_wall_time_s: None,
         unloading_stiffness_n_per_m: unloading_stiffness(&curve),
         audit: audit(&curve, masses, speed),
         original: curve,
@@ -669,7 +670,8 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
         assert_eq!(cases.len(), speeds);
         for case in cases {
             let reference = crumple::validate::motion::Reference::of(case).unwrap();
-            let run = reference.run(&crumple::validate::motion::Driver::recorded(case).unwrap()).unwrap();
+            let run =
+                reference.run(&crumple::validate::motion::Driver::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
             assert!(errors.velocity_l1 < 0.01, "{group} {}: {errors:?}", case.name);
             assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.name);

@@ -1,72 +1,165 @@
-//! `crumple compare`: FE against the methods at a left-out speed.
+//! `crumple compare`: FE against the methods at left-out speeds, or in a whole train.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::compare::{self, Comparison};
+use crumple::compare::train::{TrainComparison, compare_train};
+use crumple::compare::{self, Comparison, Settings};
 use crumple::database::Database;
+use crumple::nsdm::Start;
+use crumple::scenario;
 use crumple::unit::km_per_h;
+use serde::Serialize;
 
 use super::arguments;
 use super::output;
-use super::{CommandResult, Manners, Outcome};
+use super::{CommandResult, Failure, Manners, Outcome};
 
-/// Compare FE with FDRM and DDTCM at a left-out speed, each in the same multi-body model
+/// Compare FE with FDRM, NSDM, DDTCM and the best model, each in the same multi-body model
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple compare curves.h5 --group lead-car-wall --speed 48km/h
-  crumple compare curves.h5 --group lead-car-wall --speed 48km/h --json
+  crumple compare curves.h5 --group lead-car-wall                 # every inner speed, and means
+  crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
+  crumple compare --train train-set.toml
 Rows: fe and fe_body are FE's own curves in the one-mass model, the floors for contact forces and
-for body forces; fdrm is the FE curve of the nearest other speed; ddtcm the reference method's
-forest and spline; best the model that leaving speeds out chooses among the others, by its body
-force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's largest crush; accelerations
-are filtered with CFC 60, in brackets not.")]
+for the body's motion; fdrm is the FE curve of one speed, nsdm the spring and damper fitted to that
+run; ddtcm the reference method's forest and spline; best the model that leaving speeds out chooses
+among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
+largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure.
+With --train, a scenario whose curves are cases of a database runs with the curves of each method,
+and the vehicles' speeds are compared with FE's, which its [reference] names.")]
 pub struct Args {
     /// Curve database
-    database: PathBuf,
+    #[arg(required_unless_present = "train", conflicts_with = "train")]
+    database: Option<PathBuf>,
     /// Group to compare in
-    #[arg(long)]
-    group: String,
-    /// Speed to leave out, with its unit
+    #[arg(long, required_unless_present = "train")]
+    group: Option<String>,
+    /// Speed to leave out, with its unit; every inner speed in turn if absent
     #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true)]
-    speed: f64,
-    /// Seed of the forest
+    speed: Option<f64>,
+    /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent
+    #[arg(long, value_parser = arguments::speed, conflicts_with = "train")]
+    fixed_speed: Option<f64>,
+    /// Scenario of a train with FE's run as reference
+    #[arg(long)]
+    train: Option<PathBuf>,
+    /// Seed of the forest, and first seed of the genetic algorithm
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Fits of the spring and damper, each with its own seed; 0 leaves NSDM out
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    nsdm_seeds: u64,
+    /// Where the genetic algorithm starts
+    #[arg(long, value_enum, default_value_t = NsdmStart::Random)]
+    nsdm_start: NsdmStart,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum NsdmStart {
+    Random,
+    LeastSquares,
+}
+
+/// Comparisons at several speeds.
+#[derive(Serialize)]
+struct Document {
+    comparisons: Vec<Comparison>,
+    /// By method, in the order of the rows.
+    means: Vec<Mean>,
+}
+
+#[derive(Serialize)]
+struct Mean {
+    method: String,
+    velocity_l1: f64,
+    acceleration_l1: f64,
+    acceleration_unfiltered_l1: f64,
+    /// Score of ISO/TS 18571 of velocity and acceleration.
+    velocity_iso18571: f64,
+    acceleration_iso18571: f64,
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
-    let database = Database::read(&args.database)?;
-    let cases = database.group(&args.database, &args.group)?;
-    let comparison = compare::compare(&args.group, cases, args.speed, args.seed)?;
-    if !comparison.inner {
-        manners.warn("the left-out speed is an end of the range: the forest extrapolates");
+    let settings = Settings {
+        seed: args.seed,
+        fixed_speed_m_per_s: args.fixed_speed,
+        nsdm_seeds: args.nsdm_seeds,
+        nsdm_start: match args.nsdm_start {
+            NsdmStart::Random => Start::Random,
+            NsdmStart::LeastSquares => Start::LeastSquares,
+        },
+    };
+    if let Some(path) = &args.train {
+        return train(path, &settings, manners);
     }
-    if manners.json {
-        output::print_json(&comparison)?;
+    let (Some(path), Some(group)) = (&args.database, &args.group) else {
+        return Err(Failure::Usage("name a database and --group, or --train".into()));
+    };
+    let database = Database::read(path)?;
+    let cases = database.group(path, group)?;
+    let speeds = match args.speed {
+        Some(speed) => vec![speed],
+        None => compare::inner_speeds(group, cases)?,
+    };
+    let mut comparisons = Vec::new();
+    for speed in speeds {
+        comparisons.push(compare::compare(group, cases, speed, &settings)?);
+    }
+    let inner = comparisons.iter().all(|c| c.inner);
+    if !inner {
+        manners.warn("the left-out speed is an end of the range: the models extrapolate");
+    }
+    if let (Some(_), [comparison]) = (args.speed, &comparisons[..]) {
+        if manners.json {
+            output::print_json(comparison)?;
+        } else {
+            output::print(|out| print(out, comparison))?;
+        }
     } else {
-        output::print(|out| print(out, &comparison))?;
+        let document = Document { means: means(&comparisons), comparisons };
+        if manners.json {
+            output::print_json(&document)?;
+        } else {
+            output::print(|out| {
+                for comparison in &document.comparisons {
+                    print(out, comparison)?;
+                    writeln!(out)?;
+                }
+                print_means(out, &document)
+            })?;
+        }
     }
-    Ok(if comparison.inner { Outcome::Clean } else { Outcome::Warned })
+    Ok(if inner { Outcome::Clean } else { Outcome::Warned })
+}
+
+fn percent(error: f64) -> String {
+    format!("{:.2} %", error * 100.0)
 }
 
 fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
+    let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!(", run in {t:.0} s"));
     writeln!(
         out,
-        "{} at {} ({}), left out; FE: peak force {:.3} MN, max crush {:.4} m",
+        "{} at {} ({}), left out; FE: peak force {:.3} MN, max crush {:.4} m{fe_time}",
         comparison.group,
         km_per_h(comparison.speed_m_per_s),
         comparison.speed_kind.name(),
         comparison.reference_peak_force_n / 1e6,
         comparison.reference_max_crush_m
     )?;
-    let percent = |error: f64| format!("{:.2} %", error * 100.0);
+    let score = |iso: &Option<crumple::rating::iso18571::Iso18571>| {
+        iso.as_ref().map_or("-".into(), |iso| format!("{:.3}", iso.rating))
+    };
+    let factor = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.3e}"));
     let rows: Vec<Vec<String>> = comparison
         .rows
         .iter()
         .map(|row| {
             vec![
-                row.method.to_string(),
+                row.method.clone(),
                 row.curve.clone(),
                 percent(row.velocity_l1),
                 format!(
@@ -74,11 +167,15 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
                     percent(row.acceleration_l1),
                     row.acceleration_unfiltered_l1 * 100.0
                 ),
-                percent(row.force_l1),
+                format!("{}/{}", score(&row.velocity.iso18571), score(&row.acceleration.iso18571)),
+                row.force_l1.map_or("-".into(), percent),
                 format!("{:.3} MN", row.peak_force_n / 1e6),
                 format!("{:.4} m", row.max_crush_m),
-                format!("{:.2} ms", row.curve_time_s * 1e3),
+                format!("{:.1} ms", row.fit_time_s * 1e3),
+                format!("{:.2} ms", row.predict_time_s * 1e3),
                 format!("{:.2} ms", row.simulation_time_s * 1e3),
+                factor(row.speed_up),
+                factor(row.speed_up_with_training),
             ]
         })
         .collect();
@@ -87,11 +184,165 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         "curve",
         "velocity",
         "acceleration",
+        "ISO v/a",
         "force",
         "peak force",
         "max crush",
-        "fit+predict",
-        "simulation",
+        "fit",
+        "predict",
+        "run",
+        "speed-up",
+        "with training",
     ];
+    output::table(out, &heading, &rows)?;
+    let Some(nsdm) = &comparison.nsdm else { return Ok(()) };
+    let range = |of: fn(&compare::NsdmFit) -> f64| {
+        let all = || nsdm.fits.iter().map(of);
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+        format!("{:.2} to {:.2} %", low * 100.0, high * 100.0)
+    };
+    writeln!(
+        out,
+        "nsdm over {} seeds ({} start): velocity {} at its own {}, {} here; acceleration {} and {}",
+        nsdm.fits.len(),
+        nsdm.start,
+        range(|f| f.own_velocity_l1),
+        km_per_h(nsdm.fitted_at_m_per_s),
+        range(|f| f.velocity_l1),
+        range(|f| f.own_acceleration_l1),
+        range(|f| f.acceleration_l1),
+    )?;
+    if let Some(spread) = &nsdm.identifiability {
+        writeln!(
+            out,
+            "nsdm parameters across seeds: stiffness differs by up to {:.0} % of its mean (on average {:.0} %), damping by {:.0} % ({:.0} %)",
+            spread.stiffness.largest * 100.0,
+            spread.stiffness.mean * 100.0,
+            spread.damping.largest * 100.0,
+            spread.damping.mean * 100.0
+        )?;
+    }
+    Ok(())
+}
+
+fn means(comparisons: &[Comparison]) -> Vec<Mean> {
+    let Some(first) = comparisons.first() else { return Vec::new() };
+    let score = |rating: &crumple::rating::Rating| {
+        rating.iso18571.as_ref().map_or(f64::NAN, |iso| iso.rating)
+    };
+    first
+        .rows
+        .iter()
+        .map(|row| {
+            let all = || {
+                comparisons.iter().flat_map(|c| &c.rows).filter(|other| other.method == row.method)
+            };
+            let mean = |of: &dyn Fn(&compare::Row) -> f64| {
+                all().map(of).sum::<f64>() / all().count() as f64
+            };
+            Mean {
+                method: row.method.clone(),
+                velocity_l1: mean(&|r| r.velocity_l1),
+                acceleration_l1: mean(&|r| r.acceleration_l1),
+                acceleration_unfiltered_l1: mean(&|r| r.acceleration_unfiltered_l1),
+                velocity_iso18571: mean(&|r| score(&r.velocity)),
+                acceleration_iso18571: mean(&|r| score(&r.acceleration)),
+            }
+        })
+        .collect()
+}
+
+fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+    let speeds: Vec<String> =
+        document.comparisons.iter().map(|c| km_per_h(c.speed_m_per_s)).collect();
+    let group = document.comparisons.first().map_or("", |c| &c.group);
+    writeln!(out, "{group}: means over {}, each left out in turn", speeds.join(", "))?;
+    let rows: Vec<Vec<String>> = document
+        .means
+        .iter()
+        .map(|m| {
+            vec![
+                m.method.clone(),
+                format!("{:.1} %", m.velocity_l1 * 100.0),
+                format!(
+                    "{:.1} % ({:.1})",
+                    m.acceleration_l1 * 100.0,
+                    m.acceleration_unfiltered_l1 * 100.0
+                ),
+                format!("{:.3}", m.velocity_iso18571),
+                format!("{:.3}", m.acceleration_iso18571),
+            ]
+        })
+        .collect();
+    let heading = ["method", "velocity", "acceleration", "ISO/TS 18571 v", "a"];
+    output::table(out, &heading, &rows)
+}
+
+/// `compare --train`.
+fn train(path: &PathBuf, settings: &Settings, manners: Manners) -> CommandResult {
+    let scenario = scenario::read(path)?;
+    let comparison = compare_train(path, &scenario, settings)?;
+    let mut warned = false;
+    for row in &comparison.rows {
+        for warning in &row.warnings {
+            warned = true;
+            manners.warn(&format!("{}: {warning}", row.method));
+        }
+    }
+    if manners.json {
+        output::print_json(&comparison)?;
+    } else {
+        output::print(|out| print_train(out, &comparison))?;
+    }
+    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+}
+
+/// Rows of the table of speeds.
+const SPEED_ROWS: usize = 9;
+
+fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<()> {
+    let vehicles: Vec<&String> = comparison.fe.keys().collect();
+    let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!("; FE took {t:.0} s"));
+    writeln!(
+        out,
+        "velocity errors to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
+        comparison.until_s * 1e3
+    )?;
+    let rows: Vec<Vec<String>> = comparison
+        .rows
+        .iter()
+        .map(|row| {
+            let cell = |v: f64, a: f64| format!("{:.1} % ({:.0})", v * 100.0, a * 100.0);
+            let mut cells =
+                vec![row.method.clone(), cell(row.mean_velocity_l1, row.mean_acceleration_l1)];
+            cells.extend(row.vehicles.iter().map(|v| cell(v.velocity_l1, v.acceleration_l1)));
+            cells.push(format!("{:.2} ms", row.simulation_time_s * 1e3));
+            let speeds: Vec<String> = row
+                .interface_speeds_m_per_s
+                .iter()
+                .map(|(name, v)| format!("{name} {}", v.map_or("-".into(), km_per_h)))
+                .collect();
+            cells.push(speeds.join(", "));
+            cells
+        })
+        .collect();
+    let mut heading = vec!["method", "mean"];
+    heading.extend(vehicles.iter().map(|v| v.as_str()));
+    heading.extend(["curves and run", "curves at"]);
+    output::table(out, &heading, &rows)?;
+    writeln!(out, "\nspeeds in m/s")?;
+    let step = comparison.time_s.len().div_ceil(SPEED_ROWS).max(1);
+    let columns = |of: &BTreeMap<String, Vec<f64>>, i: usize| {
+        vehicles.iter().map(|v| format!("{:.2}", of[*v][i])).collect::<Vec<_>>().join(" ")
+    };
+    let mut rows = Vec::new();
+    for i in (0..comparison.time_s.len()).step_by(step) {
+        let mut cells = vec![format!("{:.1} ms", comparison.time_s[i] * 1e3)];
+        cells.push(columns(&comparison.fe, i));
+        cells.extend(comparison.rows.iter().map(|row| columns(&row.velocities, i)));
+        rows.push(cells);
+    }
+    let mut heading = vec!["time", "fe"];
+    heading.extend(comparison.rows.iter().map(|row| row.method.as_str()));
     output::table(out, &heading, &rows)
 }

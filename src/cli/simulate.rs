@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use crumple::file::write_whole;
 use crumple::multibody::integrator::BodyHistory;
-use crumple::multibody::ledger::{ENERGY_TOLERANCE, Ledger, MOMENTUM_TOLERANCE};
-use crumple::multibody::{Run, simulate};
+use crumple::multibody::ledger::Ledger;
+use crumple::multibody::{Run, STANDARD_GRAVITY_M_PER_S2, simulate};
 use crumple::scenario::{self, Prepared};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -27,9 +27,6 @@ pub struct Args {
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
-
-/// Standard gravity, in m/s² (CGPM 1901): decelerations are quoted in g.
-const G_M_PER_S2: f64 = 9.80665;
 
 #[derive(Serialize)]
 struct Summary {
@@ -63,8 +60,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let prepared = scenario::load(&args.scenario)?;
     let run = simulate(&prepared.chain, &prepared.settings)?;
     let mut warnings = prepared.warnings.clone();
-    warnings.extend(ledger_warnings(&run.ledger));
-    warnings.extend(run.warnings.iter().map(|w| w.to_string()));
+    warnings.extend(run.all_warnings());
     for warning in &warnings {
         manners.warn(warning);
     }
@@ -90,23 +86,6 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         })?;
     }
     Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
-}
-
-fn ledger_warnings(ledger: &Ledger) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if ledger.max_energy_error > ENERGY_TOLERANCE {
-        warnings.push(format!(
-            "energy is off by {:.2e} of the initial kinetic energy (tolerance {ENERGY_TOLERANCE:e}): shorten the step",
-            ledger.max_energy_error
-        ));
-    }
-    if ledger.max_momentum_error > MOMENTUM_TOLERANCE {
-        warnings.push(format!(
-            "momentum is off by {:.2e} (tolerance {MOMENTUM_TOLERANCE:e}): shorten the step",
-            ledger.max_momentum_error
-        ));
-    }
-    warnings
 }
 
 /// Column names and values, in the order of the scenario.
@@ -161,7 +140,7 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
         name: prepared.chain.bodies()[i].name.clone(),
         final_v_m_per_s: run.bodies[i].v_m_per_s.last().copied().unwrap_or(0.0),
         mean_deceleration_m_per_s2: run.bodies[i].mean_deceleration_m_per_s2,
-        mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / G_M_PER_S2,
+        mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
     };
     let interfaces = prepared
         .chain

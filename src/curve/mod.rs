@@ -190,6 +190,8 @@ pub struct Case {
     pub original: Curve,
     /// Solver's time of the first contact, in s; curves count from it.
     pub contact_time_s: f64,
+    /// Time by the clock that the solver took for the run, in s, if the run's folder tells.
+    pub solver_wall_time_s: Option<f64>,
     /// Secant of the unloading branch between 90 % and 10 % of its force, in N/m;
     /// `None` if the record ends before.
     pub unloading_stiffness_n_per_m: Option<f64>,

@@ -52,6 +52,9 @@ fn encode_case(case: &Case, group: &mut GroupBuilder) -> Result<(), DatabaseErro
     group.set_attr("parameters", text(&json(serde_json::to_string(&case.parameters))?));
     group.set_attr("force_kind", text(case.force_kind.name()));
     group.set_attr("contact_time_s", AttrValue::F64(case.contact_time_s));
+    if let Some(time_s) = case.solver_wall_time_s {
+        group.set_attr("solver_wall_time_s", AttrValue::F64(time_s));
+    }
     group.set_attr("loading_end", AttrValue::I64(case.loading_end() as i64));
     group.set_attr("max_deflection_m", AttrValue::F64(case.max_deflection_m()));
     group.set_attr("truncated", AttrValue::U8(case.is_truncated().into()));
@@ -224,6 +227,7 @@ fn decode_case(
         closing_speed_m_per_s,
         original,
         contact_time_s: attrs.number("contact_time_s")?,
+        solver_wall_time_s: attrs.optional_number("solver_wall_time_s")?,
         unloading_stiffness_n_per_m: attrs.optional_number("unloading_stiffness_N_per_m")?,
         audit: EnergyAudit {
             work_j: attrs.number("work_J")?,

@@ -558,7 +558,7 @@ pub(super) fn run(
     record: Record,
     run: &mut Run,
     steps_per_output: usize,
-    outputs: usize,
+    (outputs, interval_s): (usize, f64),
 ) -> Result<(), SimulationError> {
     let h = run.step_s;
     let ahead = ahead(method);
@@ -567,7 +567,7 @@ pub(super) fn run(
     engine.outputs_left = outputs;
     engine.output(run, &mut account, record, 0.0);
     for output in 1..=outputs {
-        let time_s = output as f64 * steps_per_output as f64 * h;
+        let time_s = output as f64 * interval_s;
         engine.kick(ahead * h);
         engine.on_wall(At::End, ahead * h);
         steps(&mut engine, method, (output - 1) * steps_per_output, steps_per_output)?;

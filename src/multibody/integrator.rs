@@ -214,7 +214,10 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
     run.reserve(outputs + 1, settings.record);
     match settings.method {
         Method::Reference => extrapolation::run(chain, settings, &mut run, outputs)?,
-        method => engine::run(chain, method, settings.record, &mut run, per_output, outputs)?,
+        method => {
+            let times = (outputs, settings.output_interval_s);
+            engine::run(chain, method, settings.record, &mut run, per_output, times)?;
+        }
     }
     for (k, history) in run.interfaces.iter().enumerate() {
         let (deflection_m, end_m) = (history.max_deflection_m, chain.interfaces()[k].law.end_m());
@@ -250,6 +253,13 @@ fn steps(chain: &Chain, settings: &RunSettings) -> Result<(f64, usize, usize), S
 }
 
 impl Run {
+    /// All that a user must know, as text.
+    pub fn all_warnings(&self) -> Vec<String> {
+        let mut warnings = self.ledger.warnings();
+        warnings.extend(self.warnings.iter().map(|w| w.to_string()));
+        warnings
+    }
+
     fn reserve(&mut self, outputs: usize, record: Record) {
         for b in &mut self.bodies {
             // The moving mean needs the speeds in any case.

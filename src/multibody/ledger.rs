@@ -32,6 +32,26 @@ pub struct Ledger {
     pub max_momentum_error: f64,
 }
 
+impl Ledger {
+    /// What is out of tolerance.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.max_energy_error > ENERGY_TOLERANCE {
+            warnings.push(format!(
+                "energy is off by {:.2e} of the initial kinetic energy (tolerance {ENERGY_TOLERANCE:e}): shorten the step",
+                self.max_energy_error
+            ));
+        }
+        if self.max_momentum_error > MOMENTUM_TOLERANCE {
+            warnings.push(format!(
+                "momentum is off by {:.2e} (tolerance {MOMENTUM_TOLERANCE:e}): shorten the step",
+                self.max_momentum_error
+            ));
+        }
+        warnings
+    }
+}
+
 /// Imbalance of energy over which a warning is due.
 pub const ENERGY_TOLERANCE: f64 = 1e-3;
 /// Imbalance of momentum over which a warning is due.

@@ -17,4 +17,6 @@ mod watch;
 pub use damping::Damping;
 pub use integrator::{Method, Record, Run, RunSettings, RunWarning, SimulationError, simulate};
 pub use interface::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
-pub use train::{Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2};
+pub use train::{
+    Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension,
+};

@@ -449,6 +449,7 @@ impl LocatedRun<'_> {
             closing_speed_m_per_s: extracted.closing_speed_m_per_s,
             original: extracted.original,
             contact_time_s: extracted.contact_time_s,
+            solver_wall_time_s: self.solver_wall_time_s(),
             unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
             audit: extracted.audit,
             recipe: self.recipe.clone(),
@@ -461,6 +462,15 @@ impl LocatedRun<'_> {
             notes,
             warnings,
         })
+    }
+
+    /// `engine_wall_time_s` of the case.json in the run's folder, if there is one.
+    fn solver_wall_time_s(&self) -> Option<f64> {
+        let text =
+            std::fs::read_to_string(self.study.folder.join(&self.entry.path).join("case.json"))
+                .ok()?;
+        let case: serde_json::Value = serde_json::from_str(&text).ok()?;
+        case.get("engine_wall_time_s")?.as_f64().filter(|t| *t > 0.0 && t.is_finite())
     }
 
     /// The manifest's units, or those that the deck states.

@@ -204,6 +204,25 @@ pub enum PredictError {
 /// [`PredictError`] if the speed is not above 0, a parameter is missing, the rule gives no
 /// maximal crush, or an energy correction is out of bounds.
 pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictError> {
+    predict_beyond(model, query).map(|(curve, _)| curve)
+}
+
+/// The forces of a model along even deflections beyond any maximal crush, in N: neighbours in
+/// a train push on where a body by itself would have stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beyond {
+    pub declared: Envelope,
+    pub body: Envelope,
+}
+
+/// As [`predict`], with the forces beyond the maximal crush.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_beyond(
+    model: &Model,
+    query: &Query,
+) -> Result<(PredictedCurve, Beyond), PredictError> {
     let v = query.speed_m_per_s;
     if !(v > 0.0 && v.is_finite()) {
         return Err(PredictError::Speed { speed_m_per_s: v });
@@ -297,6 +316,7 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
         Ok(Envelope::new(deflection_m.clone(), force_n)?)
     };
     let envelope = corrected(force_n, true, &mut warnings)?;
+    let beyond = Beyond { declared, body: body.clone() };
     let body = match model.has_body_force() {
         true => Some(corrected(body_n, false, &mut warnings)?),
         false => None,
@@ -332,7 +352,7 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
     let band = model.leave_one_out.as_ref().and_then(|v| v.band);
     let (force_low_n, force_high_n) = band.map(|b| b.around(envelope.force_n())).unzip();
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
-    Ok(PredictedCurve {
+    let curve = PredictedCurve {
         // A softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),
         rebound,
@@ -371,7 +391,8 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictEr
             band,
             parameters,
         },
-    })
+    };
+    Ok((curve, beyond))
 }
 
 /// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands

@@ -8,8 +8,7 @@ use rayon::prelude::*;
 
 use super::row::{Row, Status};
 use super::{Sweep, SweepError};
-use crate::multibody::ledger::{ENERGY_TOLERANCE, MOMENTUM_TOLERANCE};
-use crate::multibody::{Run, simulate};
+use crate::multibody::{Record, Run, RunSettings, simulate};
 use crate::plan::ResultName;
 use crate::scenario::{self, Prepared, Scenario};
 
@@ -149,7 +148,9 @@ impl<'a> Worker<'a> {
     fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, String> {
         let sweep = self.sweep;
         let prepared = self.prepared()?;
-        let run = simulate(&prepared.chain, &prepared.settings).map_err(|e| e.to_string())?;
+        // A row needs the summary only.
+        let settings = RunSettings { record: Record::Summary, ..prepared.settings };
+        let run = simulate(&prepared.chain, &settings).map_err(|e| e.to_string())?;
         push_results(&sweep.results, prepared, &run, values);
         // What holds for the scenario as written has been said once; here it has other numbers.
         let said = |w: &String| {
@@ -161,7 +162,7 @@ impl<'a> Worker<'a> {
                 all.push(warning.clone());
             }
         }
-        all.extend(warnings(prepared, &run));
+        all.extend(run.all_warnings());
         Ok(all)
     }
 
@@ -213,7 +214,7 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
                 values.extend(interfaces.map(|i| i.restitution.unwrap_or(f64::NAN)));
             }
             ResultName::FinalSpeed => {
-                values.extend(bodies().map(|b| b.v_m_per_s.last().copied().unwrap_or(f64::NAN)));
+                values.extend(bodies().map(|b| b.final_v_m_per_s));
             }
             ResultName::MeanDeceleration => {
                 values.extend(bodies().map(|b| b.mean_deceleration_m_per_s2));
@@ -222,25 +223,4 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
             ResultName::MomentumError => values.push(run.ledger.max_momentum_error),
         }
     }
-}
-
-/// What a single run would warn of.
-fn warnings(prepared: &Prepared, run: &Run) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if run.ledger.max_energy_error > ENERGY_TOLERANCE {
-        warnings.push(format!("energy is off by {:.2e}", run.ledger.max_energy_error));
-    }
-    if run.ledger.max_momentum_error > MOMENTUM_TOLERANCE {
-        warnings.push(format!("momentum is off by {:.2e}", run.ledger.max_momentum_error));
-    }
-    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
-        let (crush, end) = (history.max_deflection_m, interface.law.end_m());
-        if crush > end {
-            warnings.push(format!(
-                "interface {} is crushed {crush:.4} m, beyond the end of its curve at {end:.4} m",
-                interface.name
-            ));
-        }
-    }
-    warnings
 }

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
-use crate::scenario::{Scenario, TrainTable};
-use crate::unit::{LengthText, MassText, SpeedText};
+use crate::scenario::{InterfaceSpeed, Scenario, TrainTable};
+use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
 pub struct Variable {
@@ -288,7 +288,11 @@ impl Variable {
             Target::Speed(_) | Target::Mass(_) => {
                 scenario.curves.values().any(|c| c.model.is_some())
             }
-            Target::ContactGap | Target::CurveGap(_) => false,
+            // Gaps decide how fast interfaces close that have a curve for their own speed.
+            Target::ContactGap | Target::CurveGap(_) => {
+                scenario.run.interface_speed == InterfaceSpeed::Local
+                    && scenario.curves.values().any(|c| c.model.is_some())
+            }
         }
     }
 
@@ -324,7 +328,7 @@ impl Variable {
         match &self.target {
             Target::Speed(train) => {
                 let train = &mut scenario.train[*train];
-                train.speed = SpeedText(with(train.speed.0));
+                train.speed = SignedSpeedText(with(train.speed.0));
             }
             Target::Mass(vehicles) => {
                 for &(t, v) in vehicles {

@@ -156,21 +156,69 @@ impl Reference {
         Ok(simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?)
     }
 
+    /// Times of the states that are compared and a little more, in s.
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// States inside the window of the comparison.
+    pub fn inside(&self) -> usize {
+        self.inside
+    }
+
+    /// FE's closing speed at [`time_s`](Self::time_s), in m/s.
+    pub fn velocity(&self) -> &[f64] {
+        &self.velocity
+    }
+
+    /// Its central differences, in m/s².
+    pub fn acceleration(&self) -> &[f64] {
+        &self.acceleration
+    }
+
+    pub fn mass_kg(&self) -> f64 {
+        self.mass_kg
+    }
+
+    pub fn speed_m_per_s(&self) -> f64 {
+        self.speed_m_per_s
+    }
+
+    /// FE's and another motion's accelerations inside the window, CFC 60, from speeds at
+    /// [`time_s`](Self::time_s).
+    pub fn filtered_accelerations(&self, velocity: &[f64]) -> (&[f64], Vec<f64>) {
+        let mut smooth = filtered(&self.time_s, derivative(&self.time_s, velocity));
+        smooth.truncate(self.inside);
+        (&self.acceleration_filtered[..self.inside], smooth)
+    }
+
+    /// A run's first body's speeds at [`time_s`](Self::time_s).
+    ///
+    /// # Errors
+    /// [`MotionError::RunTooShort`] if the run ends before the window.
+    pub fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, MotionError> {
+        interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s)
+            .map_err(|_| MotionError::RunTooShort { case: self.case.clone() })
+    }
+
     /// Errors of a run's first body.
     ///
     /// # Errors
     /// [`MotionError::RunTooShort`] if the run ends before the window.
     pub fn errors(&self, run: &Run) -> Result<MotionErrors, MotionError> {
-        let velocity = interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s)
-            .map_err(|_| MotionError::RunTooShort { case: self.case.clone() })?;
-        let acceleration = derivative(&self.time_s, &velocity);
+        Ok(self.errors_of(&self.velocity_of(run)?))
+    }
+
+    /// Errors of speeds at [`time_s`](Self::time_s).
+    pub fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
+        let acceleration = derivative(&self.time_s, velocity);
         let smooth = filtered(&self.time_s, acceleration.clone());
         let inside =
             |values: &[f64], other: &[f64]| l1_ratio(&values[..self.inside], &other[..self.inside]);
-        Ok(MotionErrors {
-            velocity_l1: inside(&self.velocity, &velocity),
+        MotionErrors {
+            velocity_l1: inside(&self.velocity, velocity),
             acceleration_l1: inside(&self.acceleration_filtered, &smooth),
             acceleration_unfiltered_l1: inside(&self.acceleration, &acceleration),
-        })
+        }
     }
 }

@@ -1,0 +1,345 @@
+//! Trains: every method's curves in one scenario, against FE's run of the whole train.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CompareError, Settings, nsdm_target};
+use crate::curve::Case;
+use crate::curve::body::filtered;
+use crate::curve::rating::l1_ratio;
+use crate::curve::resample::interpolate;
+use crate::database::{Database, DatabaseError};
+use crate::dataset::TrainingSet;
+use crate::history::{EntityId, derivative};
+use crate::multibody::simulate;
+use crate::nsdm;
+use crate::scenario::{
+    self, DampingTable, EndName, ForceName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
+    ScenarioError, Source, Sources,
+};
+use crate::solver::{self, ReadError, Selection, WantedId};
+use crate::surrogate::forest::ForestOptions;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::{Model, Options};
+use crate::validate::motion::Reference;
+use crate::validate::{self, Choice};
+
+/// FE's motion of a train: time from the first contact on, speeds positive in the direction
+/// in which the first train moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeTrain {
+    pub time_s: Vec<f64>,
+    /// Vehicle, as the scenario names it, and its speed in m/s at each time.
+    pub velocities: Vec<(String, Vec<f64>)>,
+    /// Time by the clock that FE took, in s.
+    pub wall_time_s: Option<f64>,
+}
+
+impl FeTrain {
+    /// Reads what a scenario's reference names; `path` is the scenario's.
+    ///
+    /// # Errors
+    /// [`TrainError`] names the file, node or component.
+    pub fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let file = folder.join(&reference.file);
+        let selection = Selection {
+            ids: Some(reference.nodes.values().map(|&id| WantedId { id, side: None }).collect()),
+            components: Some(vec![reference.component.clone()]),
+            ..Selection::all()
+        };
+        let read = solver::read(&file, None, &selection)?;
+        let units = reference.units;
+        let contact_s = reference.contact.map_or(0.0, |t| t.0);
+        let first = read.time.iter().take_while(|&&t| t * units.time_s < contact_s).count();
+        let time_s = read.time[first..].iter().map(|t| t * units.time_s - contact_s).collect();
+        let mut velocities = Vec::new();
+        for (name, &node) in &reference.nodes {
+            let missing = || TrainError::NoHistory {
+                path: file.clone(),
+                node,
+                component: reference.component.clone(),
+            };
+            let history = read.history(Some(EntityId::new(node)), &reference.component);
+            let values = &history.ok_or_else(missing)?.values[first..];
+            if values.iter().any(|v| !v.is_finite()) {
+                return Err(missing());
+            }
+            velocities.push((name.clone(), values.iter().map(|v| v * units.speed()).collect()));
+        }
+        // The first train moves forwards, whichever way it went in FE.
+        let fastest = velocities
+            .iter()
+            .filter_map(|(_, v): &(String, Vec<f64>)| v.first().copied())
+            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        if fastest < 0.0 {
+            velocities.iter_mut().for_each(|(_, v)| v.iter_mut().for_each(|v| *v = -*v));
+        }
+        let case = std::fs::read_to_string(file.with_file_name("case.json")).ok();
+        let wall_time_s = case
+            .and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok())
+            .and_then(|case| case.get("engine_wall_time_s")?.as_f64());
+        Ok(Self { time_s, velocities, wall_time_s })
+    }
+}
+
+/// Every method in one train.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TrainComparison {
+    /// Compared from 0 to here.
+    pub until_s: f64,
+    pub time_s: Vec<f64>,
+    /// FE's speeds in m/s.
+    pub fe: BTreeMap<String, Vec<f64>>,
+    pub fe_time_s: Option<f64>,
+    pub rows: Vec<TrainRow>,
+}
+
+/// One method in the train.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TrainRow {
+    /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
+    /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
+    /// each interface's own).
+    pub method: String,
+    /// Means over the vehicles of the two below.
+    pub mean_velocity_l1: f64,
+    pub mean_acceleration_l1: f64,
+    pub vehicles: Vec<VehicleErrors>,
+    /// Speed each interface's curve is for, in m/s; null where no speed belongs to it.
+    pub interface_speeds_m_per_s: BTreeMap<String, Option<f64>>,
+    pub fit_time_s: f64,
+    /// Curves and run.
+    pub simulation_time_s: f64,
+    pub warnings: Vec<String>,
+    /// Speeds in m/s at the times of the comparison.
+    pub velocities: BTreeMap<String, Vec<f64>>,
+}
+
+/// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct VehicleErrors {
+    pub vehicle: String,
+    pub velocity_l1: f64,
+    /// CFC 60 on both sides.
+    pub acceleration_l1: f64,
+}
+
+/// Why a train cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    #[error(
+        "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\""
+    )]
+    NotACase { curve: String },
+    #[error("the scenario has no vehicle \"{name}\": its vehicles are {known}")]
+    NoVehicle { name: String, known: String },
+    #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
+    TooShort { states: usize, until_s: f64 },
+    #[error("the scenario has no [reference]: it names FE's run of the train")]
+    NoReference,
+    #[error(
+        "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
+    )]
+    NoHistory { path: PathBuf, node: i64, component: String },
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error(transparent)]
+    Scenario(#[from] Box<ScenarioError>),
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+}
+
+impl From<ScenarioError> for CompareError {
+    fn from(error: ScenarioError) -> Self {
+        TrainError::from(Box::new(error)).into()
+    }
+}
+
+/// A method: what it makes of the scenario and its sources.
+struct Method<'a> {
+    name: &'a str,
+    scenario: Scenario,
+    sources: Sources,
+    fit_time_s: f64,
+}
+
+/// Runs `scenario`, whose curves are cases of a database, by every method, and compares the
+/// vehicles' speeds with its reference.
+///
+/// # Errors
+/// [`CompareError`] names the curve, vehicle or method.
+pub fn compare_train(
+    path: &Path,
+    scenario: &Scenario,
+    settings: &Settings,
+) -> Result<TrainComparison, CompareError> {
+    let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
+    let fe = &FeTrain::read(path, reference).map_err(CompareError::from)?;
+    let until_s = reference.until.map_or(f64::MAX, |t| t.0);
+    let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
+    if states < 3 {
+        return Err(TrainError::TooShort { states, until_s }.into());
+    }
+    let time_s = &fe.time_s[..states];
+    let sources = Sources::read(path, scenario)?;
+    let mut rows = Vec::new();
+    for method in methods(path, scenario, &sources, settings)? {
+        rows.push(row(path, method, fe, time_s)?);
+    }
+    Ok(TrainComparison {
+        until_s: time_s[states - 1],
+        time_s: time_s.to_vec(),
+        fe: fe.velocities.iter().map(|(n, v)| (n.clone(), v[..states].to_vec())).collect(),
+        fe_time_s: fe.wall_time_s,
+        rows,
+    })
+}
+
+/// The case that each curve names and the group around it.
+fn groups(
+    path: &Path,
+    scenario: &Scenario,
+) -> Result<BTreeMap<String, (Case, Vec<Case>)>, CompareError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut groups = BTreeMap::new();
+    for (name, table) in &scenario.curves {
+        let not_a_case = || TrainError::NotACase { curve: name.clone() };
+        let file = folder.join(table.database.as_ref().ok_or_else(not_a_case)?);
+        let case = table.case.as_deref().and_then(|c| c.split_once('/'));
+        let (group, case) = case.ok_or_else(not_a_case)?;
+        let database = Database::read(&file).map_err(TrainError::from)?;
+        let cases = database.group(&file, group).map_err(TrainError::from)?;
+        let case = database.case(&file, group, case).map_err(TrainError::from)?;
+        groups.insert(name.clone(), (case.clone(), cases.to_vec()));
+    }
+    Ok(groups)
+}
+
+fn methods<'a>(
+    path: &Path,
+    scenario: &Scenario,
+    sources: &Sources,
+    settings: &Settings,
+) -> Result<Vec<Method<'a>>, CompareError> {
+    let groups = groups(path, scenario)?;
+    let with = |change: &dyn Fn(&mut scenario::CurveTable)| {
+        let mut scenario = scenario.clone();
+        scenario.curves.values_mut().for_each(change);
+        scenario
+    };
+    let mut methods = Vec::new();
+    let mut add = |name, scenario, sources, fit_time_s| {
+        methods.push(Method { name, scenario, sources, fit_time_s });
+    };
+    add("fe_body", with(&|table| table.force = None), sources.clone(), 0.0);
+    add("fdrm", with(&|table| table.force = Some(ForceName::Declared)), sources.clone(), 0.0);
+
+    if settings.nsdm_seeds > 0 {
+        let start = Instant::now();
+        let (mut changed, mut springs) = (scenario.clone(), sources.clone());
+        for (name, (case, _)) in &groups {
+            let target = nsdm_target(&Reference::of(case)?)?;
+            let choices =
+                nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
+            let seeds: Vec<u64> = (settings.seed..settings.seed + settings.nsdm_seeds).collect();
+            let fits = nsdm::fit_seeds(&target, &choices, &seeds)?;
+            let best = fits.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective));
+            let (Some(fit), Some(table)) = (best, changed.curves.get_mut(name)) else { continue };
+            table.law = LawName::Elastic;
+            table.end = EndName::Slope;
+            table.damping = Some(DampingTable {
+                speed_m_per_s: fit.model.damping.nodes().to_vec(),
+                coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
+            });
+            springs.replace(name, Source::Table(fit.model.envelope()?));
+        }
+        add("nsdm", changed, springs, start.elapsed().as_secs_f64());
+    }
+
+    let start = Instant::now();
+    let mut forests = sources.clone();
+    let options = Options::Forest(ForestOptions { seed: settings.seed, ..ForestOptions::paper() });
+    for (name, (case, cases)) in &groups {
+        let mut model = Model::fit(&TrainingSet::new(&case.group, cases)?, options)?;
+        // The paper's rule; beyond its speeds and masses the motion is asked.
+        model.max_crush_rule = MaxCrushRule::Spline;
+        forests.replace(name, Source::Model(Box::new(model)));
+    }
+    let mut paper = with(&|table| table.force = Some(ForceName::Declared));
+    paper.run.interface_speed = InterfaceSpeed::Train;
+    add("ddtcm", paper, forests, start.elapsed().as_secs_f64());
+
+    let start = Instant::now();
+    let mut best = sources.clone();
+    for (name, (case, cases)) in &groups {
+        let choice = Choice::Auto { seed: settings.seed, trees: None };
+        let model = validate::train(&case.group, cases, choice)?;
+        best.replace(name, Source::Model(Box::new(model)));
+    }
+    let fit_s = start.elapsed().as_secs_f64();
+    for (name, speed) in
+        [("best_train", InterfaceSpeed::Train), ("best_local", InterfaceSpeed::Local)]
+    {
+        let mut changed = with(&|table| table.force = None);
+        changed.run.interface_speed = speed;
+        add(name, changed, best.clone(), fit_s);
+    }
+    Ok(methods)
+}
+
+fn row(
+    path: &Path,
+    method: Method<'_>,
+    fe: &FeTrain,
+    time_s: &[f64],
+) -> Result<TrainRow, CompareError> {
+    let start = Instant::now();
+    let prepared = scenario::assemble(path, &method.scenario, &method.sources)?;
+    let run = simulate(&prepared.chain, &prepared.settings)?;
+    let simulation_time_s = start.elapsed().as_secs_f64();
+    let bodies = prepared.chain.bodies();
+    let (mut vehicles, mut velocities) = (Vec::new(), BTreeMap::new());
+    for (name, reference) in &fe.velocities {
+        let Some(i) = bodies.iter().position(|b| b.name == *name) else {
+            let known: Vec<&str> = bodies.iter().map(|b| b.name.as_str()).collect();
+            return Err(
+                TrainError::NoVehicle { name: name.clone(), known: known.join(", ") }.into()
+            );
+        };
+        let reference = &reference[..time_s.len()];
+        let ours = interpolate(&run.time_s, &run.bodies[i].v_m_per_s, time_s).map_err(|_| {
+            TrainError::TooShort { states: run.time_s.len(), until_s: time_s[time_s.len() - 1] }
+        })?;
+        let acceleration = |v: &[f64]| filtered(time_s, derivative(time_s, v));
+        vehicles.push(VehicleErrors {
+            vehicle: name.clone(),
+            velocity_l1: l1_ratio(reference, &ours),
+            acceleration_l1: l1_ratio(&acceleration(reference), &acceleration(&ours)),
+        });
+        velocities.insert(name.clone(), ours);
+    }
+    let mean = |of: fn(&VehicleErrors) -> f64| {
+        vehicles.iter().map(of).sum::<f64>() / vehicles.len().max(1) as f64
+    };
+    let names = prepared.chain.interfaces().iter().map(|i| i.name.clone());
+    let mut warnings = prepared.warnings.clone();
+    warnings.extend(run.all_warnings());
+    Ok(TrainRow {
+        method: method.name.into(),
+        mean_velocity_l1: mean(|v| v.velocity_l1),
+        mean_acceleration_l1: mean(|v| v.acceleration_l1),
+        interface_speeds_m_per_s: names
+            .zip(prepared.used.iter().map(|u| u.speed_m_per_s))
+            .collect(),
+        vehicles,
+        fit_time_s: method.fit_time_s,
+        simulation_time_s,
+        warnings,
+        velocities,
+    })
+}

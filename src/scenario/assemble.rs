@@ -1,0 +1,187 @@
+//! Assembly: bodies, interfaces and their laws become a chain.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::check::check;
+use super::layout::{Layout, Role, Slot, layout};
+use super::spring::{SpringError, spring};
+use super::{InterfaceSpeed, Prepared, Scenario, ScenarioError, Source, Sources, Used, local};
+use crate::multibody::{Chain, Damping, ForceLaw, Interface, Method, RunSettings, Tension};
+use crate::unit::SpeedKind;
+
+/// Puts a scenario together with what its files hold; `path` is for messages. Interfaces whose
+/// curves come from models get them for their own closing speeds, unless the scenario asks for
+/// the trains' speed.
+///
+/// # Errors
+/// [`ScenarioError`] names the key or curve.
+pub fn assemble(
+    path: &Path,
+    scenario: &Scenario,
+    sources: &Sources,
+) -> Result<Prepared, ScenarioError> {
+    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
+    let obstacle_speed = check(scenario).map_err(invalid)?;
+    let meeting = scenario.train[0].speed.0 - obstacle_speed;
+    let nominal = vec![meeting; layout(scenario).slots.len()];
+    let prepared = assemble_at(path, scenario, sources, &nominal)?;
+    match scenario.run.interface_speed == InterfaceSpeed::Local && has_local(scenario, sources) {
+        true => local::settle(path, scenario, sources, prepared, nominal),
+        false => Ok(prepared),
+    }
+}
+
+/// Whether some interface between vehicles takes its curve from a model.
+pub(super) fn has_local(scenario: &Scenario, sources: &Sources) -> bool {
+    layout(scenario).slots.iter().any(|slot| is_local(slot, sources))
+}
+
+/// Whether a slot's curve depends on its own closing speed.
+pub(super) fn is_local(slot: &Slot<'_>, sources: &Sources) -> bool {
+    slot.role == Role::Vehicles && matches!(sources.curves.get(slot.curve), Some(Source::Model(_)))
+}
+
+/// The same with given speeds for the curves of the interfaces, in the order of the chain.
+pub(super) fn assemble_at(
+    path: &Path,
+    scenario: &Scenario,
+    sources: &Sources,
+    speeds_m_per_s: &[f64],
+) -> Result<Prepared, ScenarioError> {
+    let Layout { bodies, slots, order } = layout(scenario);
+    let mut builder = Builder { path, scenario, sources, made: Vec::new(), warnings: Vec::new() };
+    let (mut interfaces, mut used) = (Vec::new(), Vec::new());
+    for (slot, &speed) in slots.iter().zip(speeds_m_per_s) {
+        let made = builder.law(slot, slot.curve, speed)?;
+        let table = &scenario.curves[slot.curve];
+        let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
+        let mut interface = Interface::new(slot.name.clone(), made.law, gap_m);
+        if let Some(name) = &table.tension {
+            let slack_m = scenario.curves[name].gap.map_or(0.0, |g| g.0);
+            interface.tension = Some(Tension { law: builder.law(slot, name, speed)?.law, slack_m });
+        }
+        if let Some(damping) = &table.damping {
+            let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
+            let damping = Damping::new(points.0, points.1).map_err(|e| ScenarioError::Invalid {
+                path: path.into(),
+                message: format!("curve \"{}\": {e}", slot.curve),
+            })?;
+            interface.damping = Some(damping);
+        }
+        interfaces.push(interface);
+        used.push(made.used);
+    }
+    let chain = Chain::new(bodies, interfaces)
+        .map_err(|source| ScenarioError::Chain { path: path.into(), source })?;
+    let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0)
+        .with_method(Method::from(scenario.run.method));
+    let settings = scenario.run.step.map_or(settings, |step| settings.with_step(step.0));
+    let mut warnings: Vec<String> = Vec::new();
+    for warning in builder.warnings {
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
+    }
+    Ok(Prepared { chain, settings, order, used, warnings })
+}
+
+/// Gives a chain put together by [`assemble`] the masses, speeds and gaps of `scenario`, which
+/// differs from the one it was made of in nothing else; the force laws stay as they are. That
+/// is right wherever no law depends on these: a model's curve does, on masses and speeds, and
+/// on gaps too if it is sought for the interface's own speed.
+///
+/// # Errors
+/// [`ScenarioError`] as of [`assemble`]; the chain is then not to be run.
+pub fn adjust(
+    path: &Path,
+    scenario: &Scenario,
+    prepared: &mut Prepared,
+) -> Result<(), ScenarioError> {
+    check(scenario).map_err(|message| ScenarioError::Invalid { path: path.into(), message })?;
+    let Layout { bodies, slots, .. } = layout(scenario);
+    let motions: Vec<(f64, f64)> = bodies.iter().map(|b| (b.mass_kg, b.speed_m_per_s)).collect();
+    let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
+    let gaps: Vec<f64> =
+        slots.iter().map(|slot| slot.gap_m.unwrap_or_else(|| own(slot.curve))).collect();
+    let failed = |source| ScenarioError::Chain { path: path.into(), source };
+    prepared.chain.adjust(&motions, &gaps).map_err(failed)
+}
+
+/// A law that has been made, and for what.
+#[derive(Clone)]
+struct Made {
+    curve: String,
+    /// What decides it: role, speed and mass if a model gives it, whether vehicles are split.
+    key: (bool, bool, bool, u64, u64),
+    law: Arc<ForceLaw>,
+    used: Used,
+}
+
+struct Builder<'a> {
+    path: &'a Path,
+    scenario: &'a Scenario,
+    sources: &'a Sources,
+    made: Vec<Made>,
+    warnings: Vec<String>,
+}
+
+impl Builder<'_> {
+    /// The law of a curve at a slot: made once for all slots that need the same.
+    fn law(&mut self, slot: &Slot<'_>, curve: &str, speed: f64) -> Result<Made, ScenarioError> {
+        let invalid = |message: String| ScenarioError::Invalid { path: self.path.into(), message };
+        let table = self.scenario.curves.get(curve).ok_or_else(|| {
+            let known: Vec<&str> = self.scenario.curves.keys().map(String::as_str).collect();
+            invalid(format!(
+                "there is no curve \"{curve}\" in [curves]: it has {}",
+                known.join(", ")
+            ))
+        })?;
+        let source = self
+            .sources
+            .curves
+            .get(curve)
+            .ok_or_else(|| invalid(format!("curve \"{curve}\" has not been read")))?;
+        let is_model = matches!(source, Source::Model(_));
+        let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
+        let key = (
+            slot.role == Role::Wall,
+            slot.role == Role::Within,
+            slot.split,
+            of_model(speed),
+            of_model(slot.mass_kg),
+        );
+        if let Some(made) = self.made.iter().find(|m| m.curve == curve && m.key == key) {
+            return Ok(made.clone());
+        }
+        let mut spring = spring(source, table, slot, speed).map_err(|e| match e {
+            SpringError::Message(message) => invalid(format!("curve \"{curve}\": {message}")),
+            SpringError::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
+        })?;
+        let expected = match slot.role {
+            Role::Wall => Some(SpeedKind::Wall),
+            Role::Noses | Role::Vehicles => Some(SpeedKind::Closing),
+            Role::Within => None,
+        };
+        if let (Some(kind), Some(expected)) = (spring.kind, expected)
+            && kind != expected
+        {
+            return Err(invalid(format!(
+                "curve \"{curve}\" was measured at {} speeds, but interface {} needs one of {} speeds",
+                kind.name(),
+                slot.name,
+                expected.name()
+            )));
+        }
+        let law = spring.law(table).map_err(|m| invalid(format!("curve \"{curve}\": {m}")))?;
+        let used = Used {
+            curve: curve.into(),
+            force: spring.force.map(|f| f.name()),
+            speed_m_per_s: spring.speed_m_per_s,
+        };
+        self.warnings.extend(spring.warnings.iter().map(|w| format!("curve \"{curve}\": {w}")));
+        let made = Made { curve: curve.into(), key, law: Arc::new(law), used };
+        self.made.push(made.clone());
+        Ok(made)
+    }
+}

@@ -1,0 +1,100 @@
+//! Interface-local speeds: curves for the speed at which each interface closes itself.
+//!
+//! The interfaces inside a train close far more slowly than the trains meet. What an interface
+//! closes at depends on the curves of all, so both are sought together, by iteration.
+
+use std::path::Path;
+
+use super::assemble::{assemble_at, is_local};
+use super::layout::layout;
+use super::{Prepared, Scenario, ScenarioError, Sources};
+use crate::curve::rating::peaks;
+use crate::multibody::{Chain, Method, Run, simulate};
+use crate::unit::km_per_h;
+
+/// The speeds are found when none changes by more, in m/s.
+const CHANGE_M_PER_S: f64 = 0.1;
+const ROUNDS: usize = 10;
+/// Of a change that goes back and forth only this share is made.
+const RELAXATION: f64 = 0.5;
+/// The first maximum of the force is one that stands out by this share of the largest.
+const PROMINENCE: f64 = 0.1;
+/// States for the speeds, in s; forces rise within a few.
+const INTERVAL_S: f64 = 0.25e-3;
+/// No curve is asked for below this speed, in m/s: an interface that hardly closes.
+const SLOWEST_M_PER_S: f64 = 0.1;
+
+/// Starts from `prepared`, whose curves are those of `speeds_m_per_s`.
+pub(super) fn settle(
+    path: &Path,
+    scenario: &Scenario,
+    sources: &Sources,
+    mut prepared: Prepared,
+    mut speeds_m_per_s: Vec<f64>,
+) -> Result<Prepared, ScenarioError> {
+    let own: Vec<bool> =
+        layout(scenario).slots.iter().map(|slot| is_local(slot, sources)).collect();
+    let mut before = vec![0.0; own.len()];
+    for _ in 0..ROUNDS {
+        let mut settings = prepared.settings;
+        settings.output_interval_s = INTERVAL_S.min(settings.duration_s);
+        if !prepared.chain.has_rates() {
+            settings = settings.with_method(Method::FourthOrder);
+        }
+        let run = simulate(&prepared.chain, &settings)
+            .map_err(|source| ScenarioError::Local { path: path.into(), source })?;
+        let mut largest = (0.0, 0);
+        for k in (0..own.len()).filter(|&k| own[k]) {
+            let Some(closing) = closing_speed(&prepared.chain, &run, k) else { continue };
+            let mut change = closing.max(SLOWEST_M_PER_S) - speeds_m_per_s[k];
+            if f64::abs(change) > largest.0 {
+                largest = (f64::abs(change), k);
+            }
+            if change * before[k] < 0.0 {
+                change *= RELAXATION;
+            }
+            before[k] = change;
+            speeds_m_per_s[k] += change;
+        }
+        if largest.0 < CHANGE_M_PER_S {
+            return Ok(prepared);
+        }
+        prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
+        if before.iter().all(|change| *change == 0.0) {
+            return Ok(prepared);
+        }
+    }
+    let unsettled = before
+        .iter()
+        .enumerate()
+        .filter(|(_, change)| change.abs() >= CHANGE_M_PER_S)
+        .map(|(k, change)| {
+            let name = &prepared.chain.interfaces()[k].name;
+            format!("{name} ({} last changed by {change:+.2} m/s)", km_per_h(speeds_m_per_s[k]))
+        })
+        .collect::<Vec<_>>();
+    if !unsettled.is_empty() {
+        prepared.warnings.push(format!(
+            "the closing speed of interface {} did not settle in {ROUNDS} rounds: compare with interface_speed = \"train\"",
+            unsettled.join(", ")
+        ));
+    }
+    Ok(prepared)
+}
+
+/// Largest closing speed of interface `k` from its contact to the first maximum of its force;
+/// `None` if it never closes.
+fn closing_speed(chain: &Chain, run: &Run, k: usize) -> Option<f64> {
+    let interface = &run.interfaces[k];
+    let begin = interface.deflection_m.iter().position(|&d| d > 0.0)?;
+    let forces = &interface.force_n[begin..];
+    let most = forces.iter().copied().fold(0.0, f64::max);
+    let until = peaks(forces, PROMINENCE * most).first().map_or(forces.len(), |&peak| peak + 1);
+    let ahead = |row: usize| match k + 1 < chain.bodies().len() {
+        true => run.bodies[k + 1].v_m_per_s[row],
+        false => 0.0,
+    };
+    // The state before the contact still has the whole speed.
+    let rows = begin.saturating_sub(1)..begin + until;
+    rows.map(|row| run.bodies[k].v_m_per_s[row] - ahead(row)).reduce(f64::max)
+}

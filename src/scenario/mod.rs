@@ -1,0 +1,101 @@
+//! Scenario (TOML): trains, wall and curves, resolved into a multi-body chain.
+
+mod assemble;
+mod check;
+mod layout;
+mod local;
+mod sources;
+mod spring;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+pub use assemble::{adjust, assemble};
+pub use sources::{Source, Sources};
+pub use tables::*;
+
+use crate::database::DatabaseError;
+use crate::export::{csv, json};
+use crate::manifest::{self, ManifestError};
+use crate::multibody::{Chain, ChainError, RunSettings, SimulationError};
+use crate::surrogate::ModelError;
+use crate::surrogate::predict::PredictError;
+
+/// A scenario ready to run.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    pub chain: Chain,
+    pub settings: RunSettings,
+    /// Bodies as the scenario lists them: indices into the chain, first train first.
+    pub order: Vec<usize>,
+    /// What each interface of the chain uses.
+    pub used: Vec<Used>,
+    /// Warnings of the curves used.
+    pub warnings: Vec<String>,
+}
+
+/// What an interface uses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Used {
+    /// Name of its curve in the scenario.
+    pub curve: String,
+    /// Which force it is, where that is known: `contact` or `body`.
+    pub force: Option<&'static str>,
+    /// Speed that its curve was predicted for, in m/s.
+    pub speed_m_per_s: Option<f64>,
+}
+
+/// Why a scenario cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    #[error("{path}: {message}")]
+    Invalid { path: PathBuf, message: String },
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error("curve \"{curve}\": {source}")]
+    Predict { curve: String, source: PredictError },
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    #[error(transparent)]
+    CurveFile(#[from] json::CurveFileError),
+    #[error(transparent)]
+    Csv(#[from] csv::CsvError),
+    #[error("{path}: {source}")]
+    Chain { path: PathBuf, source: ChainError },
+    #[error("{path}: while the interfaces' speeds were sought: {source}")]
+    Local { path: PathBuf, source: SimulationError },
+}
+
+/// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
+///
+/// # Errors
+/// [`ScenarioError`] as of [`load`].
+pub fn parse(path: &Path, text: &str) -> Result<Scenario, ScenarioError> {
+    checked(path, manifest::parse(path, text)?)
+}
+
+fn checked(path: &Path, scenario: Scenario) -> Result<Scenario, ScenarioError> {
+    check::check(&scenario)
+        .map_err(|message| ScenarioError::Invalid { path: path.into(), message })?;
+    Ok(scenario)
+}
+
+/// Reads and checks a scenario; curves are not read.
+///
+/// # Errors
+/// [`ScenarioError`] names the key.
+pub fn read(path: &Path) -> Result<Scenario, ScenarioError> {
+    checked(path, manifest::load(path)?)
+}
+
+/// Loads a scenario and everything it names.
+///
+/// # Errors
+/// [`ScenarioError`] names the key, curve or file.
+pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
+    let scenario = read(path)?;
+    let sources = Sources::read(path, &scenario)?;
+    assemble(path, &scenario, &sources)
+}

@@ -1,0 +1,293 @@
+//! The tables of a scenario (TOML).
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::curve::Parameter;
+use crate::multibody::Method;
+use crate::plan::Plan;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::unit::{
+    ForceText, LengthText, MassText, SignedSpeedText, StiffnessText, TimeText, UnitSystem,
+};
+
+/// A scenario as written.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    pub run: RunTable,
+    /// Curves, used below by name.
+    pub curves: BTreeMap<String, CurveTable>,
+    /// The moving train, then the one it meets, if any.
+    pub train: Vec<TrainTable>,
+    /// A rigid wall in place of a second train.
+    pub wall: Option<WallTable>,
+    /// Between the two noses, or nose and wall.
+    pub contact: ContactTable,
+    /// FE's run of the whole, for `crumple compare --train`; a run takes no notice of it.
+    pub reference: Option<ReferenceTable>,
+    /// What `crumple sweep` varies; a single run takes no notice of it.
+    pub sweep: Option<Plan>,
+}
+
+/// Where FE's speeds of the vehicles are.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceTable {
+    /// Solver file with the nodes, such as a nodout; a case.json beside it tells how long FE
+    /// took.
+    pub file: PathBuf,
+    /// Units of the file, such as "mm-t-s".
+    #[schemars(with = "String")]
+    pub units: UnitSystem,
+    #[serde(default = "x_velocity")]
+    pub component: String,
+    /// Node of each vehicle, by the vehicle's name.
+    pub nodes: BTreeMap<String, i64>,
+    /// FE's time of the first contact; 0 if absent.
+    pub contact: Option<TimeText>,
+    /// The comparison ends here, counted from the contact; with the record if absent.
+    pub until: Option<TimeText>,
+}
+
+fn x_velocity() -> String {
+    "x_velocity".into()
+}
+
+/// Times of the run.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunTable {
+    pub duration: TimeText,
+    #[serde(default = "default_interval")]
+    pub output_interval: TimeText,
+    /// Longest integration step.
+    pub step: Option<TimeText>,
+    /// How the motion is integrated.
+    #[serde(default)]
+    pub method: MethodName,
+    /// Which speed an interface's model curve is predicted for.
+    #[serde(default)]
+    pub interface_speed: InterfaceSpeed,
+}
+
+/// How the motion is integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodName {
+    /// Velocity Verlet, of order 2.
+    #[default]
+    Verlet,
+    /// Of order 4, about five times faster; not for dampers and resistance.
+    FourthOrder,
+    /// Adaptive extrapolation, slow, for checks.
+    Reference,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Verlet => Self::Verlet,
+            MethodName::FourthOrder => Self::FourthOrder,
+            MethodName::Reference => Self::Reference,
+        }
+    }
+}
+
+/// 0.75 ms, as in the reference data.
+fn default_interval() -> TimeText {
+    TimeText(0.75e-3)
+}
+
+/// Which speed an interface's model curve is predicted for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InterfaceSpeed {
+    /// The speed at which the trains meet.
+    Train,
+    /// The interface's own closing speed.
+    #[default]
+    Local,
+}
+
+/// One curve: exactly one of `model`, `file`, `database` and `stages`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurveTable {
+    /// Model file; the curve is predicted for the speed of the interface.
+    pub model: Option<PathBuf>,
+    /// Curve file: predicted curve (.json) or table (.csv).
+    pub file: Option<PathBuf>,
+    /// Curve database, with `case`.
+    pub database: Option<PathBuf>,
+    /// Case of the database, as "group/case".
+    pub case: Option<String>,
+    /// Stages in series on one stroke, such as those of a coupler, the first one first.
+    pub stages: Option<Vec<StageTable>>,
+    /// Unloading stiffness; the curve's own if absent.
+    pub unloading: Option<StiffnessText>,
+    /// Free distance before contact.
+    pub gap: Option<LengthText>,
+    /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
+    pub tension: Option<String>,
+    /// Damper beside the curve while it is in contact.
+    pub damping: Option<DampingTable>,
+    #[serde(default)]
+    pub law: LawName,
+    #[serde(default)]
+    pub end: EndName,
+    /// Of a model: the rule for the maximal crush; the model's own if absent.
+    #[serde(default)]
+    pub max_crush: Option<MaxCrushRule>,
+    /// Of a model: values of its further parameters.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Of a model, predicted curve or database case: the force of the recipe, or the one that
+    /// moves a body of one mass; if absent the one that the vehicles need.
+    pub force: Option<ForceName>,
+    /// Of a model or predicted curve: member of its band, from −1 (lower edge) over 0 (the
+    /// curve) to 1 (upper edge).
+    pub band: Option<f64>,
+    /// Factor on the force.
+    pub scale: Option<f64>,
+}
+
+/// Which force of a predicted curve drives an interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceName {
+    /// The force of the recipe (contact or body).
+    Declared,
+    /// The force of the body's motion, with its rebound.
+    Body,
+}
+
+/// A stage of a staged curve.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StageTable {
+    /// For people, such as "deformation tube".
+    pub name: Option<String>,
+    pub stroke: LengthText,
+    /// Force at the begin of the stage, 0 if absent: it steps there from the stage before.
+    pub from: Option<ForceText>,
+    /// Force at its end; the same as at its begin if absent.
+    pub to: Option<ForceText>,
+}
+
+/// A damper's coefficient over the magnitude of the closing speed, piecewise linear and held
+/// beyond its ends; one pair of values for a constant one.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DampingTable {
+    #[serde(default = "zero")]
+    pub speed_m_per_s: Vec<f64>,
+    #[serde(rename = "coefficient_N_s_per_m")]
+    pub coefficient_n_s_per_m: Vec<f64>,
+}
+
+fn zero() -> Vec<f64> {
+    vec![0.0]
+}
+
+/// Force law of an interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawName {
+    /// Elastic-plastic: unloads on a line of the unloading stiffness.
+    #[default]
+    Memory,
+    /// Follows the curve back, as the reference model.
+    Elastic,
+}
+
+/// What the force does beyond the curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EndName {
+    /// Holds the last force.
+    #[default]
+    Hold,
+    /// Continues the last segment.
+    Slope,
+    /// Ends the run with an error.
+    Error,
+}
+
+/// A train.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrainTable {
+    pub name: String,
+    /// In the direction in which the first train moves; below 0 if it comes against it.
+    pub speed: SignedSpeedText,
+    /// Curve of the interfaces between its vehicles.
+    pub inner: Option<String>,
+    /// Running and braking resistance of its vehicles; none if absent.
+    pub resistance: Option<ResistanceTable>,
+    /// From the nose back.
+    pub vehicles: Vec<VehicleTable>,
+}
+
+/// A vehicle.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VehicleTable {
+    pub name: String,
+    /// Of the whole vehicle.
+    pub mass: MassText,
+    /// Curve of the interface behind it, in place of the train's `inner`.
+    pub behind: Option<String>,
+    /// Mass of the crush zone at its front (the end towards the train's nose), as a body of its
+    /// own.
+    pub front: Option<CrushZoneTable>,
+    /// The same at its rear.
+    pub rear: Option<CrushZoneTable>,
+}
+
+/// A mass split off a vehicle: it stands in front of the interface's spring, the body behind.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CrushZoneTable {
+    /// Part of the vehicle's mass.
+    pub mass: MassText,
+    /// Curve between it and the body.
+    pub curve: String,
+}
+
+/// `R = m (A + B|v| + C v² + μ g) sgn(v)`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[derive(Default)]
+pub struct ResistanceTable {
+    pub constant_m_per_s2: f64,
+    pub linear_per_s: f64,
+    pub quadratic_per_m: f64,
+    /// Coefficient of friction of the brakes, over the whole weight.
+    pub braking: f64,
+}
+
+/// A rigid wall.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WallTable {
+    #[serde(default = "wall_name")]
+    pub name: String,
+}
+
+fn wall_name() -> String {
+    "wall".into()
+}
+
+/// The first contact.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactTable {
+    /// Name of its curve.
+    pub curve: String,
+    /// Free distance before contact; the curve's own if absent.
+    pub gap: Option<LengthText>,
+}
