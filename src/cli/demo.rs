@@ -39,31 +39,17 @@ static FE_RUNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/fe");
 const GROUP: &str = "lead-car-wall";
 const SPEED_M_PER_S: f64 = 50.0 * M_PER_S_PER_KM_PER_H;
 
-const SCENARIO: &str = r#"# A lead car against a rigid wall at a speed for which there is no FE run.
-[run]
-duration = "300ms"
-output_interval = "0.75ms"
+/// FE's run of a whole train, for the comparison of methods.
+static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set");
 
-[curves]
-nose = { model = "lead.model", force = "body" }   # what moves the car; the wall feels more
+/// Scenarios, written beside the models that they name.
+static SCENARIOS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/examples/trains");
+/// The one that the demo runs.
+const SCENARIO: &str = "scenario.toml";
 
-[[train]]
-name = "A"
-speed = "50km/h"
-vehicles = [ { name = "A1", mass = "24t" } ]
-
-[wall]
-
-[contact]
-curve = "nose"
-
-# For crumple sweep: all combinations, the last one changing fastest.
-[sweep]
-vary = [
-    { what = "speed", train = "A", from = "30km/h", to = "70km/h", steps = 5 },
-    { what = "band", curve = "nose", values = [-1, 0, 1] },   # lower edge, curve, upper edge
-]
-"#;
+/// Groups and the model files of their curves.
+const MODELS: [(&str, &str); 3] =
+    [(GROUP, "lead.model"), ("lead-car-pair", "pair.model"), ("vehicle-pair", "vehicle.model")];
 
 #[derive(Serialize)]
 struct Document {
@@ -157,6 +143,8 @@ impl Flow<'_> {
         let target = self.folder.join("fe");
         std::fs::create_dir_all(&target)?;
         FE_RUNS.extract(&target)?;
+        std::fs::create_dir_all(target.join("train-set"))?;
+        TRAIN_SET.extract(target.join("train-set"))?;
         Ok(())
     }
 
@@ -187,12 +175,17 @@ impl Flow<'_> {
         Ok(validations)
     }
 
+    /// Trains a model of every group; the one of [`GROUP`] goes on.
     fn train(&mut self, database: &Database) -> Result<Model, Failure> {
-        self.bar.step("training the model");
-        let model =
-            validate::train(GROUP, database.cases(GROUP), Choice::Auto { seed: 0, trees: None })?;
-        model.write(&self.path("lead.model"))?;
-        Ok(model)
+        let mut first = None;
+        for (group, file) in MODELS {
+            self.bar.step(&format!("training {file}"));
+            let choice = Choice::Auto { seed: 0, trees: None };
+            let model = validate::train(group, database.cases(group), choice)?;
+            model.write(&self.path(file))?;
+            first = first.or(Some(model));
+        }
+        first.ok_or_else(|| Failure::Usage("no model".into()))
     }
 
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
@@ -206,8 +199,11 @@ impl Flow<'_> {
     }
 
     fn simulate(&mut self) -> Result<Run, Failure> {
-        let path = self.path("scenario.toml");
-        write_whole(&path, SCENARIO.as_bytes())?;
+        for file in SCENARIOS.files() {
+            let path = self.path(&file.path().display().to_string());
+            write_whole(&path, file.contents())?;
+        }
+        let path = self.folder.join(SCENARIO);
         let prepared = scenario::load(&path)?;
         Ok(simulate(&prepared.chain, &prepared.settings)?)
     }

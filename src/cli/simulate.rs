@@ -8,6 +8,7 @@ use crumple::multibody::integrator::BodyHistory;
 use crumple::multibody::ledger::Ledger;
 use crumple::multibody::{Run, STANDARD_GRAVITY_M_PER_S2, simulate};
 use crumple::scenario::{self, Prepared};
+use crumple::unit::km_per_h;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -33,6 +34,19 @@ struct Summary {
     bodies: Vec<BodySummary>,
     interfaces: Vec<InterfaceSummary>,
     step_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limits: Option<Limits>,
+}
+
+/// Mean decelerations against a limit.
+#[derive(Serialize)]
+struct Limits {
+    standard: String,
+    edition: String,
+    mean_deceleration_limit_g: f64,
+    /// Bodies whose mean deceleration is over it.
+    over: Vec<String>,
+    statement: String,
 }
 
 #[derive(Serialize)]
@@ -41,6 +55,8 @@ struct BodySummary {
     final_v_m_per_s: f64,
     mean_deceleration_m_per_s2: f64,
     mean_deceleration_g: f64,
+    /// Largest mean over 120 ms; null in a shorter run.
+    moving_mean_deceleration_g: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -50,7 +66,13 @@ struct InterfaceSummary {
     peak_force_n: f64,
     max_deflection_m: f64,
     max_deflection_time_s: f64,
+    /// When both sides first had the same velocity.
+    common_velocity_time_s: Option<f64>,
     restitution: Option<f64>,
+    /// Name of its curve, which force it is where that is known, and the speed it is for.
+    curve: String,
+    curve_force: Option<&'static str>,
+    curve_speed_m_per_s: Option<f64>,
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
@@ -73,6 +95,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     }
     let summary = summary(&prepared, &run);
     if manners.json {
+        let mut columns = columns;
+        columns.extend(further_columns(&prepared, &run));
         output::print_json(&document(&columns, &summary, &run.ledger, &warnings)?)?;
     } else if to_stdout {
         output::print(|out| write_csv(out, &columns))?;
@@ -101,6 +125,18 @@ fn columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f64])> {
     for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
         columns.push((format!("deflection_m[{}]", interface.name), &history.deflection_m));
         columns.push((format!("force_N[{}]", interface.name), &history.force_n));
+    }
+    columns
+}
+
+/// What the document has beside the columns of the table.
+fn further_columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f64])> {
+    let mut columns: Vec<(String, &[f64])> = Vec::new();
+    for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {
+        let name = &interface.name;
+        columns.push((format!("largest_deflection_m[{name}]"), &history.largest_deflection_m));
+        columns.push((format!("stored_J[{name}]"), &history.stored_j));
+        columns.push((format!("dissipated_J[{name}]"), &history.dissipated_j));
     }
     columns
 }
@@ -138,24 +174,47 @@ fn document(
 fn summary(prepared: &Prepared, run: &Run) -> Summary {
     let body = |&i: &usize| BodySummary {
         name: prepared.chain.bodies()[i].name.clone(),
-        final_v_m_per_s: run.bodies[i].v_m_per_s.last().copied().unwrap_or(0.0),
+        final_v_m_per_s: run.bodies[i].final_v_m_per_s,
         mean_deceleration_m_per_s2: run.bodies[i].mean_deceleration_m_per_s2,
         mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
+        moving_mean_deceleration_g: run.bodies[i]
+            .moving_mean_deceleration_m_per_s2
+            .map(|a| a / STANDARD_GRAVITY_M_PER_S2),
     };
     let interfaces = prepared
         .chain
         .interfaces()
         .iter()
         .zip(&run.interfaces)
-        .map(|(interface, history)| InterfaceSummary {
+        .zip(&prepared.used)
+        .map(|((interface, history), used)| InterfaceSummary {
             name: interface.name.clone(),
             peak_force_n: history.peak_force_n,
             max_deflection_m: history.max_deflection_m,
             max_deflection_time_s: history.max_deflection_time_s,
+            common_velocity_time_s: history.common_velocity_time_s,
             restitution: history.restitution,
+            curve: used.curve.clone(),
+            curve_force: used.force,
+            curve_speed_m_per_s: used.speed_m_per_s,
         })
         .collect();
-    Summary { bodies: prepared.order.iter().map(body).collect(), interfaces, step_s: run.step_s }
+    let bodies: Vec<BodySummary> = prepared.order.iter().map(body).collect();
+    let limits = prepared.limits.as_ref().map(|limits| Limits {
+        standard: limits.standard.clone(),
+        edition: limits.edition.clone(),
+        mean_deceleration_limit_g: limits.mean_deceleration_g,
+        over: bodies
+            .iter()
+            .filter(|b| b.mean_deceleration_g.abs() > limits.mean_deceleration_g)
+            .map(|b| b.name.clone())
+            .collect(),
+        statement: format!(
+            "mean decelerations are survival-independent figures of a one-dimensional model; this is no statement of conformity with {}:{}",
+            limits.standard, limits.edition
+        ),
+    });
+    Summary { bodies, interfaces, step_s: run.step_s, limits }
 }
 
 fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<()> {
@@ -169,10 +228,13 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
                 format!("{:.7} m", i.max_deflection_m),
                 format!("{:.3} ms", i.max_deflection_time_s * 1e3),
                 i.restitution.map_or("-".into(), |e| format!("{e:.4}")),
+                i.curve_force.unwrap_or("-").into(),
+                i.curve_speed_m_per_s.map_or("-".into(), km_per_h),
             ]
         })
         .collect();
-    let heading = ["interface", "peak force", "max crush", "at", "restitution"];
+    let heading =
+        ["interface", "peak force", "max crush", "at", "restitution", "force", "curve for"];
     output::table(out, &heading, &rows)?;
     let rows: Vec<Vec<String>> = summary
         .bodies
@@ -182,10 +244,22 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
                 b.name.clone(),
                 format!("{:.6} m/s", b.final_v_m_per_s),
                 format!("{:.4} g", b.mean_deceleration_g),
+                b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.4} g")),
             ]
         })
         .collect();
-    output::table(out, &["body", "final speed", "mean deceleration"], &rows)?;
+    output::table(out, &["body", "final speed", "mean deceleration", "over 120 ms"], &rows)?;
+    if let Some(limits) = &summary.limits {
+        let over = match limits.over.is_empty() {
+            true => "no body".into(),
+            false => limits.over.join(", "),
+        };
+        writeln!(
+            out,
+            "over {} g ({}:{}): {over}\n{}",
+            limits.mean_deceleration_limit_g, limits.standard, limits.edition, limits.statement
+        )?;
+    }
     writeln!(
         out,
         "energy of {:.6} MJ: {:.6} kinetic, {:.6} stored, {:.6} dissipated; largest imbalance {:.1e}",

@@ -83,7 +83,8 @@ pub(super) fn assemble_at(
             warnings.push(warning);
         }
     }
-    Ok(Prepared { chain, settings, order, used, warnings })
+    let limits = scenario.limits.clone();
+    Ok(Prepared { chain, settings, order, used, limits, warnings })
 }
 
 /// Gives a chain put together by [`assemble`] the masses, speeds and gaps of `scenario`, which

@@ -21,6 +21,14 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
     if let Some(wall) = &scenario.wall {
         check_name(&wall.name)?;
     }
+    if let Some(limits) = &scenario.limits
+        && !(limits.mean_deceleration_g > 0.0 && limits.mean_deceleration_g.is_finite())
+    {
+        return Err(format!(
+            "[limits] mean_deceleration_g = {}: expected more than 0",
+            limits.mean_deceleration_g
+        ));
+    }
     let mut names = std::collections::HashSet::new();
     for train in &scenario.train {
         let Some((last, others)) = train.vehicles.split_last() else {

@@ -30,6 +30,7 @@ pub struct Prepared {
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
     pub used: Vec<Used>,
+    pub limits: Option<LimitsTable>,
     /// Warnings of the curves used.
     pub warnings: Vec<String>,
 }

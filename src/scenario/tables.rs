@@ -27,10 +27,24 @@ pub struct Scenario {
     pub wall: Option<WallTable>,
     /// Between the two noses, or nose and wall.
     pub contact: ContactTable,
+    /// Limits that results are held against.
+    pub limits: Option<LimitsTable>,
     /// FE's run of the whole, for `crumple compare --train`; a run takes no notice of it.
     pub reference: Option<ReferenceTable>,
     /// What `crumple sweep` varies; a single run takes no notice of it.
     pub sweep: Option<Plan>,
+}
+
+/// Limits of a standard, as configuration: they belong to an edition and a category of vehicles.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsTable {
+    /// Such as "EN 15227".
+    pub standard: String,
+    /// Such as "2020".
+    pub edition: String,
+    /// Of the mean deceleration while the net contact force acts, in g.
+    pub mean_deceleration_g: f64,
 }
 
 /// Where FE's speeds of the vehicles are.
