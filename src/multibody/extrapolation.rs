@@ -57,10 +57,19 @@ impl Motion<'_> {
             extension_m = -moved - tension.slack_m;
             pulls = force(&tension.law, extension_m, self.pulled_m[k]);
         }
+        let touches = |law: &ForceLaw, d: f64, largest: f64, force: f64, closing: f64| {
+            let begins = d == 0.0 && closing > 0.0;
+            (d > 0.0 || begins) && (force != 0.0 || d >= largest || !law.has_memory())
+        };
+        let mut in_contact =
+            touches(&interface.law, deflection_m, self.pushed_m[k], pushes, closing);
+        if let Some(tension) = &interface.tension {
+            in_contact |= touches(&tension.law, extension_m, self.pulled_m[k], pulls, -closing);
+        }
         let spring_n = pushes - pulls;
         let mut damper_n = 0.0;
         if let Some(damping) = &interface.damping
-            && spring_n != 0.0
+            && in_contact
         {
             damper_n = damping.at(closing) * closing;
             if interface.tension.is_none() {
