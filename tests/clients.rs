@@ -1,18 +1,24 @@
 //! Outside judges: h5py reads our HDF5, ONNX Runtime our forests, scikit-learn's forest is as
-//! accurate as ours, objective-rating-metrics rates as we do.
+//! accurate as ours, objective-rating-metrics and pyisomme rate as we do, Exudyn moves a train
+//! as we do.
 //!
-//! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, as
-//! tests/run sets it.
+//! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, and
+//! CRUMPLE_PYTHON_ISOMME one with requirements-isomme.txt, as tests/run sets them.
 
 mod common;
 
 use std::fmt::Write;
 use std::path::Path;
+use std::process::Command;
 
-use common::{build_fixture, crumple_ok, fixture, python, root};
+use common::{build_fixture, crumple_ok, fixture, python, python_of, root};
+use crumple::curve::Envelope;
 use crumple::database::Database;
 use crumple::dataset::{TableKind, TrainingSet};
 use crumple::forest::{ForestParams, Ties};
+use crumple::multibody::{
+    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, RunSettings, Unloading, simulate,
+};
 use crumple::surrogate::{Fitted, Model};
 use linfa::Dataset;
 use linfa::traits::{Fit, Predict};
@@ -21,7 +27,10 @@ use serde_json::Value;
 
 /// Runs a script of tests/python and parses what it prints.
 fn run_python(script: &str, arguments: &[&str]) -> Option<Value> {
-    let mut command = python()?;
+    run_python_of(python()?, script, arguments)
+}
+
+fn run_python_of(mut command: Command, script: &str, arguments: &[&str]) -> Option<Value> {
     let output =
         command.arg(root().join("tests/python").join(script)).args(arguments).output().unwrap();
     let error = String::from_utf8_lossy(&output.stderr);
@@ -361,5 +370,110 @@ fn objective_rating_metrics_and_numpy_rate_the_same() {
             ours["iso18571"]["rating"], theirs["iso18571"]["rating"]
         );
         assert_agrees(&format!("{arguments:?}"), &ours, theirs);
+    }
+}
+
+/// pyisomme takes ISO/TS 18571 from objective-rating-metrics and has no other rating (no CORA),
+/// so that what it adds is the way there: channels, their common times, 10 kHz by interpolation.
+///
+/// Its times stop one sample before ours where the common time is a multiple of 0.1 ms, as they
+/// come from a half-open range; with the histories thinned to their own 10 kHz both take all.
+#[test]
+fn pyisomme_rates_the_same() {
+    let Some(command) = python_of("CRUMPLE_PYTHON_ISOMME") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for group in ["lead-car-wall", "lead-car-pair"] {
+        for speed in ["36", "48", "72"] {
+            let nodout = fixture(&format!("fe/{group}/{speed}kmh/nodout"));
+            let output = format!("{group}-{speed}.csv");
+            crumple_ok(here, &["histories", nodout.to_str().unwrap(), "-o", &output]);
+        }
+    }
+    let file = |group: &str, speed: &str| format!("{group}-{speed}.csv");
+    let mut pairs = Vec::new();
+    for group in ["lead-car-wall", "lead-car-pair"] {
+        for (a, b) in [("36", "48"), ("48", "36"), ("36", "72")] {
+            pairs.push((file(group, a), file(group, b)));
+        }
+    }
+    let column = "x_velocity[900001]";
+    let asked: Vec<Value> = pairs
+        .iter()
+        .map(|(a, b)| serde_json::json!([here.join(a), here.join(b), column]))
+        .collect();
+    let asked = Value::from(asked).to_string();
+    let theirs = run_python_of(command, "isomme_rating.py", &[&asked]).unwrap();
+    let theirs = theirs.as_array().unwrap();
+    assert_eq!(theirs.len(), pairs.len());
+    for ((a, b), theirs) in pairs.iter().zip(theirs) {
+        let arguments = ["rate", a, b, "--column", column, "--json"];
+        let ours: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
+        println!("{a}, {b}: R {} against {}", ours["iso18571"]["rating"], theirs["rating"]);
+        assert_agrees(&format!("{a}, {b}"), &ours["iso18571"], theirs);
+    }
+}
+
+/// 8 cars at 10 m/s against 8 that stand, for 120 ms in which all interfaces load: lead cars of 24 t at
+/// the noses, 20.24 t behind, one law without memory everywhere, so that only the motion is
+/// compared. Exudyn takes steps of fourth order over the kinks of the same tables.
+#[test]
+fn exudyn_moves_eight_cars_against_eight_alike() {
+    let Some(_) = python() else { return };
+    let mass = |i: usize| if i == 7 || i == 8 { 24.0e3 } else { 20.24e3 };
+    let speed = |i: usize| if i < 8 { 10.0 } else { 0.0 };
+    let nose = (vec![0.0, 0.05, 0.12, 0.4, 2.0], vec![0.0, 3.1e6, 1.4e6, 1.9e6, 2.6e6]);
+    let coupler = (vec![0.0, 0.06, 0.08, 0.3, 1.0], vec![0.0, 0.9e6, 1.6e6, 1.2e6, 2.2e6]);
+    let outputs = 160;
+    for gap in [0.0, 0.04] {
+        let table = |k: usize| if k == 7 { &nose } else { &coupler };
+        let gap = |k: usize| if k == 7 { 0.0 } else { gap };
+        let interface = |k: usize| {
+            let (deflection, force) = table(k).clone();
+            let envelope = Envelope::new(deflection, force).unwrap();
+            let law = ForceLaw::new(envelope, Unloading::Elastic, EnvelopeEnd::Hold);
+            Interface::new(format!("I{k}"), law, gap(k))
+        };
+        let bodies = (0..16).map(|i| Body::new(format!("B{i}"), mass(i), speed(i))).collect();
+        let chain = Chain::new(bodies, (0..15).map(interface).collect()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("chain.json");
+        let values = |of: &dyn Fn(usize) -> f64, n: usize| (0..n).map(of).collect::<Vec<f64>>();
+        let columns = |of: &dyn Fn(usize) -> Vec<f64>| (0..15).map(of).collect::<Vec<_>>();
+        let asked = serde_json::json!({
+            "masses_kg": values(&mass, 16),
+            "speeds_m_per_s": values(&speed, 16),
+            "gaps_m": values(&gap, 15),
+            "deflections_m": columns(&|k| table(k).0.clone()),
+            "forces_N": columns(&|k| table(k).1.clone()),
+            "step_s": 5e-6,
+            "interval_s": 0.75e-3,
+            "outputs": outputs,
+        });
+        std::fs::write(&file, asked.to_string()).unwrap();
+        let Some(theirs) = run_python("exudyn_chain.py", &[file.to_str().unwrap()]) else { return };
+        let theirs: Vec<Vec<f64>> = serde_json::from_value(theirs).unwrap();
+        for (method, step_s) in [(Method::Verlet, 1e-6), (Method::FourthOrder, 1.5e-5)] {
+            let settings = RunSettings::new(f64::from(outputs) * 0.75e-3, 0.75e-3);
+            let settings = settings.with_method(method).with_step(step_s);
+            let run = simulate(&chain, &settings).unwrap();
+            assert_eq!(run.time_s.len(), theirs.len());
+            for seen in &run.interfaces {
+                let (now, most) = (&seen.deflection_m, &seen.largest_deflection_m);
+                // Until it is touched an interface's largest deflection is 0.
+                assert!(now.iter().zip(most).all(|(now, most)| now.max(0.0) == *most), "loads");
+            }
+            let touched = run.interfaces.iter().filter(|i| i.max_deflection_m > 1e-3).count();
+            let mut difference = 0.0_f64;
+            for (row, theirs) in theirs.iter().enumerate() {
+                for (body, theirs) in run.bodies.iter().zip(theirs) {
+                    difference = difference.max((body.v_m_per_s[row] - theirs).abs());
+                }
+            }
+            println!("{method:?}, gap {} m: {difference:.1e} m/s, {touched} interfaces", gap(0));
+            assert!(touched >= 5, "{touched} interfaces");
+            // What kinks within steps of 5 µs cost Exudyn: 2e-9 of the speed.
+            assert!(difference / 10.0 < 1e-8, "{method:?}: {difference:e} m/s");
+        }
     }
 }

@@ -1,9 +1,9 @@
-//! Multi-body runs against solutions on paper, to the digits given there.
+//! Multi-body runs against solutions on paper, to the digits given there, by every method.
 
 use crumple::curve::Envelope;
 use crumple::multibody::{
-    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError, Unloading,
-    simulate,
+    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Run, RunSettings,
+    STANDARD_GRAVITY_M_PER_S2, SimulationError, Unloading, simulate,
 };
 
 const TONNES: f64 = 1e3;
@@ -38,9 +38,12 @@ fn memory(envelope: Envelope, stiffness_n_per_m: f64) -> ForceLaw {
     ForceLaw::new(envelope, Unloading::Memory { stiffness_n_per_m }, EnvelopeEnd::Hold)
 }
 
-fn run(chain: &Chain, duration_s: f64, step_s: f64) -> Run {
-    let settings = RunSettings::new(duration_s, 0.75e-3).with_step(step_s);
-    let run = simulate(chain, &settings).unwrap();
+fn run(chain: &Chain, duration_s: f64, method: Method) -> Run {
+    run_with(chain, &RunSettings::new(duration_s, 0.75e-3).with_method(method))
+}
+
+fn run_with(chain: &Chain, settings: &RunSettings) -> Run {
+    let run = simulate(chain, settings).unwrap();
     assert!(run.ledger.max_energy_error < 1e-3, "energy {:e}", run.ledger.max_energy_error);
     assert!(run.ledger.max_momentum_error < 1e-10, "momentum {:e}", run.ledger.max_momentum_error);
     run
@@ -52,69 +55,107 @@ fn digits(value: f64, printed: &str) {
     assert_eq!(format!("{value:.decimals$}"), printed);
 }
 
-const STEP_S: f64 = crumple::multibody::integrator::DEFAULT_STEP_S;
+/// Those that see the extremes between outputs; the reference is compared at the outputs.
+const STEPPING: [Method; 2] = [Method::Verlet, Method::FourthOrder];
+const ALL: [Method; 3] = [Method::Verlet, Method::FourthOrder, Method::Reference];
+/// Verlet at a quarter of its default step, where its error would show in the last digit.
+fn finer(settings: RunSettings) -> RunSettings {
+    let share = if settings.method == Method::Verlet { 0.25 } else { 1.0 };
+    settings.with_step(share * settings.method.default_step_s())
+}
+
+/// The reference keeps to 1e-12 of the largest speed in each of its steps.
+const REFERENCE: f64 = 1e-9;
 
 /// `d = m v²/2F`, `t = m v/F`.
 #[test]
 fn case_1_constant_force_against_a_wall() {
     let wall = chain(&[(24.0 * TONNES, 40.0 / 3.0)], &[elastic(constant(2.0 * MEGA))]);
-    let run = run(&wall, 0.3, STEP_S);
-    let contact = &run.interfaces[0];
-    digits(contact.max_deflection_m, "1.0666667");
-    digits(contact.max_deflection_time_s, "0.16");
-    digits(run.bodies[0].mean_deceleration_m_per_s2 / 9.80665, "8.4976");
+    for method in STEPPING {
+        let run = run(&wall, 0.3, method);
+        let contact = &run.interfaces[0];
+        digits(contact.max_deflection_m, "1.0666667");
+        digits(contact.max_deflection_time_s, "0.16");
+        let mean = run.bodies[0].mean_deceleration_m_per_s2;
+        digits(mean / STANDARD_GRAVITY_M_PER_S2, "8.4976");
+    }
+    let run = run(&wall, 0.3, Method::Reference);
+    for (t, v) in run.time_s.iter().zip(&run.bodies[0].v_m_per_s) {
+        let exact = 40.0 / 3.0 - 2.0 * MEGA / (24.0 * TONNES) * t;
+        assert!((v - exact).abs() < REFERENCE, "{v} against {exact} m/s at {t} s");
+    }
 }
 
 /// `d = v sqrt(m/k)`, `t = (π/2) sqrt(m/k)`, `F = v sqrt(m k)`.
 #[test]
 fn case_2_linear_spring_against_a_wall() {
     let wall = chain(&[(24.0 * TONNES, 40.0 / 3.0)], &[elastic(linear(40.0 * MEGA))]);
-    let run = run(&wall, 0.3, STEP_S);
-    let contact = &run.interfaces[0];
-    digits(contact.max_deflection_m, "0.3265986");
-    digits(contact.max_deflection_time_s, "0.03847649");
-    digits(contact.peak_force_n / MEGA, "13.063946");
-    digits(contact.restitution.unwrap(), "1.000000");
+    for method in STEPPING {
+        let run = run(&wall, 0.3, method);
+        let contact = &run.interfaces[0];
+        digits(contact.max_deflection_m, "0.3265986");
+        digits(contact.max_deflection_time_s, "0.03847649");
+        // 13.0639453: Verlet's own period is longer by (ωh)²/24, and its force larger by 2e-8.
+        let printed = if method == Method::Verlet { "13.06395" } else { "13.063945" };
+        digits(contact.peak_force_n / MEGA, printed);
+        digits(contact.restitution.unwrap(), "1.000000");
+    }
+    let run = run(&wall, 0.07, Method::Reference);
+    let omega = (40.0 * MEGA / (24.0 * TONNES)).sqrt();
+    for (t, d) in run.time_s.iter().zip(&run.interfaces[0].deflection_m) {
+        let exact = 40.0 / 3.0 / omega * (omega * t).sin();
+        assert!((d - exact).abs() < REFERENCE, "{d} against {exact} m at {t} s");
+    }
+}
+
+/// 24 t each, 10 m/s, 2 MN, and 80 MN/m on the way back.
+fn pair() -> Chain {
+    chain(
+        &[(24.0 * TONNES, 10.0), (24.0 * TONNES, 0.0)],
+        &[memory(constant(2.0 * MEGA), 80.0 * MEGA)],
+    )
 }
 
 /// `d = μ v_r²/2F`, common velocity `m_1 v_r/(m_1 + m_2)`.
 #[test]
 fn case_3_two_bodies_with_constant_force() {
-    let pair = chain(
-        &[(24.0 * TONNES, 10.0), (24.0 * TONNES, 0.0)],
-        &[memory(constant(2.0 * MEGA), 80.0 * MEGA)],
-    );
-    let run = run(&pair, 0.06, STEP_S);
-    digits(run.interfaces[0].max_deflection_m, "0.3");
-    digits(run.interfaces[0].max_deflection_time_s, "0.06");
-    digits(run.bodies[0].v_m_per_s[run.time_s.len() - 1], "5.000");
+    for method in ALL {
+        let run = run(&pair(), 0.06, method);
+        digits(run.interfaces[0].max_deflection_m, "0.3");
+        digits(run.interfaces[0].max_deflection_time_s, "0.06");
+        let last = run.time_s.len() - 1;
+        for body in &run.bodies {
+            assert!((body.v_m_per_s[last] - 5.0).abs() < 1e-9, "{method:?}");
+        }
+    }
 }
 
 /// `e² = (F²/2k_u)/(μ v_r²/2)`.
 #[test]
 fn case_4_unloading_gives_the_restitution() {
-    let pair = chain(
-        &[(24.0 * TONNES, 10.0), (24.0 * TONNES, 0.0)],
-        &[memory(constant(2.0 * MEGA), 80.0 * MEGA)],
-    );
-    // The switch from loading to unloading costs O(h): seven digits need a short step.
-    let run = run(&pair, 0.15, 1e-7);
-    let last = run.time_s.len() - 1;
-    digits(run.interfaces[0].restitution.unwrap(), "0.2041241");
-    digits(run.bodies[0].v_m_per_s[last], "3.9793793");
-    digits(run.bodies[1].v_m_per_s[last], "6.0206207");
+    for method in ALL {
+        let settings = finer(RunSettings::new(0.15, 0.75e-3).with_method(method));
+        let run = run_with(&pair(), &settings);
+        let last = run.time_s.len() - 1;
+        digits(run.bodies[0].v_m_per_s[last], "3.9793793");
+        digits(run.bodies[1].v_m_per_s[last], "6.0206207");
+        if method != Method::Reference {
+            digits(run.interfaces[0].restitution.unwrap(), "0.2041241");
+        }
+    }
+    let run = run(&pair(), 0.15, Method::Verlet);
+    let e = 2.0 * MEGA / (80.0 * MEGA * 12.0 * TONNES).sqrt() / 10.0;
+    let error = run.bodies[0].final_v_m_per_s - (5.0 - 5.0 * e);
+    assert!(error.abs() < 1e-7, "{error:e} m/s at the default step");
 }
 
-/// A spring that also pulls is not an interface of ours, so the free chain is checked while
-/// all interfaces still push, against its closed form.
+/// Springs that push and pull, against their modes:
+/// `v_i(t) = Σ_j q_j cos(ω_j t) φ_j(i)`, `φ_j(i) = cos(jπ(i − 1/2)/N)`,
+/// `ω_j = 2 sqrt(k/m) sin(jπ/2N)`.
 #[test]
-fn chain_of_springs_follows_its_modes_while_it_is_pressed() {
+fn case_5_free_chain_of_two_way_springs() {
     let (n, mass, stiffness) = (8, 24.0 * TONNES, 50.0 * MEGA);
     let start = |i: usize| if i < n / 2 { 10.0 } else { 0.0 };
-    let bodies: Vec<(f64, f64)> = (0..n).map(|i| (mass, start(i))).collect();
-    let laws: Vec<ForceLaw> = (0..n - 1).map(|_| elastic(linear(stiffness))).collect();
-    let run = run(&chain(&bodies, &laws), 0.06, 1e-6);
-    // v_i(t) = Σ_j q_j cos(ω_j t) φ_j(i), φ_j(i) = cos(jπ(i − 1/2)/N), ω_j = 2 sqrt(k/m) sin(jπ/2N).
     let pi = std::f64::consts::PI;
     let shape = |j: usize, i: usize| (j as f64 * pi * (i as f64 + 0.5) / n as f64).cos();
     let velocity = |i: usize, t: f64| -> f64 {
@@ -128,18 +169,39 @@ fn chain_of_springs_follows_its_modes_while_it_is_pressed() {
             })
             .sum()
     };
-    // The closed form's own check values, at 0.1 s.
-    digits(velocity(0, 0.1), "3.470766");
-    digits(velocity(7, 0.1), "6.529234");
-    // Up to where the first interface would pull.
-    let pulls = |row: usize| run.interfaces.iter().any(|i| i.deflection_m[row] < 0.0);
-    let pressed = (0..run.time_s.len()).take_while(|&row| !pulls(row)).count();
-    assert!(run.time_s[pressed - 1] > 0.03, "pressed until {} s", run.time_s[pressed - 1]);
-    for row in 0..pressed {
-        for i in 0..n {
-            let (ours, exact) = (run.bodies[i].v_m_per_s[row], velocity(i, run.time_s[row]));
-            assert!((ours - exact).abs() < 1e-6, "body {i}: {ours} against {exact}");
+    let printed = [
+        "3.470766", "3.027898", "6.053866", "4.390974", "5.609026", "3.946134", "6.972102",
+        "6.529234",
+    ];
+    for (i, printed) in printed.into_iter().enumerate() {
+        digits(velocity(i, 0.1), printed);
+    }
+    let bodies: Vec<Body> = (0..n).map(|i| Body::new(format!("B{i}"), mass, start(i))).collect();
+    let spring = |k| {
+        let law = elastic(linear(stiffness));
+        Interface::new(format!("I{k}"), law.clone(), 0.0).with_tension(law, 0.0)
+    };
+    let chain = Chain::new(bodies, (0..n - 1).map(spring).collect()).unwrap();
+    for method in ALL {
+        // On beyond 0.1 s, up to which all springs push.
+        let settings = RunSettings::new(0.3, 1e-3).with_method(method);
+        let run = run_with(&chain, &finer(settings));
+        digits(run.time_s[100], "0.1");
+        for (i, (body, printed)) in run.bodies.iter().zip(printed).enumerate() {
+            digits(body.v_m_per_s[100], printed);
+            for (&v, &t) in body.v_m_per_s.iter().zip(&run.time_s) {
+                let error = v - velocity(i, t);
+                assert!(error.abs() < 2e-7, "{method:?}: {error:e} m/s at {t} s");
+            }
         }
+        let pulls = run.interfaces.iter().all(|i| i.force_n.iter().any(|f| *f < -MEGA));
+        assert!(pulls, "every spring pulls at some time");
+    }
+    // Verlet's frequencies are off by (ωh)²/24 ≤ 3.5e-8, which 0.1 s makes 3e-7 rad of 10 m/s.
+    let run = run_with(&chain, &RunSettings::new(0.1, 1e-3));
+    for (i, body) in run.bodies.iter().enumerate() {
+        let error = body.final_v_m_per_s - velocity(i, 0.1);
+        assert!(error.abs() < 1e-6, "{error:e} m/s at the default step");
     }
 }
 
@@ -168,7 +230,7 @@ fn a_gap_is_closed_before_time_begins() {
 #[test]
 fn a_curve_never_pulls() {
     let wavy = Envelope::new(vec![0.0, 0.1, 0.2, 1.0], vec![0.0, MEGA, -MEGA, MEGA]).unwrap();
-    let run = run(&chain(&[(24.0 * TONNES, 5.0)], &[memory(wavy, 0.0)]), 0.3, STEP_S);
+    let run = run(&chain(&[(24.0 * TONNES, 5.0)], &[memory(wavy, 0.0)]), 0.3, Method::Verlet);
     assert!(run.interfaces[0].force_n.iter().all(|&f| f >= 0.0));
 }
 
@@ -190,49 +252,67 @@ fn case_6_wall_curve_and_doubled_pair_curve_move_alike() {
     let wall = chain(&[(24.0 * TONNES, 8.0)], &[memory(bumpy(), 100.0 * MEGA)]);
     let pair =
         chain(&[(24.0 * TONNES, 8.0), (24.0 * TONNES, -8.0)], &[memory(doubled, 50.0 * MEGA)]);
-    let (wall, pair) = (run(&wall, 0.3, STEP_S), run(&pair, 0.3, STEP_S));
-    for (a, b) in wall.bodies[0].v_m_per_s.iter().zip(&pair.bodies[0].v_m_per_s) {
-        assert!((a - b).abs() < 1e-9, "{a} against {b}");
+    for method in ALL {
+        let (wall, pair) = (run(&wall, 0.3, method), run(&pair, 0.3, method));
+        for (a, b) in wall.bodies[0].v_m_per_s.iter().zip(&pair.bodies[0].v_m_per_s) {
+            assert!((a - b).abs() < 1e-9, "{method:?}: {a} against {b}");
+        }
     }
 }
 
 #[test]
 fn case_7_mass_and_force_scale_together() {
-    let scaled = |factor: f64| {
+    let scaled = |factor: f64, method: Method| {
         let force = bumpy().force_n().iter().map(|f| factor * f).collect();
         let envelope = Envelope::new(bumpy().deflection_m().to_vec(), force).unwrap();
         let law = memory(envelope, factor * 100.0 * MEGA);
-        run(&chain(&[(factor * 24.0 * TONNES, 10.0)], &[law]), 0.3, STEP_S)
+        run(&chain(&[(factor * 24.0 * TONNES, 10.0)], &[law]), 0.3, method)
     };
-    let (one, eight, three) = (scaled(1.0), scaled(8.0), scaled(3.0));
-    assert_eq!(one.bodies, eight.bodies, "a power of two changes no bit");
-    for (a, b) in one.bodies[0].v_m_per_s.iter().zip(&three.bodies[0].v_m_per_s) {
-        assert!((a - b).abs() < 1e-10, "{a} against {b}");
+    for method in ALL {
+        let (one, eight) = (scaled(1.0, method), scaled(8.0, method));
+        let three = scaled(3.0, method);
+        if method != Method::Reference {
+            // The reference chooses its steps by a momentum that scales too.
+            assert_eq!(one.bodies, eight.bodies, "{method:?}: a power of two changes no bit");
+        }
+        for (a, b) in one.bodies[0].v_m_per_s.iter().zip(&three.bodies[0].v_m_per_s) {
+            assert!((a - b).abs() < REFERENCE, "{method:?}: {a} against {b}");
+        }
     }
 }
 
-/// Halving the step quarters the error of the crush on a spring.
+/// Halving the step divides the error on a spring by 4, or by 16.
 #[test]
-fn order_of_convergence_is_two() {
-    let exact = 40.0 / 3.0 * (24.0 * TONNES / (40.0 * MEGA)).sqrt();
-    let error = |step_s| {
-        let wall = chain(&[(24.0 * TONNES, 40.0 / 3.0)], &[elastic(linear(40.0 * MEGA))]);
-        let settings = RunSettings::new(0.06, 0.75e-3).with_step(step_s);
+fn orders_of_convergence_are_two_and_four() {
+    let amplitude = 40.0 / 3.0 * (24.0 * TONNES / (40.0 * MEGA)).sqrt();
+    let omega = (40.0 * MEGA / (24.0 * TONNES)).sqrt();
+    let wall = chain(&[(24.0 * TONNES, 40.0 / 3.0)], &[elastic(linear(40.0 * MEGA))]);
+    let error = |method, step_s| {
+        let settings = RunSettings::new(0.06, 1.5e-3).with_method(method).with_step(step_s);
         let run = simulate(&wall, &settings).unwrap();
+        assert_eq!(run.step_s, step_s);
         // At a fixed time on the way in, free of the search for the top.
         let row = run.time_s.len() / 2;
-        let omega = (40.0 * MEGA / (24.0 * TONNES)).sqrt();
-        run.interfaces[0].deflection_m[row] - exact * (omega * run.time_s[row]).sin()
+        run.interfaces[0].deflection_m[row] - amplitude * (omega * run.time_s[row]).sin()
     };
-    let order = (error(0.75e-3 / 4.0) / error(0.75e-3 / 8.0)).log2();
-    assert!((order - 2.0).abs() < 0.05, "order {order}");
+    let order = |method, step_s| -> f64 {
+        let ratio: f64 = error(method, step_s) / error(method, step_s / 2.0);
+        ratio.log2()
+    };
+    let two = order(Method::Verlet, 1.5e-3 / 8.0);
+    assert!((two - 2.0).abs() < 0.05, "order {two}");
+    // Coarse, so that rounding stays far below the error.
+    let four = order(Method::FourthOrder, 1.5e-3);
+    assert!((four - 4.0).abs() < 0.05, "order {four}");
 }
 
 #[test]
 fn the_step_keeps_to_its_rule() {
     let stiff = chain(&[(1.0 * TONNES, 5.0)], &[elastic(linear(1e10))]);
-    let run = run(&stiff, 0.01, 1e-3);
-    assert!(run.step_s <= 0.03 * (1e3_f64 / 1e10).sqrt());
+    for (method, share) in [(Method::Verlet, 0.03), (Method::FourthOrder, 0.1)] {
+        let settings = RunSettings::new(0.01, 0.75e-3).with_method(method).with_step(1e-3);
+        assert!(run_with(&stiff, &settings).step_s <= share * (1e3_f64 / 1e10).sqrt());
+    }
 }
 
 #[test]

@@ -237,7 +237,8 @@ impl<'a> Engine<'a> {
         self.rates.damper_w = 0.0;
         for (k, interface) in self.chain.interfaces().iter().enumerate() {
             let Some(damping) = &interface.damping else { continue };
-            let touches = |bank: &Bank<'_>| bank.deflection_m(at, k) > 0.0 && !bank.is_open(k);
+            // At 0 only where bodies meet at the start.
+            let touches = |bank: &Bank<'_>| bank.deflection_m(at, k) >= 0.0 && !bank.is_open(k);
             let pulls = self.pull.as_ref().is_some_and(|pull| pull.has_law(k) && touches(pull));
             if !(touches(&self.push) || pulls) {
                 continue;

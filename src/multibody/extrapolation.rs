@@ -3,7 +3,9 @@
 //!
 //! Gragg's modified midpoint rule, extrapolated in h² (E. Hairer, S. P. Nørsett, G. Wanner,
 //! Solving Ordinary Differential Equations I, II.8 and II.9). Memory advances on accepted steps
-//! only; inside a step the force takes the larger of memory and deflection.
+//! only; inside a step the force takes the larger of memory and deflection. That force is smooth
+//! where a deflection turns, so the error does not show a step over the turn, which would leave
+//! the memory short of the top: steps end at turns.
 
 use super::integrator::{Record, Run, RunSettings, SimulationError};
 use super::interface::ForceLaw;
@@ -17,6 +19,9 @@ const TOLERANCE: f64 = 1e-12;
 const ROWS: usize = 8;
 /// Below this step something is no function.
 const SHORTEST_S: f64 = 1e-15;
+/// A closing speed as small a share of the fastest body's is none: the deflection then is within
+/// `(1e-8)²` of its top.
+const TURNED: f64 = 1e-8;
 
 struct Motion<'a> {
     chain: &'a Chain,
@@ -52,10 +57,19 @@ impl Motion<'_> {
             extension_m = -moved - tension.slack_m;
             pulls = force(&tension.law, extension_m, self.pulled_m[k]);
         }
+        let touches = |law: &ForceLaw, d: f64, largest: f64, force: f64, closing: f64| {
+            let begins = d == 0.0 && closing > 0.0;
+            (d > 0.0 || begins) && (force != 0.0 || d >= largest || !law.has_memory())
+        };
+        let mut in_contact =
+            touches(&interface.law, deflection_m, self.pushed_m[k], pushes, closing);
+        if let Some(tension) = &interface.tension {
+            in_contact |= touches(&tension.law, extension_m, self.pulled_m[k], pulls, -closing);
+        }
         let spring_n = pushes - pulls;
         let mut damper_n = 0.0;
         if let Some(damping) = &interface.damping
-            && spring_n != 0.0
+            && in_contact
         {
             damper_n = damping.at(closing) * closing;
             if interface.tension.is_none() {
@@ -110,16 +124,19 @@ impl Motion<'_> {
         before.iter().zip(&now).zip(&rates).map(|((b, n), r)| 0.5 * (b + n + step * r)).collect()
     }
 
-    /// The state after `h`, and its error over the tolerance.
+    /// The state after `h`, and its error over the tolerance, infinite if no two rows are
+    /// within it.
     fn step(&self, y: &[f64], h: f64, scale: &[f64]) -> (Vec<f64>, f64) {
         let first = self.rates(y);
         let mut table: Vec<Vec<f64>> = Vec::with_capacity(ROWS);
         let mut error = f64::INFINITY;
         for row in 0..ROWS {
+            let before = error;
             let mut value = self.midpoint(y, &first, h, row);
-            // Aitken and Neville in h², along the last row of the table.
-            for (back, previous) in table.iter_mut().enumerate().rev().map(|(k, t)| (row - k, t)) {
-                let ratio = ((row + 1) as f64 / (row + 1 - back) as f64).powi(2);
+            // Aitken and Neville in h², along the last row of the table: `previous` is the row
+            // before in the same column.
+            for (column, previous) in table.iter_mut().enumerate() {
+                let ratio = ((row + 1) as f64 / (row - column) as f64).powi(2);
                 error = 0.0;
                 for ((v, p), s) in value.iter_mut().zip(previous.iter_mut()).zip(scale) {
                     let improved = *v + (*v - *p) / (ratio - 1.0);
@@ -127,12 +144,39 @@ impl Motion<'_> {
                     (*p, *v) = (*v, improved);
                 }
             }
+            // Over a kink two values may agree by chance, but hardly twice.
+            if error <= 1.0 && before <= 1.0 {
+                return (value, error);
+            }
             table.push(value);
-            if error <= 1.0 {
-                break;
+        }
+        (y.to_vec(), f64::INFINITY)
+    }
+}
+
+impl Motion<'_> {
+    /// The share of a step from `y` to `next` up to the first turn of a law with memory at its
+    /// largest deflection, if one lies before the step's end.
+    fn turn(&self, y: &[f64], next: &[f64], slow: f64) -> Option<f64> {
+        let turn = |law: &ForceLaw, before: f64, now: f64, reached: bool| {
+            let turned = law.has_memory() && reached && before > slow && now < -slow;
+            turned.then(|| before / (before - now))
+        };
+        let mut first: Option<f64> = None;
+        for (k, interface) in self.chain.interfaces().iter().enumerate() {
+            let (was, is) = (self.contact(y, k), self.contact(next, k));
+            let reached = |was_m: f64, is_m: f64, most_m: f64| was_m.max(is_m) >= most_m.max(0.0);
+            let pushes = reached(was.deflection_m, is.deflection_m, self.pushed_m[k]);
+            let pushed = turn(&interface.law, was.closing, is.closing, pushes);
+            let pulled = interface.tension.as_ref().and_then(|tension| {
+                let pulls = reached(was.extension_m, is.extension_m, self.pulled_m[k]);
+                turn(&tension.law, -was.closing, -is.closing, pulls)
+            });
+            for share in pushed.into_iter().chain(pulled) {
+                first = Some(first.map_or(share, |f: f64| f.min(share)));
             }
         }
-        (table.pop().unwrap_or_else(|| y.to_vec()), error)
+        first
     }
 }
 
@@ -175,7 +219,11 @@ pub(super) fn run(
             let last = h >= left;
             let step = if last { left } else { h };
             let (next, error) = motion.step(&y, step, &scale);
-            if error <= 1.0 {
+            let turn = if error <= 1.0 { motion.turn(&y, &next, TURNED * fastest) } else { None };
+            if let Some(share) = turn {
+                // The secant's step; it is taken anew until it ends at the turn.
+                h = share * step;
+            } else if error <= 1.0 {
                 y = next;
                 time_s = if last { end_s } else { time_s + step };
                 for (k, interface) in interfaces.iter().enumerate() {

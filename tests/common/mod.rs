@@ -62,12 +62,15 @@ pub fn crumple_fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
 
 /// The Python with the client packages, or `None` (said) if the test command did not set it.
 pub fn python() -> Option<Command> {
-    match std::env::var_os("CRUMPLE_PYTHON") {
+    python_of("CRUMPLE_PYTHON")
+}
+
+/// The Python that a variable names, in the same way.
+pub fn python_of(variable: &str) -> Option<Command> {
+    match std::env::var_os(variable) {
         Some(python) => Some(Command::new(python)),
         None => {
-            eprintln!(
-                "skipped: CRUMPLE_PYTHON is not set; tests/run installs the clients and sets it"
-            );
+            eprintln!("skipped: {variable} is not set; tests/run installs the clients and sets it");
             None
         }
     }
