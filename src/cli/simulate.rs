@@ -55,7 +55,7 @@ struct BodySummary {
     final_v_m_per_s: f64,
     mean_deceleration_m_per_s2: f64,
     mean_deceleration_g: f64,
-    /// Largest mean over 120 ms; null in a shorter run.
+    /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
     moving_mean_deceleration_g: Option<f64>,
 }
 

@@ -104,7 +104,7 @@ pub struct BodyHistory {
     /// Mean of `−a` from the first instant the body's net contact force differs from zero
     /// until it next returns to zero or changes its sign.
     pub mean_deceleration_m_per_s2: f64,
-    /// Largest mean of `−a` over 120 ms; `None` in a shorter run.
+    /// Mean of `−a` over the 120 ms in which its magnitude is largest; `None` in a shorter run.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,
 }
 
@@ -144,7 +144,7 @@ pub struct Run {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RunWarning {
     #[error(
-        "the step of {asked_s:e} s is too long for interface {interface}: {used_s:e} s was used"
+        "the step of {asked_s:.3e} s is too long for interface {interface}: {used_s:.3e} s was used"
     )]
     StepShortened { asked_s: f64, used_s: f64, interface: String },
     #[error(
@@ -207,7 +207,9 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
     };
     let (shortest_s, k) = chain.shortest_time_s();
     let interface = |k: usize| chain.interfaces()[k].name.clone();
-    if settings.step_s > settings.method.step_rule() * shortest_s {
+    // The default step is not what anybody asked for.
+    let is_asked = settings.step_s != settings.method.default_step_s();
+    if is_asked && settings.step_s > settings.method.step_rule() * shortest_s {
         let (asked_s, used_s) = (settings.step_s, step_s);
         run.warnings.push(RunWarning::StepShortened { asked_s, used_s, interface: interface(k) });
     }

@@ -148,7 +148,8 @@ impl Phase {
     }
 }
 
-/// Largest mean deceleration over 120 ms, from the speeds at its ends.
+/// Mean deceleration over the 120 ms in which its magnitude is largest, from the speeds at the
+/// ends.
 fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
     let window = MOVING_MEAN_S / interval_s;
     // Rounding shall not make 160 intervals of 0.75 ms a little more than 120 ms.
@@ -159,5 +160,5 @@ fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
         let (before, after) = (speeds[j - back], speeds[j - back + 1]);
         (before + share * (after - before) - speeds[j]) / MOVING_MEAN_S
     };
-    (back.max(1)..speeds.len()).map(mean).reduce(f64::max)
+    (back.max(1)..speeds.len()).map(mean).reduce(|a, b| if b.abs() > a.abs() { b } else { a })
 }
