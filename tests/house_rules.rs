@@ -47,6 +47,7 @@ const MAY_NAME: [(&str, &[&str]); 22] = [
             "surrogate",
             "dataset",
             "database",
+            "solver",
             "curve",
             "history",
             "unit",

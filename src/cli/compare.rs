@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crumple::compare::train::{TrainComparison, compare_train};
 use crumple::compare::{self, Comparison, Settings};
@@ -279,7 +279,7 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
 }
 
 /// `compare --train`.
-fn train(path: &PathBuf, settings: &Settings, manners: Manners) -> CommandResult {
+fn train(path: &Path, settings: &Settings, manners: Manners) -> CommandResult {
     let scenario = scenario::read(path)?;
     let comparison = compare_train(path, &scenario, settings)?;
     let mut warned = false;

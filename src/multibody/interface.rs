@@ -161,6 +161,17 @@ impl ForceLaw {
         Self::with(envelope, unloading, UnloadingShape::line(), end, false)
     }
 
+    /// The same with an unloading branch that is no straight line; its energy is that of the
+    /// line of the unloading stiffness.
+    pub fn shaped(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+    ) -> Self {
+        Self::with(envelope, unloading, shape, end, false)
+    }
+
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
     /// line of the unloading stiffness from the envelope's end.
     ///
