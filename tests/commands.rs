@@ -691,18 +691,61 @@ fn compare_leaves_the_speed_out() {
     ));
     let rows = result["rows"].as_array().unwrap();
     let methods: Vec<&str> = rows.iter().map(|r| r["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["fe", "fe_body", "fdrm", "ddtcm", "best"]);
+    assert_eq!(methods, ["fe", "fe_body", "fdrm", "nsdm", "ddtcm", "best"]);
     let value = |row: usize, key: &str| rows[row][key].as_f64().unwrap();
     // FE's own contact curve in a one-mass model misses by 2-7 % in velocity.
     assert!((0.02..0.07).contains(&value(0, "velocity_l1")), "{}", value(0, "velocity_l1"));
     assert_eq!(value(0, "force_l1"), 0.0);
     // Its body force nearly repeats the motion.
     assert!(value(1, "velocity_l1") < 0.01 && value(1, "acceleration_l1") < 0.05);
-    assert!(value(2, "force_l1") > 0.05 && value(3, "force_l1") > 0.05, "both were left out");
+    assert!(value(2, "force_l1") > 0.05 && value(4, "force_l1") > 0.05, "both were left out");
     assert_eq!(rows[2]["curve"], "FE at 36 km/h");
-    assert_eq!(rows[3]["curve"], "forest on 4 speeds");
-    assert!(rows[4]["curve"].as_str().unwrap().ends_with(" on 4 speeds"));
-    assert!(value(4, "velocity_l1") < value(3, "velocity_l1"));
+    assert_eq!(rows[3]["curve"], "fit to FE at 36 km/h");
+    assert_eq!(rows[4]["curve"], "forest on 4 speeds");
+    assert!(rows[5]["curve"].as_str().unwrap().ends_with(" on 4 speeds"));
+    assert!(value(5, "velocity_l1") < value(4, "velocity_l1"));
+    // Every measure of both signals; FE's own force agrees best.
+    for key in ["velocity", "acceleration"] {
+        let score = |row: usize| rows[row][key]["iso18571"]["rating"].as_f64().unwrap();
+        assert!(score(1) > 0.94 && (2..6).all(|row| score(row) < score(1)), "{key}");
+        let all = &rows[5][key];
+        for measure in ["rms_ratio", "peak_norm", "sprague_geers", "russell", "cora"] {
+            assert!(!all[measure].is_null(), "{key} has no {measure}");
+        }
+    }
+    // FE's time is that of its case file: 491 s for this run, over a thousand for the others.
+    assert!((result["fe_time_s"].as_f64().unwrap() - 491.0).abs() < 1.0);
+    let own = value(5, "predict_time_s") + value(5, "simulation_time_s");
+    assert!(
+        (value(5, "speed_up") / (result["fe_time_s"].as_f64().unwrap() / own) - 1.0).abs() < 1e-9
+    );
+    assert!(value(5, "speed_up_with_training") < 1.0, "four FE runs cost more than one");
+    // Seeds agree in errors at their own speed far better than in parameters.
+    let nsdm = &result["nsdm"];
+    assert_eq!(nsdm["fits"].as_array().unwrap().len(), 3);
+    assert!(nsdm["fits"][0]["own_velocity_l1"].as_f64().unwrap() < 0.1);
+    assert!(nsdm["identifiability"]["stiffness"]["largest"].as_f64().unwrap() > 0.5);
+}
+
+/// Without a speed every inner one is left out in turn; FDRM and NSDM stay at the chosen one.
+#[test]
+fn compare_at_all_speeds_with_one_fixed_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    build_fixture(folder.path(), WALL);
+    let base = ["compare", "curves.h5", "--group", WALL, "--nsdm-seeds", "0"];
+    let all = [&base[..], &["--fixed-speed", "25km/h", "--json"]].concat();
+    let result = json(&crumple_ok(folder.path(), &all));
+    let comparisons = result["comparisons"].as_array().unwrap();
+    assert_eq!(comparisons.len(), 3);
+    for comparison in comparisons {
+        assert_eq!(comparison["rows"][2]["curve"], "FE at 25 km/h");
+    }
+    let mean = result["means"][2]["velocity_l1"].as_f64().unwrap();
+    let sum: f64 = comparisons.iter().map(|c| c["rows"][2]["velocity_l1"].as_f64().unwrap()).sum();
+    assert!((mean - sum / 3.0).abs() < 1e-12);
+    let own = [&base[..], &["--fixed-speed", "48km/h", "--speed", "48km/h"]].concat();
+    let error = crumple_fails(folder.path(), 1, &own);
+    assert!(error.contains("the speed that is left out: choose another one"), "{error}");
 }
 
 #[test]

@@ -77,6 +77,16 @@ fn picture() {
     );
 }
 
+/// The README's other picture as well.
+#[test]
+fn train_set() {
+    let committed = std::fs::read_to_string(root().join("examples/train_set.svg")).unwrap();
+    assert!(
+        example("train_set", &[]) == committed,
+        "draw it again: cargo run --example train_set > examples/train_set.svg"
+    );
+}
+
 #[test]
 fn every_example_is_run_here() {
     let here = std::fs::read_to_string(root().join("tests/examples.rs")).unwrap();

@@ -65,3 +65,18 @@ fn table_of_the_readme_is_the_demos() {
         assert!(demo.lines().any(|l| l == line), "the demo does not print: {line}\n{demo}");
     }
 }
+
+/// The tables of the methods are those that the commands print.
+#[test]
+fn tables_of_the_methods_are_those_of_compare() {
+    let folder = tempfile::tempdir().unwrap();
+    crumple_ok(folder.path(), &["demo", "-o", ".", "-q"]);
+    let group = crumple_ok(folder.path(), &["compare", "curves.h5", "--group", "lead-car-wall"]);
+    let train = crumple_ok(folder.path(), &["compare", "--train", "train-set.toml", "-q"]);
+    let tables = blocks("txt");
+    assert_eq!(tables.iter().filter(|l| l.starts_with("nsdm")).count(), 2, "two tables");
+    for line in tables {
+        let printed = group.lines().chain(train.lines()).any(|l| l == line);
+        assert!(printed, "compare does not print: {line}\n{group}\n{train}");
+    }
+}

@@ -316,7 +316,6 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
             let mut cells =
                 vec![row.method.clone(), cell(row.mean_velocity_l1, row.mean_acceleration_l1)];
             cells.extend(row.vehicles.iter().map(|v| cell(v.velocity_l1, v.acceleration_l1)));
-            cells.push(format!("{:.2} ms", row.simulation_time_s * 1e3));
             let speeds: Vec<String> = row
                 .interface_speeds_m_per_s
                 .iter()
@@ -328,8 +327,14 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
         .collect();
     let mut heading = vec!["method", "mean"];
     heading.extend(vehicles.iter().map(|v| v.as_str()));
-    heading.extend(["curves and run", "curves at"]);
+    heading.push("curves at");
     output::table(out, &heading, &rows)?;
+    let times: Vec<String> = comparison
+        .rows
+        .iter()
+        .map(|row| format!("{} {:.2} ms", row.method, row.simulation_time_s * 1e3))
+        .collect();
+    writeln!(out, "time of curves and run: {}", times.join(", "))?;
     writeln!(out, "\nspeeds in m/s")?;
     let step = comparison.time_s.len().div_ceil(SPEED_ROWS).max(1);
     let columns = |of: &BTreeMap<String, Vec<f64>>, i: usize| {

@@ -1,0 +1,284 @@
+//! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
+//! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
+
+mod common;
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use common::{crumple_fails, crumple_ok, root};
+use serde_json::Value;
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+/// The demo's folder, made once.
+fn demo() -> &'static Path {
+    static DEMO: OnceLock<tempfile::TempDir> = OnceLock::new();
+    DEMO.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        crumple_ok(folder.path(), &["demo", "-o", ".", "-q"]);
+        folder
+    })
+    .path()
+}
+
+/// Runs a scenario text in a folder of its own.
+fn run(text: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    json(&crumple_ok(folder.path(), &["simulate", "s.toml", "--json", "-q"]))
+}
+
+fn fails(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    crumple_fails(folder.path(), 1, &["simulate", "s.toml"])
+}
+
+fn column(run: &Value, name: &str) -> Vec<f64> {
+    let values = run[name].as_array().unwrap_or_else(|| panic!("no column {name}"));
+    values.iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+const STAGES: &str = "stages = [ { stroke = \"100mm\", from = \"0kN\", to = \"600kN\" }, \
+    { stroke = \"300mm\", from = \"1.5MN\" }, { stroke = \"900mm\", from = \"2.2MN\", to = \"3MN\" } ]";
+
+fn scenario(curves: &str, first: &str, rest: &str) -> String {
+    format!(
+        "[run]\nduration = \"300ms\"\noutput_interval = \"0.75ms\"\n[curves]\n{curves}\n\
+         [[train]]\nname = \"A\"\nspeed = \"36km/h\"\n{first}\n{rest}\n[contact]\ncurve = \"nose\"\n"
+    )
+}
+
+/// Every shipped scenario runs; energy and momentum balance.
+#[test]
+fn shipped_scenarios_run() {
+    let mut run = 0;
+    for entry in root().join("examples/trains").read_dir().unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let result = json(&crumple_ok(demo(), &["simulate", &name, "--json", "-q"]));
+        let ledger = &result["ledger"];
+        assert!(ledger["max_energy_error"].as_f64().unwrap() < 1e-3, "{name}: {ledger}");
+        assert!(ledger["max_momentum_error"].as_f64().unwrap() < 1e-10, "{name}: {ledger}");
+        if name.starts_with("en15227") {
+            let statement = result["summary"]["limits"]["statement"].as_str().unwrap();
+            assert!(statement.contains("no statement of conformity with EN 15227:2020"));
+        }
+        run += 1;
+    }
+    assert!(run >= 7, "{run} scenarios");
+}
+
+/// Interior interfaces get curves for their own speeds, far below the trains'; all get the
+/// trains' speed if that is asked for.
+#[test]
+fn interfaces_have_their_own_speeds() {
+    let text = std::fs::read_to_string(demo().join("eight-on-eight.toml")).unwrap();
+    let speeds = |text: &str| -> Vec<f64> {
+        std::fs::write(demo().join("local.toml"), text).unwrap();
+        let result = json(&crumple_ok(demo(), &["simulate", "local.toml", "--json", "-q"]));
+        let interfaces = result["summary"]["interfaces"].as_array().unwrap().clone();
+        interfaces.iter().map(|i| i["curve_speed_m_per_s"].as_f64().unwrap()).collect()
+    };
+    let local = speeds(&text);
+    assert_eq!(local.len(), 15);
+    assert!((local[7] - 10.0).abs() < 1e-12, "the noses: {local:?}");
+    for (k, speed) in local.iter().enumerate().filter(|(k, _)| *k != 7) {
+        assert!((1.0..5.0).contains(speed), "interface {k}: {speed}");
+        assert!((speed - local[14 - k]).abs() < 0.1, "both trains are alike: {local:?}");
+    }
+    let train = speeds(&text.replace("\"local\"", "\"train\""));
+    assert!(train.iter().all(|v| (v - 10.0).abs() < 1e-12), "{train:?}");
+}
+
+/// A crush zone on a very stiff link moves with its body as one vehicle would.
+#[test]
+fn a_stiff_link_makes_a_split_vehicle_one() {
+    let nose = format!("nose = {{ {STAGES}, unloading = \"100MN/m\" }}\n");
+    let link = "link = { stages = [ { stroke = \"1m\", from = \"0kN\", to = \"900MN\" } ], law = \"elastic\", tension = \"pull\" }\n\
+                pull = { stages = [ { stroke = \"1m\", from = \"0kN\", to = \"900MN\" } ], law = \"elastic\" }";
+    let wall = "[wall]";
+    let one = run(&scenario(&nose, "vehicles = [ { name = \"A1\", mass = \"24t\" } ]", wall));
+    let split = run(&scenario(
+        &format!("{nose}{link}"),
+        "vehicles = [ { name = \"A1\", mass = \"24t\", front = { mass = \"0.5t\", curve = \"link\" } } ]",
+        wall,
+    ));
+    let (a, b) = (column(&one, "v_m_per_s[A1]"), column(&split, "v_m_per_s[A1]"));
+    // The light mass m on its stiff link k swings around the common motion: a step ΔF of the nose
+    // moves the body of mass M by up to 2 ΔF/(M √(k/m)), 0.9 MN: 0.056 m/s.
+    let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.056, "{worst} m/s");
+    assert_eq!(column(&split, "v_m_per_s[A1 front]").len(), a.len());
+    assert!(split["force_N[A1|wall]"].is_array() && split["force_N[A1 front|A1]"].is_array());
+    assert!(split["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
+}
+
+/// Coupled vehicles pull each other back; without a coupling they part.
+#[test]
+fn couplings_pull() {
+    let vehicles = "inner = \"inner\"\nvehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"20t\" } ]";
+    let nose = format!("nose = {{ {STAGES}, unloading = \"40MN/m\" }}\n");
+    let inner = |more: &str| {
+        format!(
+            "{nose}inner = {{ stages = [ {{ stroke = \"500mm\", from = \"0kN\", to = \"5MN\" }} ], law = \"elastic\"{more} }}\n"
+        )
+    };
+    // They rebound from the wall at first.
+    let long = |text: String| run(&text.replace("300ms", "600ms"));
+    let free = long(scenario(&inner(""), vehicles, "[wall]"));
+    let pull = "pull = { stages = [ { stroke = \"500mm\", from = \"0kN\", to = \"5MN\" } ], law = \"elastic\", gap = \"10mm\" }";
+    let coupled =
+        run(&scenario(&format!("{}{pull}", inner(", tension = \"pull\"")), vehicles, "[wall]"));
+    let least = |run: &Value| column(run, "force_N[A1|A2]").into_iter().fold(0.0, f64::min);
+    assert_eq!(least(&free), 0.0);
+    assert!(least(&coupled) < -1e4, "{}", least(&coupled));
+    let apart = |run: &Value| {
+        let last = |name: &str| *column(run, name).last().unwrap();
+        last("x_m[A1]") - last("x_m[A2]")
+    };
+    assert!(apart(&coupled) < apart(&free) || apart(&coupled).abs() < apart(&free).abs());
+    assert!(coupled["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
+}
+
+/// Stages stand in series on one stroke, with steps between them.
+#[test]
+fn stages_are_followed() {
+    let text = scenario(
+        &format!("nose = {{ {STAGES}, unloading = \"100MN/m\" }}"),
+        "vehicles = [ { name = \"A1\", mass = \"24t\" } ]",
+        "[wall]",
+    );
+    let result = run(&text);
+    let (d, f) = (column(&result, "deflection_m[A1|wall]"), column(&result, "force_N[A1|wall]"));
+    let at = |low: f64, high: f64| {
+        let inside = d.iter().zip(&f).take_while(|(d, _)| **d < 0.5);
+        inside.filter(|(d, _)| (low..high).contains(*d)).map(|(_, f)| *f).collect::<Vec<_>>()
+    };
+    assert!(at(0.11, 0.39).iter().all(|f| *f == 1.5e6), "a tube at constant force");
+    assert!(at(0.0, 0.099).windows(2).all(|w| w[1] >= w[0]));
+    // 1.2 MJ: 0.03 + 0.45 MJ in the first two stages, the rest on 2.2 MN and rising.
+    let rest: f64 = 1.2e6 - 0.03e6 - 0.45e6;
+    let slope = 0.8e6 / 0.9;
+    let expected = 0.4 + ((2.2e6_f64.powi(2) + 2.0 * slope * rest).sqrt() - 2.2e6) / slope;
+    let crush = result["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap();
+    // The steps take 0.1 mm.
+    assert!((crush - expected).abs() < 2e-4, "{crush} for {expected}");
+}
+
+/// Head-on: the second train's speed is below 0.
+#[test]
+fn trains_meet_head_on() {
+    let curves = format!("nose = {{ {STAGES}, unloading = \"100MN/m\" }}");
+    let vehicles = |name: &str| format!("vehicles = [ {{ name = \"{name}\", mass = \"24t\" }} ]");
+    let second =
+        |speed: &str| format!("[[train]]\nname = \"B\"\nspeed = \"{speed}\"\n{}", vehicles("B1"));
+    let head_on = run(&scenario(&curves, &vehicles("A1"), &second("-36km/h")));
+    assert!(column(&head_on, "v_m_per_s[B1]")[0] == -10.0);
+    let sum: f64 = ["A1", "B1"]
+        .iter()
+        .map(|n| column(&head_on, &format!("v_m_per_s[{n}]")).last().unwrap().to_owned())
+        .sum();
+    assert!(sum.abs() < 1e-9, "equal trains keep no momentum: {sum}");
+}
+
+/// Braking takes energy and momentum, and the ledger says so.
+#[test]
+fn resistance_is_in_the_ledger() {
+    let text = scenario(
+        &format!("nose = {{ {STAGES}, unloading = \"100MN/m\" }}"),
+        "resistance = { braking = 0.15, constant_m_per_s2 = 0.01 }\nvehicles = [ { name = \"A1\", mass = \"24t\" } ]",
+        "[wall]",
+    );
+    let result = run(&text);
+    assert!(result["ledger"]["resisted_J"].as_f64().unwrap() > 1e3);
+    assert!(result["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
+    assert!(result["ledger"]["max_momentum_error"].as_f64().unwrap() < 1e-10);
+    let fourth = text.replace("[curves]", "method = \"fourth_order\"\n[curves]");
+    let error = fails(&fourth);
+    assert!(error.contains("resistance") && error.contains("method = \"verlet\""), "{error}");
+}
+
+/// What the curve's kind may not drive is refused, and the reason says what to do.
+#[test]
+fn the_force_must_suit_the_vehicles() {
+    let text = |vehicle: &str| {
+        format!(
+            "[run]\nduration = \"100ms\"\n[curves]\nnose = {{ model = \"lead.model\", force = \"body\" }}\n\
+             link = {{ {STAGES}, unloading = \"100MN/m\" }}\n[[train]]\nname = \"A\"\nspeed = \"50km/h\"\n\
+             vehicles = [ {vehicle} ]\n[wall]\n[contact]\ncurve = \"nose\"\n"
+        )
+    };
+    let split = "{ name = \"A1\", mass = \"24t\", front = { mass = \"2t\", curve = \"link\" } }";
+    std::fs::write(demo().join("force.toml"), text(split)).unwrap();
+    let error = crumple_fails(demo(), 1, &["simulate", "force.toml"]);
+    assert!(
+        error.contains("curve \"nose\": interface A1|wall has a vehicle with a crush zone"),
+        "{error}"
+    );
+    let free = text(split).replace(", force = \"body\"", "");
+    std::fs::write(demo().join("force.toml"), &free).unwrap();
+    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    let force = |r: &Value, k: usize| r["summary"]["interfaces"][k]["curve_force"].clone();
+    assert_eq!(force(&result, 1), "contact", "the split vehicle takes the contact force");
+    let one = free.replace(", front = { mass = \"2t\", curve = \"link\" }", "");
+    std::fs::write(demo().join("force.toml"), one).unwrap();
+    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    assert_eq!(force(&result, 0), "body", "one mass takes the body force");
+}
+
+#[test]
+fn wrong_trains_are_explained() {
+    let nose = format!("nose = {{ {STAGES}, unloading = \"100MN/m\" }}");
+    let one = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]";
+    let t = |curves: &str, first: &str, expected: &str| {
+        let error = fails(&scenario(curves, first, "[wall]"));
+        assert!(error.contains("s.toml") && error.contains(expected), "{error}");
+    };
+    let no_unloading = nose.replace(", unloading = \"100MN/m\"", "");
+    t(&no_unloading, one, "it has stages, which do not say how they unload");
+    let flat = nose.replace("stroke = \"300mm\"", "stroke = \"0.1mm\"");
+    t(&flat, one, "stage 2 has a stroke of 0.0001 m: expected over 0.2 mm");
+    let tension = nose.replace("unloading", "tension = \"pull\", unloading");
+    t(&tension, one, "its tension curve \"pull\" is not in [curves]");
+    let damper =
+        nose.replace("unloading", "damping = { coefficient_N_s_per_m = [-1.0] }, unloading");
+    t(&damper, one, "coefficients of 0 or more");
+    let all = "vehicles = [ { name = \"A1\", mass = \"2t\", front = { mass = \"2t\", curve = \"nose\" } } ]";
+    t(&nose, all, "nothing is left for the body");
+    let behind = "vehicles = [ { name = \"A1\", mass = \"2t\", behind = \"nose\" } ]";
+    t(&nose, behind, "there is nothing behind the last vehicle \"A1\"");
+    let both = nose.replace("unloading", "file = \"a.csv\", unloading");
+    t(&both, one, "needs exactly one of model, file, database and stages");
+    let limits =
+        format!("{nose}\n[limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = -1.0");
+    t(&limits, one, "mean_deceleration_g = -1: expected more than 0");
+}
+
+/// Velocities of every vehicle against FE's run of the train, by every method.
+#[test]
+fn the_train_set_is_compared_with_fe() {
+    let text = crumple_ok(
+        demo(),
+        &["compare", "--train", "train-set.toml", "--nsdm-seeds", "1", "--json", "-q"],
+    );
+    let result = json(&text);
+    assert!((result["until_s"].as_f64().unwrap() - 0.135).abs() < 1e-3);
+    let rows = result["rows"].as_array().unwrap();
+    let methods: Vec<&str> = rows.iter().map(|r| r["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["fe_body", "fdrm", "nsdm", "ddtcm", "best_train", "best_local"]);
+    for row in rows {
+        let vehicles = row["vehicles"].as_array().unwrap();
+        assert_eq!(vehicles.len(), 3);
+        assert!(vehicles.iter().all(|v| v["velocity_l1"].as_f64().unwrap().is_finite()));
+    }
+    let speed = |row: &Value, name: &str| row["interface_speeds_m_per_s"][name].as_f64().unwrap();
+    assert!((speed(&rows[4], "A2|A3") - 5.0).abs() < 1e-9);
+    assert!(speed(&rows[5], "A2|A3") < 4.0);
+    // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
+    assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
+    let error = crumple_fails(demo(), 1, &["compare", "--train", "scenario.toml"]);
+    assert!(error.contains("the scenario has no [reference]"), "{error}");
+}
