@@ -440,7 +440,10 @@ fn warnings_and_errors_name_the_interface() {
     let deflection_m = run.interfaces[0].max_deflection_m;
     let interface = String::from("nose|wall");
     assert!(deflection_m > 0.2);
-    assert_eq!(run.warnings, [RunWarning::BeyondEnd { interface, deflection_m, end_m: 0.2 }]);
+    assert_eq!(
+        run.warnings,
+        [RunWarning::BeyondEnd { interface, what: "crushed", deflection_m, end_m: 0.2 }]
+    );
     let stiff = against_wall(Interface::new("buffer", linear(1e4 * MEGA), 0.0));
     match &simulate(&stiff, &long).unwrap().warnings[..] {
         [RunWarning::StepShortened { asked_s, used_s, interface }] => {
@@ -452,7 +455,7 @@ fn warnings_and_errors_name_the_interface() {
     for method in [Method::Verlet, Method::FourthOrder, Method::Reference] {
         let settings = settings().with_method(method);
         match simulate(&with(EnvelopeEnd::Error), &settings).unwrap_err() {
-            SimulationError::CurveEnd { interface, deflection_m, time_s, end_m } => {
+            SimulationError::CurveEnd { interface, deflection_m, time_s, end_m, what: _ } => {
                 assert_eq!((interface.as_str(), end_m), ("nose|wall", 0.2));
                 // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.
                 assert!(deflection_m > 0.2 && deflection_m < 0.212, "{method:?}: {deflection_m}");

@@ -35,10 +35,10 @@ pub struct Args {
     #[arg(required_unless_present = "train", conflicts_with = "train")]
     database: Option<PathBuf>,
     /// Group to compare in
-    #[arg(long, required_unless_present = "train")]
+    #[arg(long, required_unless_present = "train", conflicts_with = "train")]
     group: Option<String>,
     /// Speed to leave out, with its unit; every inner speed in turn if absent
-    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true)]
+    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, conflicts_with = "train")]
     speed: Option<f64>,
     /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent
     #[arg(long, value_parser = arguments::speed, conflicts_with = "train")]

@@ -115,6 +115,17 @@ fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Refuses to write over a scenario or a file that it names.
+fn keep_inputs(scenario: &Path, output: &Path) -> Result<(), Failure> {
+    keep_input(scenario, output)?;
+    // A scenario that cannot be read is reported by whoever runs it.
+    let Ok(read) = crumple::scenario::read(scenario) else { return Ok(()) };
+    for file in read.files(scenario) {
+        keep_input(&file, output)?;
+    }
+    Ok(())
+}
+
 /// Whether an output argument means standard output.
 fn is_stdout(output: &Path) -> bool {
     output == Path::new("-")

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use crumple::file::write_whole;
 use crumple::multibody::integrator::BodyHistory;
 use crumple::multibody::ledger::Ledger;
-use crumple::multibody::{Run, STANDARD_GRAVITY_M_PER_S2, simulate};
+use crumple::multibody::{Run, STANDARD_GRAVITY_M_PER_S2, SimulationError, simulate};
 use crumple::scenario::{self, Prepared};
 use crumple::unit::km_per_h;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::output;
-use super::{CommandResult, Manners, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_inputs};
 
 /// Run a scenario and write the histories of every body and interface
 #[derive(clap::Args)]
@@ -69,18 +69,45 @@ struct InterfaceSummary {
     /// When both sides first had the same velocity.
     common_velocity_time_s: Option<f64>,
     restitution: Option<f64>,
+    /// Of a coupling; 0 without one.
+    #[serde(rename = "peak_tension_N")]
+    peak_tension_n: f64,
+    max_extension_m: f64,
     /// Name of its curve, which force it is where that is known, and the speed it is for.
     curve: String,
     curve_force: Option<&'static str>,
     curve_speed_m_per_s: Option<f64>,
 }
 
+/// Why a run stopped, with the scenario's place.
+#[derive(Debug)]
+struct InScenario {
+    path: PathBuf,
+    source: SimulationError,
+}
+
+impl std::fmt::Display for InScenario {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.path.display(), self.source)
+    }
+}
+
+impl std::error::Error for InScenario {}
+
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
     if let Some(output) = &args.output {
-        keep_input(&args.scenario, output)?;
+        keep_inputs(&args.scenario, output)?;
+        let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));
+        if !is_stdout(output) && !is_csv {
+            return Err(Failure::Usage(format!(
+                "-o {}: a run is written as CSV: name a .csv file, or use --json",
+                output.display()
+            )));
+        }
     }
     let prepared = scenario::load(&args.scenario)?;
-    let run = simulate(&prepared.chain, &prepared.settings)?;
+    let run = simulate(&prepared.chain, &prepared.settings)
+        .map_err(|source| InScenario { path: args.scenario.clone(), source })?;
     let mut warnings = prepared.warnings.clone();
     warnings.extend(run.all_warnings());
     for warning in &warnings {
@@ -194,6 +221,8 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
             max_deflection_time_s: history.max_deflection_time_s,
             common_velocity_time_s: history.common_velocity_time_s,
             restitution: history.restitution,
+            peak_tension_n: history.peak_tension_n,
+            max_extension_m: history.max_extension_m,
             curve: used.curve.clone(),
             curve_force: used.force,
             curve_speed_m_per_s: used.speed_m_per_s,

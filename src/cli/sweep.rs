@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::output;
 use super::progress::Count;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input, keep_inputs};
 
 /// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each
 ///
@@ -93,8 +93,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         return Err(Failure::Usage("name the scenario".into()));
     };
     if let Some(output) = &args.output {
-        for input in [scenario].into_iter().chain(&args.plan) {
-            keep_input(input, output)?;
+        keep_inputs(scenario, output)?;
+        if let Some(plan) = &args.plan {
+            keep_input(plan, output)?;
         }
         check_output(output)?;
         if is_stdout(output) && manners.json {

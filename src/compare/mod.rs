@@ -36,6 +36,12 @@ pub struct Settings {
     pub nsdm_start: Start,
 }
 
+impl Settings {
+    fn nsdm_seeds(&self) -> Vec<u64> {
+        (0..self.nsdm_seeds).map(|k| self.seed.wrapping_add(k)).collect()
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self { seed: 0, fixed_speed_m_per_s: None, nsdm_seeds: 3, nsdm_start: Start::Random }
@@ -347,7 +353,7 @@ fn fit_nsdm(
     let target = nsdm_target(&own)?;
     let choices = nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
     let mut fits = Vec::new();
-    for seed in settings.seed..settings.seed + settings.nsdm_seeds {
+    for seed in settings.nsdm_seeds() {
         let start = Instant::now();
         let fit = nsdm::fit(&target, &choices, seed)?;
         fits.push((fit, start.elapsed().as_secs_f64()));

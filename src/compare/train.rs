@@ -140,6 +140,16 @@ pub enum TrainError {
     NoVehicle { name: String, known: String },
     #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
     TooShort { states: usize, until_s: f64 },
+    #[error(
+        "{path}: the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
+    )]
+    RunTooShort { path: PathBuf, duration_s: f64, until_s: f64 },
+    #[error("{path}: [reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
+    NoNodes { path: PathBuf },
+    #[error(
+        "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
+    )]
+    OtherSpeed { path: PathBuf, vehicle: String, fe_m_per_s: f64, m_per_s: f64 },
     #[error("the scenario has no [reference]: it names FE's run of the train")]
     NoReference,
     #[error(
@@ -160,6 +170,9 @@ impl From<ScenarioError> for CompareError {
     }
 }
 
+/// FE's vehicles begin at the scenario's speeds, but for this share.
+const SAME_SPEED: f64 = 0.02;
+
 /// A method: what it makes of the scenario and its sources.
 struct Method<'a> {
     name: &'a str,
@@ -179,7 +192,20 @@ pub fn compare_train(
     settings: &Settings,
 ) -> Result<TrainComparison, CompareError> {
     let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
+    if reference.nodes.is_empty() {
+        return Err(TrainError::NoNodes { path: path.into() }.into());
+    }
     let fe = &FeTrain::read(path, reference).map_err(CompareError::from)?;
+    for (name, speeds) in &fe.velocities {
+        let train = scenario.train.iter().find(|t| t.vehicles.iter().any(|v| v.name == *name));
+        if let (Some(train), Some(&fe_m_per_s)) = (train, speeds.first()) {
+            let m_per_s = train.speed.0;
+            if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
+                let (path, vehicle) = (path.into(), name.clone());
+                return Err(TrainError::OtherSpeed { path, vehicle, fe_m_per_s, m_per_s }.into());
+            }
+        }
+    }
     let until_s = reference.until.map_or(f64::MAX, |t| t.0);
     let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
     if states < 3 {
@@ -246,7 +272,7 @@ fn methods<'a>(
             let target = nsdm_target(&Reference::of(case)?)?;
             let choices =
                 nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
-            let seeds: Vec<u64> = (settings.seed..settings.seed + settings.nsdm_seeds).collect();
+            let seeds: Vec<u64> = settings.nsdm_seeds();
             let fits = nsdm::fit_seeds(&target, &choices, &seeds)?;
             let best = fits.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective));
             let (Some(fit), Some(table)) = (best, changed.curves.get_mut(name)) else { continue };
@@ -313,7 +339,11 @@ fn row(
         };
         let reference = &reference[..time_s.len()];
         let ours = interpolate(&run.time_s, &run.bodies[i].v_m_per_s, time_s).map_err(|_| {
-            TrainError::TooShort { states: run.time_s.len(), until_s: time_s[time_s.len() - 1] }
+            TrainError::RunTooShort {
+                path: path.into(),
+                duration_s: run.time_s.last().copied().unwrap_or(0.0),
+                until_s: time_s[time_s.len() - 1],
+            }
         })?;
         let acceleration = |v: &[f64]| filtered(time_s, derivative(time_s, v));
         vehicles.push(VehicleErrors {

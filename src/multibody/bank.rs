@@ -173,24 +173,25 @@ impl<'a> Bank<'a> {
     /// Deflections and forces at positions `x_m` (padded by one); whether some interface has
     /// left its piece. At the end of a step the largest deflections follow.
     #[inline(always)]
-    pub fn evaluate(&mut self, x_m: &[f64], at: At) -> bool {
+    pub fn evaluate<const N: usize>(&mut self, x_m: &[f64], at: At) -> bool {
         match at {
-            At::End => self.pass::<true>(x_m, at as usize),
-            At::Start | At::Inside => self.pass::<false>(x_m, at as usize),
+            At::End => self.pass::<N, true>(x_m, at as usize),
+            At::Start | At::Inside => self.pass::<N, false>(x_m, at as usize),
         }
     }
 
     #[inline(always)]
-    fn pass<const FOLLOW: bool>(&mut self, x_m: &[f64], at: usize) -> bool {
+    fn pass<const N: usize, const FOLLOW: bool>(&mut self, x_m: &[f64], at: usize) -> bool {
         let sign = self.sign;
         let mut out = [0.0_f64; LANES];
-        let n = self.lanes.len();
+        let n = if N > 0 { N } else { self.lanes.len() };
         let deflections = &mut self.deflection_m[at][..n];
         let forces = &mut self.force_n[at][1..].as_chunks_mut::<LANES>().0[..n];
         let (here, ahead) =
             (&x_m.as_chunks::<LANES>().0[..n], &x_m[1..].as_chunks::<LANES>().0[..n]);
+        let all = &mut self.lanes[..n];
         for c in 0..n {
-            let (lanes, here, ahead) = (&mut self.lanes[c], &here[c], &ahead[c]);
+            let (lanes, here, ahead) = (&mut all[c], &here[c], &ahead[c]);
             // Whole arrays at a time, which the compiler turns into vectors.
             let deflection = each(|j| sign * (here[j] - ahead[j]) - lanes.gap_m[j]);
             forces[c] = each(|j| lanes.at_zero_n[j] + lanes.slope_n_per_m[j] * deflection[j]);
@@ -211,12 +212,13 @@ impl<'a> Bank<'a> {
 
     /// Sets `out_n[k + 1]` to `factor` times the change of the force of `k` along `a`.
     #[inline(always)]
-    pub fn gradient(&self, a: &[f64], factor: f64, out_n: &mut [f64]) {
-        let n = self.lanes.len();
+    pub fn gradient<const N: usize>(&self, a: &[f64], factor: f64, out_n: &mut [f64]) {
+        let n = if N > 0 { N } else { self.lanes.len() };
         let (here, ahead) = (&a.as_chunks::<LANES>().0[..n], &a[1..].as_chunks::<LANES>().0[..n]);
         let out = &mut out_n[1..].as_chunks_mut::<LANES>().0[..n];
+        let all = &self.lanes[..n];
         for c in 0..n {
-            let slope = &self.lanes[c].slope_n_per_m;
+            let slope = &all[c].slope_n_per_m;
             out[c] = each(|j| factor * slope[j] * (here[c][j] - ahead[c][j]));
         }
     }

@@ -29,7 +29,6 @@ pub(super) struct Engine<'a> {
     net_n: Option<Vec<f64>>,
     missed: Vec<Missed>,
     step_s: f64,
-    outputs_left: usize,
     /// End of the present step.
     end_s: f64,
     rates: Rates,
@@ -89,25 +88,29 @@ impl<'a> Engine<'a> {
             pull,
             missed: Vec::new(),
             step_s,
-            outputs_left: 0,
             end_s: 0.0,
             rates: Rates::default(),
             wall_impulse: 0.0,
             watch: Watch::new(chain),
         };
         engine.move_to_first_contact();
-        engine.accelerate(At::End, 0.0);
+        engine.accelerate::<0>(At::End, 0.0);
         for k in 0..interfaces.len() {
             if engine.push.is_loading(k) {
                 engine.watch.contact(k, engine.closing(k));
                 for i in [k, k + 1] {
-                    if i < bodies.len() && engine.push.force_n(At::End, k) != 0.0 {
+                    if i < bodies.len() {
                         engine.watch.body(i, true, 0.0, engine.v[i]);
                     }
                 }
             }
         }
         engine
+    }
+
+    /// Groups of [`LANES`] interfaces.
+    fn groups(&self) -> usize {
+        self.v.len() / LANES
     }
 
     /// Free motion until the first gap closes; none if no interface closes.
@@ -140,9 +143,9 @@ impl<'a> Engine<'a> {
     /// `share` is the part of a step by which `v` is ahead of the step's start (`a` is that of
     /// the start), below 0 if `v` lags behind the step's end and `a` is that of its middle.
     #[inline(always)]
-    fn evaluate(&mut self, at: At, h: f64, share: f64) {
-        let pushed = self.push.evaluate(&self.x_m, at);
-        let pulled = self.pull.as_mut().is_some_and(|pull| pull.evaluate(&self.x_m, at));
+    fn evaluate<const N: usize>(&mut self, at: At, h: f64, share: f64) {
+        let pushed = self.push.evaluate::<N>(&self.x_m, at);
+        let pulled = self.pull.as_mut().is_some_and(|pull| pull.evaluate::<N>(&self.x_m, at));
         if pushed || pulled {
             self.settle(at, h, share);
         }
@@ -198,19 +201,19 @@ impl<'a> Engine<'a> {
     /// Accelerations from the forces; where forces depend on speeds, `v` is `lag` seconds
     /// behind.
     #[inline(always)]
-    fn accelerate(&mut self, at: At, lag_s: f64) {
-        self.accelerate_and_kick(at, lag_s, 0.0);
+    fn accelerate<const N: usize>(&mut self, at: At, lag_s: f64) {
+        self.accelerate_and_kick::<N>(at, lag_s, 0.0);
     }
 
     /// The same, then speeds by `kick_s` in one pass.
     #[inline(always)]
-    fn accelerate_and_kick(&mut self, at: At, lag_s: f64, kick_s: f64) {
+    fn accelerate_and_kick<const N: usize>(&mut self, at: At, lag_s: f64, kick_s: f64) {
         if self.net_n.is_some() {
             self.accelerate_by_all(at, lag_s);
-            return self.kick(kick_s);
+            return self.kick::<N>(kick_s);
         }
         let forces = self.push.forces_n(at);
-        let n = self.v.len() / LANES;
+        let n = if N > 0 { N } else { self.v.len() / LANES };
         let (behind, ahead) =
             (&forces.as_chunks::<LANES>().0[..n], &forces[1..].as_chunks::<LANES>().0[..n]);
         let (a, v) = (
@@ -268,8 +271,8 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    fn kick(&mut self, dt: f64) {
-        let n = self.v.len() / LANES;
+    fn kick<const N: usize>(&mut self, dt: f64) {
+        let n = if N > 0 { N } else { self.v.len() / LANES };
         let v = &mut self.v.as_chunks_mut::<LANES>().0[..n];
         let a = &self.a.as_chunks::<LANES>().0[..n];
         for c in 0..n {
@@ -278,8 +281,8 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    fn drift(&mut self, dt: f64) {
-        let n = self.v.len() / LANES;
+    fn drift<const N: usize>(&mut self, dt: f64) {
+        let n = if N > 0 { N } else { self.v.len() / LANES };
         let x = &mut self.x_m.as_chunks_mut::<LANES>().0[..n];
         let v = &self.v.as_chunks::<LANES>().0[..n];
         for c in 0..n {
@@ -299,13 +302,13 @@ impl<'a> Engine<'a> {
 
     /// One step of velocity Verlet; `v` is half a step ahead before and after.
     #[inline(always)]
-    fn verlet(&mut self, h: f64) {
+    fn verlet<const N: usize>(&mut self, h: f64) {
         let (damper_w, resistance_w, resistance_n) =
             (self.rates.damper_w, self.rates.resistance_w, self.rates.resistance_n);
         self.next();
-        self.drift(h);
-        self.evaluate(At::End, h, 0.5);
-        self.accelerate_and_kick(At::End, 0.5 * h, h);
+        self.drift::<N>(h);
+        self.evaluate::<N>(At::End, h, 0.5);
+        self.accelerate_and_kick::<N>(At::End, 0.5 * h, h);
         self.on_wall(At::End, h);
         if self.net_n.is_some() {
             let mean = 0.5 * h;
@@ -319,31 +322,31 @@ impl<'a> Engine<'a> {
     /// at both ends and in the middle, there with their gradient; `v` is a sixth of a step
     /// ahead before and after.
     #[inline(always)]
-    fn fourth_order(&mut self, h: f64) {
+    fn fourth_order<const N: usize>(&mut self, h: f64) {
         self.next();
-        self.drift(0.5 * h);
-        self.evaluate(At::Inside, h, 1.0 / 6.0);
-        self.accelerate(At::Inside, 0.0);
+        self.drift::<N>(0.5 * h);
+        self.evaluate::<N>(At::Inside, h, 1.0 / 6.0);
+        self.accelerate::<N>(At::Inside, 0.0);
         self.on_wall(At::Inside, 2.0 / 3.0 * h);
-        self.add_gradient_kick_and_drift(h, 2.0 / 3.0 * h, 0.5 * h);
-        self.evaluate(At::End, h, -1.0 / 6.0);
-        self.accelerate_and_kick(At::End, 0.0, h / 3.0);
+        self.add_gradient_kick_and_drift::<N>(h, 2.0 / 3.0 * h, 0.5 * h);
+        self.evaluate::<N>(At::End, h, -1.0 / 6.0);
+        self.accelerate_and_kick::<N>(At::End, 0.0, h / 3.0);
         self.on_wall(At::End, h / 3.0);
     }
 
     /// Adds `h²/24` times the change of the accelerations along themselves; then speeds by
     /// `kick_s` and positions by `drift_s` in the same pass.
     #[inline(always)]
-    fn add_gradient_kick_and_drift(&mut self, h: f64, kick_s: f64, drift_s: f64) {
+    fn add_gradient_kick_and_drift<const N: usize>(&mut self, h: f64, kick_s: f64, drift_s: f64) {
         let factor = h * h / 24.0;
-        self.push.gradient(&self.a, factor, &mut self.gradient_n);
+        self.push.gradient::<N>(&self.a, factor, &mut self.gradient_n);
         if let Some(pull) = &self.pull {
             for k in 0..self.chain.interfaces().len() {
                 let slope = pull.slope_n_per_m(k);
                 self.gradient_n[k + 1] += factor * slope * (self.a[k] - self.a[k + 1]);
             }
         }
-        let n = self.v.len() / LANES;
+        let n = if N > 0 { N } else { self.v.len() / LANES };
         let gradient = &self.gradient_n;
         let (behind, ahead) =
             (&gradient.as_chunks::<LANES>().0[..n], &gradient[1..].as_chunks::<LANES>().0[..n]);
@@ -384,12 +387,17 @@ impl<'a> Engine<'a> {
             };
             let k = m.k;
             let (start, end) = (bank.deflection_m(At::Start, k), bank.deflection_m(At::End, k));
-            if !m.pulls && interfaces[k].law.is_beyond_end(end) {
+            let law = match &interfaces[k].tension {
+                Some(tension) if m.pulls => &tension.law,
+                _ => &interfaces[k].law,
+            };
+            if law.is_beyond_end(end) {
                 return Err(SimulationError::CurveEnd {
                     interface: interfaces[k].name.clone(),
+                    what: if m.pulls { "pulled apart by" } else { "crushed" },
                     deflection_m: end,
                     time_s: self.end_s,
-                    end_m: interfaces[k].law.end_m(),
+                    end_m: law.end_m(),
                 });
             }
             let (stored, dissipated) = bank.energies_j(At::End, k);
@@ -443,35 +451,41 @@ impl<'a> Engine<'a> {
         Ok(())
     }
 
-    /// Records the state at the end of an output interval, with `v` in step with `x`.
-    fn output(&mut self, run: &mut Run, account: &mut Account, record: Record, time_s: f64) {
-        let histories = record == Record::Histories;
-        let audits = histories || self.outputs_left.is_multiple_of(8);
+    /// Interfaces at an output.
+    fn output_interfaces(
+        &mut self,
+        run: &mut Run,
+        account: &mut Account,
+        histories: bool,
+        time_s: f64,
+    ) {
         account.begin();
         let forces = self.net_n.as_deref().unwrap_or(self.push.forces_n(At::End));
         for (k, history) in run.interfaces.iter_mut().enumerate() {
-            let (mut stored, mut dissipated) = (0.0, 0.0);
-            if audits {
-                (stored, dissipated) = self.push.energies_j(At::End, k);
-                if let Some(pull) = &self.pull {
-                    let pulls = pull.energies_j(At::End, k);
-                    (stored, dissipated) = (stored + pulls.0, dissipated + pulls.1);
-                }
-                account.interface(stored, dissipated);
+            let (mut stored, mut dissipated) = self.push.energies_j(At::End, k);
+            if let Some(pull) = &self.pull {
+                let pulls = pull.energies_j(At::End, k);
+                (stored, dissipated) = (stored + pulls.0, dissipated + pulls.1);
             }
+            account.interface(stored, dissipated);
             let deflection_m = self.push.deflection_m(At::End, k);
             // A branch ends at zero but for rounding.
             let force_n = if self.net_n.is_none() { forces[k + 1].max(0.0) } else { forces[k + 1] };
-            let largest_m = self.push.largest_m(At::End, k).max(0.0);
             self.watch.output_interface(k, deflection_m, force_n, time_s);
             if histories {
                 history.deflection_m.push(deflection_m);
                 history.force_n.push(force_n);
-                history.largest_deflection_m.push(largest_m);
+                history.largest_deflection_m.push(self.push.largest_m(At::End, k).max(0.0));
                 history.stored_j.push(stored);
                 history.dissipated_j.push(dissipated);
             }
         }
+    }
+
+    /// Records the state at the end of an output interval, with `v` in step with `x`.
+    fn output(&mut self, run: &mut Run, account: &mut Account, record: Record, time_s: f64) {
+        let histories = record == Record::Histories;
+        self.output_interfaces(run, account, histories, time_s);
         for (i, history) in run.bodies.iter_mut().enumerate() {
             let (x, v, a) = (self.x_m[i], self.v[i], self.a[i]);
             account.body(self.chain.bodies()[i].mass_kg, v);
@@ -485,18 +499,16 @@ impl<'a> Engine<'a> {
         if histories {
             run.time_s.push(time_s);
         }
-        if !audits {
-            return;
-        }
         account.rates(self.rates.damped_j, self.rates.resisted_j);
         account.end(self.wall_impulse + self.rates.impulse);
     }
 }
 
 /// As many steps, the first one after `done` others. Vectors as wide as the machine has them;
-/// the bits are the same for any width.
+/// the bits are the same for any width. `N` is the number of groups of interfaces, 0 if only the
+/// arrays know it: with it the compiler unrolls the passes.
 #[multiversion(targets("x86_64+avx+avx2"))]
-fn steps<'a>(
+fn steps<'a, const N: usize>(
     engine: &mut Engine<'a>,
     method: Method,
     done: usize,
@@ -506,8 +518,8 @@ fn steps<'a>(
     for step in 1..=count {
         engine.end_s = (done + step) as f64 * h;
         match method {
-            Method::FourthOrder => engine.fourth_order(h),
-            Method::Verlet | Method::Reference => engine.verlet(h),
+            Method::FourthOrder => engine.fourth_order::<N>(h),
+            Method::Verlet | Method::Reference => engine.verlet::<N>(h),
         }
         if !engine.missed.is_empty() {
             engine.finish(h, method)?;
@@ -565,24 +577,33 @@ pub(super) fn run(
     let ahead = ahead(method);
     let mut engine = Engine::new(chain, h);
     let mut account = Account::open(chain);
-    engine.outputs_left = outputs;
     engine.output(run, &mut account, record, 0.0);
     for output in 1..=outputs {
         let time_s = output as f64 * interval_s;
-        engine.kick(ahead * h);
+        engine.kick::<0>(ahead * h);
         engine.on_wall(At::End, ahead * h);
-        steps(&mut engine, method, (output - 1) * steps_per_output, steps_per_output)?;
-        engine.kick(-ahead * h);
+        let done = (output - 1) * steps_per_output;
+        match engine.groups() {
+            1 => steps::<1>(&mut engine, method, done, steps_per_output),
+            2 => steps::<2>(&mut engine, method, done, steps_per_output),
+            3 => steps::<3>(&mut engine, method, done, steps_per_output),
+            4 => steps::<4>(&mut engine, method, done, steps_per_output),
+            _ => steps::<0>(&mut engine, method, done, steps_per_output),
+        }?;
+        engine.kick::<0>(-ahead * h);
         engine.on_wall(At::End, -ahead * h);
         if let Some(body) = engine.v.iter().position(|v| !v.is_finite()) {
             let body = chain.bodies()[body].name.clone();
             return Err(SimulationError::Diverged { body, time_s });
         }
-        engine.outputs_left = outputs - output;
         engine.output(run, &mut account, record, time_s);
     }
     for k in 0..chain.interfaces().len() {
         engine.watch.peak_n(k, engine.push.peak_n(k));
+        if let Some(pull) = &engine.pull {
+            let force = pull.peak_n(k).max(pull.force_n(At::End, k));
+            engine.watch.tension(k, force, pull.largest_m(At::End, k).max(0.0));
+        }
     }
     engine.watch.close(run, record, h * steps_per_output as f64);
     run.ledger = account.close();

@@ -180,7 +180,8 @@ impl Motion<'_> {
     }
 }
 
-/// Runs the chain; extremes are those at the outputs.
+/// Runs the chain; extremes are those of its steps, contacts those of the outputs, and there is
+/// no restitution.
 pub(super) fn run(
     chain: &Chain,
     settings: &RunSettings,
@@ -231,11 +232,15 @@ pub(super) fn run(
                     if interface.law.is_beyond_end(contact.deflection_m) {
                         return Err(SimulationError::CurveEnd {
                             interface: interface.name.clone(),
+                            what: "crushed",
                             deflection_m: contact.deflection_m,
                             time_s,
                             end_m: interface.law.end_m(),
                         });
                     }
+                    let force_n = contact.spring_n + contact.damper_n;
+                    watch.output_interface(k, contact.deflection_m, force_n, time_s);
+                    watch.tension(k, -force_n, contact.extension_m);
                     motion.pushed_m[k] = motion.pushed_m[k].max(contact.deflection_m);
                     motion.pulled_m[k] = motion.pulled_m[k].max(contact.extension_m);
                 }
@@ -274,6 +279,7 @@ fn record(
     let rates = motion.rates(y);
     let histories = what == Record::Histories;
     account.begin();
+    let mut pushed = vec![false; chain.interfaces().len()];
     for (k, history) in run.interfaces.iter_mut().enumerate() {
         let interface = &chain.interfaces()[k];
         let contact = motion.contact(y, k);
@@ -293,16 +299,13 @@ fn record(
             history.stored_j.push(stored);
             history.dissipated_j.push(dissipated);
         }
-        if contact.spring_n != 0.0 {
-            for i in [k, k + 1] {
-                if i < n {
-                    watch.body(i, true, time_s, y[n + i]);
-                }
-            }
-        }
+        pushed[k] = contact.spring_n != 0.0;
     }
     for (i, history) in run.bodies.iter_mut().enumerate() {
         account.body(chain.bodies()[i].mass_kg, y[n + i]);
+        let behind = i > 0 && pushed[i - 1];
+        let touched = behind || pushed.get(i).copied().unwrap_or(false);
+        watch.body(i, touched, time_s, y[n + i]);
         watch.output_body(i, y[n + i], rates[n + i], time_s);
         history.v_m_per_s.push(y[n + i]);
         if histories {

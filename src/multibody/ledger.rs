@@ -108,8 +108,12 @@ impl Account {
             + ledger.dissipated_j
             + ledger.damped_j
             + ledger.resisted_j;
-        let share = |difference: f64, scale: f64| {
-            if difference == 0.0 { 0.0 } else { difference.abs() / scale }
+        let share = |difference: f64, scale: f64| match difference == 0.0 {
+            true => 0.0,
+            // What is not finite is out of any tolerance.
+            false => {
+                Some(difference.abs() / scale).filter(|e| !e.is_nan()).unwrap_or(f64::INFINITY)
+            }
         };
         let energy_error = share(energy - ledger.initial_kinetic_j, ledger.initial_kinetic_j);
         let momentum_error =

@@ -147,18 +147,26 @@ impl Chain {
         Self { bodies, interfaces }.checked()
     }
 
-    /// Gives the bodies other masses and speeds (kg, m/s) and the interfaces other gaps (m), in
-    /// the order of the chain; the force laws stay.
+    /// Gives the bodies other masses and speeds (kg, m/s) and the interfaces other gaps and
+    /// slacks (m), in the order of the chain; the force laws stay.
     ///
     /// # Errors
     /// [`ChainError`] names the body or interface whose value breaks the invariant; the chain is
     /// then not to be run.
-    pub fn adjust(&mut self, motions: &[(f64, f64)], gaps_m: &[f64]) -> Result<(), ChainError> {
+    pub fn adjust(
+        &mut self,
+        motions: &[(f64, f64)],
+        gaps_m: &[f64],
+        slacks_m: &[f64],
+    ) -> Result<(), ChainError> {
         for (body, (mass_kg, speed_m_per_s)) in self.bodies.iter_mut().zip(motions) {
             (body.mass_kg, body.speed_m_per_s) = (*mass_kg, *speed_m_per_s);
         }
-        for (interface, gap_m) in self.interfaces.iter_mut().zip(gaps_m) {
+        for ((interface, gap_m), slack_m) in self.interfaces.iter_mut().zip(gaps_m).zip(slacks_m) {
             interface.gap_m = *gap_m;
+            if let Some(tension) = &mut interface.tension {
+                tension.slack_m = *slack_m;
+            }
         }
         self.check()
     }

@@ -6,6 +6,9 @@ use super::train::Chain;
 /// Window of the moving mean deceleration, in s (EN 15227).
 const MOVING_MEAN_S: f64 = 0.120;
 
+/// Between outputs further apart the largest mean would be missed by too much.
+const COARSEST_S: f64 = 0.005;
+
 pub(super) struct Watch {
     interfaces: Vec<Extremes>,
     bodies: Vec<Phase>,
@@ -14,6 +17,8 @@ pub(super) struct Watch {
 #[derive(Clone, Default)]
 struct Extremes {
     peak_n: f64,
+    peak_tension_n: f64,
+    max_extension_m: f64,
     max_deflection_m: f64,
     max_deflection_time_s: f64,
     /// When the deflection first stopped growing.
@@ -23,23 +28,46 @@ struct Extremes {
     separation: Option<f64>,
 }
 
-/// The first time a body's net contact force differs from zero.
+/// A stretch of time in which a body's net contact force differs from zero, with one sign.
+#[derive(Clone, Copy, Default)]
+struct Span {
+    begin_s: f64,
+    begin_v: f64,
+    end_s: f64,
+    end_v: f64,
+    /// Direction of the net force, 0 until it is known.
+    sign: f64,
+    /// Largest magnitude of the acceleration at the outputs.
+    peak: f64,
+}
+
 #[derive(Clone, Default)]
 struct Phase {
-    begun_s: Option<f64>,
-    ended: bool,
-    entry_speed: f64,
-    /// Direction of the net force.
-    sign: f64,
-    end_s: f64,
-    end_speed: f64,
+    mass_kg: f64,
+    /// Speed before the contact.
+    free_speed: f64,
+    open: Option<Span>,
+    closed: Vec<Span>,
     /// The last output: time, speed, acceleration.
     last: (f64, f64, f64),
 }
 
+/// Contacts of which the first that counts is among them.
+const MOST_SPANS: usize = 64;
+/// A contact counts if its net force reaches this and this share of the body's largest, as in
+/// finding the contact of an FE run.
+const LEAST_N: f64 = 1e3;
+const LEAST_SHARE: f64 = 0.005;
+/// No restitution of what meets more slowly, in m/s: it would be a ratio to nothing.
+const SLOWEST_APPROACH: f64 = 0.1;
+
 impl Watch {
     pub fn new(chain: &Chain) -> Self {
-        let body = |b: &super::Body| Phase { entry_speed: b.speed_m_per_s, ..Phase::default() };
+        let body = |b: &super::Body| Phase {
+            mass_kg: b.mass_kg,
+            free_speed: b.speed_m_per_s,
+            ..Phase::default()
+        };
         Self {
             interfaces: vec![Extremes::default(); chain.interfaces().len()],
             bodies: chain.bodies().iter().map(body).collect(),
@@ -49,7 +77,7 @@ impl Watch {
     /// Contact began at interface `k` with this closing speed.
     pub fn contact(&mut self, k: usize, closing: f64) {
         let seen = &mut self.interfaces[k];
-        seen.approach = seen.approach.or(Some(closing).filter(|c| *c > 0.0));
+        seen.approach = seen.approach.or(Some(closing));
     }
 
     /// The force of interface `k` has fallen to zero while it opened with this speed.
@@ -62,10 +90,11 @@ impl Watch {
 
     /// The deflection of interface `k` was largest.
     pub fn turned(&mut self, pulls: bool, k: usize, largest_m: f64, time_s: f64) {
+        let seen = &mut self.interfaces[k];
         if pulls {
+            seen.max_extension_m = seen.max_extension_m.max(largest_m);
             return;
         }
-        let seen = &mut self.interfaces[k];
         seen.common_velocity_s = seen.common_velocity_s.or(Some(time_s));
         if largest_m > seen.max_deflection_m {
             (seen.max_deflection_m, seen.max_deflection_time_s) = (largest_m, time_s);
@@ -77,13 +106,26 @@ impl Watch {
         seen.peak_n = seen.peak_n.max(force_n);
     }
 
-    /// Contact forces on body `i` began or ended at `time_s`, with its speed.
+    /// Largest tension and extension that are known beside those of turns.
+    pub fn tension(&mut self, k: usize, force_n: f64, extension_m: f64) {
+        let seen = &mut self.interfaces[k];
+        seen.peak_tension_n = seen.peak_tension_n.max(force_n);
+        seen.max_extension_m = seen.max_extension_m.max(extension_m);
+    }
+
+    /// Contact forces on body `i` act or have ended at `time_s`, with its speed.
     pub fn body(&mut self, i: usize, touched: bool, time_s: f64, speed: f64) {
         let phase = &mut self.bodies[i];
-        if touched && phase.begun_s.is_none() {
-            phase.begun_s = Some(time_s);
-        } else if !touched && phase.begun_s.is_some() {
-            phase.end(time_s, speed);
+        match (touched, phase.open) {
+            (true, None) => {
+                let begin_v = phase.free_speed;
+                phase.open = Some(Span { begin_s: time_s, begin_v, ..Span::default() });
+            }
+            (false, Some(_)) => {
+                phase.close(time_s, speed);
+                phase.free_speed = speed;
+            }
+            _ => {}
         }
     }
 
@@ -97,16 +139,26 @@ impl Watch {
 
     pub fn output_body(&mut self, i: usize, v: f64, a: f64, time_s: f64) {
         let phase = &mut self.bodies[i];
-        match phase.begun_s {
-            None => phase.entry_speed = v,
-            Some(_) if phase.sign == 0.0 => phase.sign = a.signum() * f64::from(a != 0.0),
-            Some(_) if a * phase.sign < 0.0 => {
-                // The net force has changed its sign since the last output.
-                let (before_s, before_v, before_a) = phase.last;
-                let until = (time_s - before_s) * before_a / (before_a - a);
-                phase.end(before_s + until, before_v + 0.5 * before_a * until);
+        let (before_s, before_v, before_a) = phase.last;
+        match &mut phase.open {
+            None => phase.free_speed = v,
+            Some(span) => {
+                if span.sign * a < 0.0 {
+                    // The net force has changed its sign since the last output.
+                    let share = before_a / (before_a - a);
+                    let until = (time_s - before_s) * share.clamp(0.0, 1.0);
+                    let at_v = before_v + 0.5 * before_a * until;
+                    phase.close(before_s + until, at_v);
+                    let (begin_s, begin_v) = (before_s + until, at_v);
+                    phase.open = Some(Span { begin_s, begin_v, ..Span::default() });
+                }
+                if let Some(span) = &mut phase.open {
+                    span.peak = span.peak.max(a.abs());
+                    if span.sign == 0.0 && a != 0.0 {
+                        span.sign = a.signum();
+                    }
+                }
             }
-            Some(_) => {}
         }
         phase.last = (time_s, v, a);
     }
@@ -119,38 +171,55 @@ impl Watch {
             history.max_deflection_time_s = seen.max_deflection_time_s;
             history.common_velocity_time_s = seen.common_velocity_s;
             history.restitution = match (seen.approach, seen.separation) {
-                (Some(approach), Some(separation)) => Some(separation / approach),
+                (Some(approach), Some(separation)) if approach >= SLOWEST_APPROACH => {
+                    Some(separation / approach)
+                }
                 _ => None,
             };
+            history.peak_tension_n = seen.peak_tension_n;
+            history.max_extension_m = seen.max_extension_m;
         }
         for (history, mut phase) in run.bodies.iter_mut().zip(self.bodies) {
             let (last_s, last_v, _) = phase.last;
-            phase.end(last_s, last_v);
+            phase.close(last_s, last_v);
             history.final_v_m_per_s = last_v;
             history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
             }
-            let duration = phase.end_s - phase.begun_s.unwrap_or(phase.end_s);
-            if duration > 0.0 {
-                history.mean_deceleration_m_per_s2 =
-                    (phase.entry_speed - phase.end_speed) / duration;
-            }
+            history.mean_deceleration_m_per_s2 = phase.mean_deceleration();
         }
     }
 }
 
 impl Phase {
-    fn end(&mut self, time_s: f64, speed: f64) {
-        if !self.ended {
-            (self.ended, self.end_s, self.end_speed) = (true, time_s, speed);
+    fn close(&mut self, time_s: f64, speed: f64) {
+        if let Some(span) = self.open.take()
+            && self.closed.len() < MOST_SPANS
+        {
+            self.closed.push(Span { end_s: time_s, end_v: speed, ..span });
         }
+    }
+
+    /// Over the first contact that counts; 0 without one.
+    fn mean_deceleration(&self) -> f64 {
+        let most = self.closed.iter().map(|s| s.peak).fold(0.0, f64::max);
+        let counts = |s: &&Span| {
+            s.peak >= LEAST_SHARE * most && s.peak * self.mass_kg >= LEAST_N && s.end_s > s.begin_s
+        };
+        self.closed
+            .iter()
+            .find(counts)
+            .map_or(0.0, |s| (s.begin_v - s.end_v) / (s.end_s - s.begin_s))
     }
 }
 
 /// Mean deceleration over the 120 ms in which its magnitude is largest, from the speeds at the
 /// ends.
 fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
+    if interval_s > COARSEST_S {
+        return None;
+    }
     let window = MOVING_MEAN_S / interval_s;
     // Rounding shall not make 160 intervals of 0.75 ms a little more than 120 ms.
     let back = (window - 1e-9).ceil();

@@ -83,6 +83,14 @@ pub(super) fn assemble_at(
             warnings.push(warning);
         }
     }
+    let gaps = chain.interfaces().iter().map(|i| i.gap_m);
+    if scenario.train.iter().any(|t| t.resistance.is_some())
+        && gaps.fold(f64::INFINITY, f64::min) > 0.0
+    {
+        warnings.push(
+            "resistance acts from the first contact on: the trains run up to it at the speeds given".into(),
+        );
+    }
     let limits = scenario.limits.clone();
     Ok(Prepared { chain, settings, order, used, limits, warnings })
 }
@@ -105,8 +113,13 @@ pub fn adjust(
     let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
     let gaps: Vec<f64> =
         slots.iter().map(|slot| slot.gap_m.unwrap_or_else(|| own(slot.curve))).collect();
+    let slacks: Vec<f64> = slots
+        .iter()
+        .map(|slot| scenario.curves.get(slot.curve).and_then(|c| c.tension.as_ref()))
+        .map(|tension| tension.map_or(0.0, |curve| own(curve)))
+        .collect();
     let failed = |source| ScenarioError::Chain { path: path.into(), source };
-    prepared.chain.adjust(&motions, &gaps).map_err(failed)
+    prepared.chain.adjust(&motions, &gaps, &slacks).map_err(failed)
 }
 
 /// A law that has been made, and for what.

@@ -1,6 +1,6 @@
 //! Checks of a scenario that a single key cannot show.
 
-use super::{CurveTable, Scenario, VehicleTable};
+use super::{CurveTable, LawName, Scenario, VehicleTable};
 use crate::unit::km_per_h;
 
 /// Returns the speed of what the first train meets, in m/s.
@@ -18,9 +18,6 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
             ));
         }
     };
-    if let Some(wall) = &scenario.wall {
-        check_name(&wall.name)?;
-    }
     if let Some(limits) = &scenario.limits
         && !(limits.mean_deceleration_g > 0.0 && limits.mean_deceleration_g.is_finite())
     {
@@ -30,6 +27,16 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
         ));
     }
     let mut names = std::collections::HashSet::new();
+    let mut take = |name: String| match names.insert(name.clone()) {
+        true => Ok(()),
+        false => Err(format!(
+            "two bodies are named \"{name}\": vehicles, their front and rear and the wall need different names"
+        )),
+    };
+    if let Some(wall) = &scenario.wall {
+        check_name(&wall.name)?;
+        take(wall.name.clone())?;
+    }
     for train in &scenario.train {
         let Some((last, others)) = train.vehicles.split_last() else {
             return Err(format!("train \"{}\" has no vehicles", train.name));
@@ -47,10 +54,14 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
         for vehicle in &train.vehicles {
             let name = &vehicle.name;
             check_name(name)?;
-            if !names.insert(name) {
-                return Err(format!("two vehicles are named \"{name}\""));
+            take(name.clone())?;
+            for (zone, end) in [(&vehicle.front, "front"), (&vehicle.rear, "rear")] {
+                if zone.is_some() {
+                    take(format!("{name} {end}"))?;
+                }
             }
-            if body_mass_kg(vehicle) <= 0.0 {
+            let is_split = vehicle.front.is_some() || vehicle.rear.is_some();
+            if is_split && body_mass_kg(vehicle) <= 0.0 {
                 return Err(format!(
                     "the crush zones of vehicle \"{name}\" have all of its mass: nothing is left for the body"
                 ));
@@ -77,6 +88,27 @@ pub(super) fn body_mass_kg(vehicle: &VehicleTable) -> f64 {
 }
 
 fn check_curve(name: &str, table: &CurveTable, scenario: &Scenario) -> Result<(), String> {
+    let takes_nothing = |key: &str, of: &str| {
+        Err(format!("curve \"{name}\": {key} belongs to {of}: leave it away"))
+    };
+    if table.stages.as_ref().is_some_and(Vec::is_empty) {
+        return Err(format!("curve \"{name}\": stages is empty"));
+    }
+    if table.stages.is_some() && table.force.is_some() {
+        return takes_nothing("force", "a model, predicted curve or case");
+    }
+    if table.database.is_none() && table.case.is_some() {
+        return takes_nothing("case", "a database");
+    }
+    if table.model.is_none() && table.max_crush.is_some() {
+        return takes_nothing("max_crush", "a model");
+    }
+    if table.model.is_none() && !table.parameters.is_empty() {
+        return takes_nothing("parameters", "a model");
+    }
+    if table.law == LawName::Elastic && table.unloading.is_some() {
+        return takes_nothing("unloading", "law = \"memory\"");
+    }
     if let Some(tension) = &table.tension {
         let Some(other) = scenario.curves.get(tension) else {
             return Err(format!(

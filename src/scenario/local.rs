@@ -21,6 +21,8 @@ const RELAXATION: f64 = 0.5;
 const PROMINENCE: f64 = 0.1;
 /// States for the speeds, in s; forces rise within a few.
 const INTERVAL_S: f64 = 0.25e-3;
+/// What closes for the first time after this is not looked for, in s.
+const LONGEST_S: f64 = 5.0;
 /// No curve is asked for below this speed, in m/s: an interface that hardly closes.
 const SLOWEST_M_PER_S: f64 = 0.1;
 
@@ -37,6 +39,7 @@ pub(super) fn settle(
     let mut before = vec![0.0; own.len()];
     for _ in 0..ROUNDS {
         let mut settings = prepared.settings;
+        settings.duration_s = settings.duration_s.min(LONGEST_S);
         settings.output_interval_s = INTERVAL_S.min(settings.duration_s);
         if !prepared.chain.has_rates() {
             settings = settings.with_method(Method::FourthOrder);
@@ -45,7 +48,10 @@ pub(super) fn settle(
             .map_err(|source| ScenarioError::Local { path: path.into(), source })?;
         let mut largest = (0.0, 0);
         for k in (0..own.len()).filter(|&k| own[k]) {
-            let Some(closing) = closing_speed(&prepared.chain, &run, k) else { continue };
+            let Some(closing) = closing_speed(&prepared.chain, &run, k) else {
+                before[k] = 0.0;
+                continue;
+            };
             let mut change = closing.max(SLOWEST_M_PER_S) - speeds_m_per_s[k];
             if f64::abs(change) > largest.0 {
                 largest = (f64::abs(change), k);
@@ -60,9 +66,6 @@ pub(super) fn settle(
             return Ok(prepared);
         }
         prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
-        if before.iter().all(|change| *change == 0.0) {
-            return Ok(prepared);
-        }
     }
     let unsettled = before
         .iter()

@@ -28,6 +28,34 @@ pub enum Source {
 /// Over this length the force steps from one stage to the next: a step is no function.
 const STEP_M: f64 = 1e-4;
 
+impl Scenario {
+    /// Every place that names a curve, in a fixed order: the contact, the trains' inner curves, those
+    /// behind vehicles, of crush zones, of tension.
+    pub fn curve_names_mut(&mut self) -> Vec<&mut String> {
+        let mut names = vec![&mut self.contact.curve];
+        for train in &mut self.train {
+            if train.vehicles.len() > 1 {
+                names.extend(&mut train.inner);
+            }
+            for vehicle in &mut train.vehicles {
+                names.extend(&mut vehicle.behind);
+                let zones = [&mut vehicle.front, &mut vehicle.rear].into_iter().flatten();
+                names.extend(zones.map(|zone| &mut zone.curve));
+            }
+        }
+        names.extend(self.curves.values_mut().filter_map(|curve| curve.tension.as_mut()));
+        names
+    }
+
+    /// The files that the scenario names, from its own place `path`.
+    pub fn files(&self, path: &Path) -> Vec<PathBuf> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let curves = self.curves.values().flat_map(|c| [&c.model, &c.file, &c.database]);
+        let reference = self.reference.as_ref().map(|r| &r.file);
+        curves.flatten().chain(reference).map(|file| folder.join(file)).collect()
+    }
+}
+
 impl Sources {
     /// Reads what `scenario`, which stands at `path`, names.
     ///

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
-use crate::scenario::{InterfaceSpeed, Scenario, TrainTable};
+use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
@@ -91,7 +91,9 @@ impl Binder<'_> {
                         ));
                     }
                     if self.scenario.contact.gap.is_some()
-                        && !self.inner_curves().any(|inner| inner == *curve)
+                        && !self.scenario.clone().curve_names_mut()[1..]
+                            .iter()
+                            .any(|name| *name == curve)
                     {
                         return Err(format!(
                             "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
@@ -236,8 +238,8 @@ impl Binder<'_> {
         let replaces = |v: &Vary| {
             v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
         };
-        let used = self.scenario.contact.curve == curve
-            || self.inner_curves().any(|inner| inner == curve)
+        let mut scenario = self.scenario.clone();
+        let used = scenario.curve_names_mut().iter().any(|name| *name == curve)
             || self.plan.vary.iter().any(replaces);
         match used {
             true => Ok(()),
@@ -245,11 +247,6 @@ impl Binder<'_> {
                 Err(format!("no interface has curve \"{curve}\", so varying it has no effect"))
             }
         }
-    }
-
-    fn inner_curves(&self) -> impl Iterator<Item = &str> {
-        let inner = |train: &'_ TrainTable| train.vehicles.len() > 1;
-        self.scenario.train.iter().filter(move |t| inner(t)).filter_map(|t| t.inner.as_deref())
     }
 }
 
@@ -314,9 +311,10 @@ impl Variable {
                 }
             }
             Target::Curve(_) => {
-                scenario.contact.curve.clone_from(&base.contact.curve);
-                for (train, base) in scenario.train.iter_mut().zip(&base.train) {
-                    train.inner.clone_from(&base.inner);
+                let mut base = base.clone();
+                let written = base.curve_names_mut();
+                for (name, written) in scenario.curve_names_mut().into_iter().zip(written) {
+                    name.clone_from(written);
                 }
             }
         }
@@ -357,12 +355,11 @@ impl Variable {
             }
             Target::Curve(curve) => {
                 let Some(name) = self.names.get(value as usize) else { return };
-                if base.contact.curve == *curve {
-                    scenario.contact.curve.clone_from(name);
-                }
-                for (train, base) in scenario.train.iter_mut().zip(&base.train) {
-                    if base.inner.as_deref() == Some(curve) {
-                        train.inner = Some(name.clone());
+                let mut base = base.clone();
+                let written = base.curve_names_mut();
+                for (now, written) in scenario.curve_names_mut().into_iter().zip(written) {
+                    if written == curve {
+                        now.clone_from(name);
                     }
                 }
             }
