@@ -126,7 +126,7 @@ fn runs() {
         "path  = \"26kmh\"",
         "the run's folder 26kmh does not exist: check path in the manifest",
     );
-    t(wall, "\"rwforc\"", "\"rcforc\"", "has no file \"rcforc\": it has nodout, rwforc");
+    t(wall, "\"rwforc\"", "\"rcforc\"", "has no file \"rcforc\": it has case.json, nodout, rwforc");
     t(
         wall,
         "node = 900001",
@@ -323,7 +323,10 @@ fn scenarios() {
     );
     t(|s| s.replace("[wall]\n", ""), "expected two [[train]], or one and a [wall]");
     t(|s| s.replace("file = \"c.csv\"", "model = \"no.model\""), "no.model: No such file");
-    t(|s| s.replace("file = \"c.csv\"", ""), "needs exactly one of model, file and database");
+    t(
+        |s| s.replace("file = \"c.csv\"", ""),
+        "needs exactly one of model, file, database and stages",
+    );
     t(|s| s.replace("10m/s", "0m/s"), "never meets what is in front of it");
     t(|s| s.replace("100ms", "1000000000s"), "shorten the duration");
     t(|s| s.replace("c.csv\"", "c.csv\", lawn = 3"), "unknown field `lawn`");
