@@ -150,8 +150,8 @@ pub enum TrainError {
         "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
     )]
     OtherSpeed { path: PathBuf, vehicle: String, fe_m_per_s: f64, m_per_s: f64 },
-    #[error("the scenario has no [reference]: it names FE's run of the train")]
-    NoReference,
+    #[error("{path}: the scenario has no [reference]: add one that names FE's run of the train")]
+    NoReference { path: PathBuf },
     #[error(
         "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
     )]
@@ -191,7 +191,8 @@ pub fn compare_train(
     scenario: &Scenario,
     settings: &Settings,
 ) -> Result<TrainComparison, CompareError> {
-    let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
+    let reference =
+        scenario.reference.as_ref().ok_or_else(|| TrainError::NoReference { path: path.into() })?;
     if reference.nodes.is_empty() {
         return Err(TrainError::NoNodes { path: path.into() }.into());
     }

@@ -166,10 +166,8 @@ impl<'a> Engine<'a> {
                 // state whose speed is known.
                 let rate = sign * (self.a[k] - self.a[k + 1]);
                 let closing = sign * (self.v[k] - self.v[k + 1]);
-                let (near, speed) = match share >= 0.0 {
-                    true => (bank.deflection_m(At::Start, k), closing - share * h * rate),
-                    false => (bank.deflection_m(at, k), closing - share * h * rate),
-                };
+                let speed = closing - share * h * rate;
+                let near = bank.deflection_m(if share >= 0.0 { At::Start } else { at }, k);
                 let top_m = if rate < 0.0 { near + speed * speed / (-2.0 * rate) } else { near };
                 let what = bank.settle(at, k, top_m);
                 let turned = what == Move::Turned;
