@@ -678,3 +678,27 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
         }
     }
 }
+
+/// What a scenario takes from a model is what `predict` gives, for other masses too.
+#[test]
+fn what_drives_a_train_is_the_prediction() {
+    use crumple::surrogate::predict::{drive, predict_beyond};
+    for group in ["lead-car-wall", "vehicle-pair"] {
+        let set = TrainingSet::new(group, databases().cases(group)).unwrap();
+        let model = Model::fit(&set, Options::Rate).unwrap();
+        assert!(model.has_body_force());
+        for (v, mass) in [(9.0, None), (13.0, Some(9e3)), (19.0, Some(31e3))] {
+            let query = Query { mass_kg: mass, ..Query::at(v) };
+            let (curve, beyond) = predict_beyond(&model, &query).unwrap();
+            let drive = drive(&model, &query).unwrap().expect("the motion's own force");
+            assert_eq!(drive.envelope.deflection_m(), curve.deflection_m);
+            assert_eq!(Some(drive.envelope.force_n()), curve.body_force_n.as_deref());
+            assert_eq!(drive.beyond, beyond.body);
+            let stiffness = curve.stiffness_at_end(&drive.envelope);
+            assert!((drive.unloading_stiffness_n_per_m / stiffness - 1.0).abs() < 1e-12);
+        }
+        // The energy rule needs the other force.
+        let by_energy = Query::at(13.0).with_rule(MaxCrushRule::Energy);
+        assert_eq!(drive(&model, &by_energy).unwrap(), None);
+    }
+}

@@ -164,6 +164,14 @@ impl Envelope {
 
     /// Index of the segment that holds `deflection_m`, the first or last one beyond the ends.
     fn segment(&self, deflection_m: f64) -> usize {
+        // Tables over even deflections are the rule: the guess is off by rounding at most.
+        let last = self.deflection_m.len() - 2;
+        let guess = ((deflection_m / self.end_m() * (last + 1) as f64) as usize).min(last);
+        for i in [guess, guess.saturating_sub(1), (guess + 1).min(last)] {
+            if self.deflection_m[i] <= deflection_m && deflection_m < self.deflection_m[i + 1] {
+                return i;
+            }
+        }
         let above = self.deflection_m.partition_point(|&d| d <= deflection_m);
         above.clamp(1, self.deflection_m.len() - 1) - 1
     }

@@ -5,7 +5,7 @@ use super::{CurveTable, EndName, ForceName, LawName, Source};
 use crate::curve::body::recorded_force;
 use crate::curve::{Case, Envelope, ForceKind};
 use crate::multibody::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
-use crate::surrogate::predict::{PredictError, predict_beyond};
+use crate::surrogate::predict::{PredictError, drive, predict_beyond};
 use crate::surrogate::{Model, PredictedCurve, Query};
 use crate::unit::SpeedKind;
 
@@ -116,13 +116,33 @@ fn from_model(
         parameters: table.parameters.clone(),
         ..Query::at(speed_m_per_s)
     };
-    let (curve, beyond) = predict_beyond(model, &query)?;
-    let mut spring = from_curve(&curve, table, force)?;
-    // Neighbours push on where a vehicle by itself would have stopped.
-    let beyond = match force {
-        ForceName::Body => beyond.body,
-        ForceName::Declared => beyond.declared,
+    let driven = match force {
+        ForceName::Body if table.band.is_none() => drive(model, &query)?,
+        ForceName::Body | ForceName::Declared => None,
     };
+    let (mut spring, beyond) = match driven {
+        Some(drive) => {
+            let spring = Spring {
+                envelope: drive.envelope,
+                unloading_n_per_m: Some(drive.unloading_stiffness_n_per_m),
+                shape: None,
+                kind: Some(model.speed_kind),
+                force: Some(ForceKind::Body),
+                speed_m_per_s: None,
+                warnings: drive.warnings.iter().map(|w| w.to_string()).collect(),
+            };
+            (spring, drive.beyond)
+        }
+        None => {
+            let (curve, beyond) = predict_beyond(model, &query)?;
+            let beyond = match force {
+                ForceName::Body => beyond.body,
+                ForceName::Declared => beyond.declared,
+            };
+            (from_curve(&curve, table, force)?, beyond)
+        }
+    };
+    // Neighbours push on where a vehicle by itself would have stopped.
     let end = spring.envelope.end_m();
     let share = match beyond.force_at(end) {
         at if at > 0.0 => spring.envelope.force_at(end) / at,

@@ -4,6 +4,7 @@ pub mod band;
 pub mod curves;
 pub mod forest;
 pub mod gp;
+mod kept;
 pub mod landmarks;
 pub mod leave_one_out;
 pub mod linear;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::forest::{ForestOptions, ForestSurrogate};
 use super::gp::Gp;
+use super::kept::Kept;
 use super::landmarks::Landmarks;
 use super::leave_one_out::Validation;
 use super::linear::Linear;
@@ -254,6 +255,16 @@ pub struct Model {
 struct Curves {
     declared: Vec<CaseCurve>,
     body: Vec<CaseCurve>,
+    /// Of the curves of the declared force and of the body's, once it was asked for.
+    kinks: [Kept<Kink>; 2],
+}
+
+/// How far single points of the curves lie above or below both of their neighbours, in N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Kink {
+    /// Distance of the neighbours.
+    step_m: f64,
+    most_n: f64,
 }
 
 impl Curves {
@@ -261,7 +272,11 @@ impl Curves {
         let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
             cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
         };
-        Ok(Self { declared: with(|c| &c.force_n)?, body: with(|c| &c.body_force_n)? })
+        Ok(Self {
+            declared: with(|c| &c.force_n)?,
+            body: with(|c| &c.body_force_n)?,
+            kinks: Default::default(),
+        })
     }
 }
 
@@ -492,6 +507,23 @@ impl Model {
     /// The training curves: of the declared force, and of the body's where it is another.
     pub fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
         (&self.curves.declared, &self.curves.body)
+    }
+
+    /// The most by which a point of the training curves lies above both neighbours at
+    /// `step_m`, or below both, in N; `most` finds it in curves. Kept for the first step that is
+    /// asked for: every prediction asks for the same one.
+    pub(super) fn most_kink_n(
+        &self,
+        of_body: bool,
+        step_m: f64,
+        most: impl Fn(&[CaseCurve]) -> f64,
+    ) -> f64 {
+        let (declared, body) = self.curves();
+        let of_body = of_body && !body.is_empty();
+        let curves = if of_body { body } else { declared };
+        let kept = self.curves.kinks[usize::from(of_body)]
+            .or_find(|| Kink { step_m, most_n: most(curves) });
+        if kept.step_m == step_m { kept.most_n } else { most(curves) }
     }
 
     /// What a query here must say, for any mass and rule.

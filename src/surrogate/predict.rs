@@ -215,6 +215,173 @@ pub struct Beyond {
     pub body: Envelope,
 }
 
+/// A query with everything that follows from it and the model alone.
+struct Asked<'a> {
+    model: &'a Model,
+    v: f64,
+    masses: Masses,
+    /// That the motion follows.
+    mass_kg: f64,
+    same_mass: bool,
+    parameters: BTreeMap<String, Parameter>,
+    features: Vec<f64>,
+    kinetic_energy_j: f64,
+}
+
+impl<'a> Asked<'a> {
+    fn new(model: &'a Model, query: &Query) -> Result<Self, PredictError> {
+        let v = query.speed_m_per_s;
+        if !(v > 0.0 && v.is_finite()) {
+            return Err(PredictError::Speed { speed_m_per_s: v });
+        }
+        let mut parameters = query.parameters.clone();
+        let other = match parameters.get(OTHER_MASS) {
+            Some(Parameter::Number(mass)) if *mass > 0.0 && mass.is_finite() => Some(*mass),
+            _ => None,
+        };
+        let masses = match query.mass_kg {
+            Some(mass) => {
+                let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
+                Masses { body_kg: mass, other_kg }
+            }
+            None => Masses {
+                other_kg: model.other_mass_kg.map(|trained| other.unwrap_or(trained)),
+                ..model.masses()
+            },
+        };
+        if let Some(mass) = query.mass_kg {
+            parameters.insert(MASS.into(), Parameter::Number(mass));
+        }
+        if let Some(other) = masses.other_kg {
+            parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other));
+        }
+        let known = |name: &str| {
+            let of_pairs = name == OTHER_MASS && model.other_mass_kg.is_some();
+            name == MASS || of_pairs || model.features.iter().any(|f| f.parameter == name)
+        };
+        if let Some(name) = query.parameters.keys().find(|name| !known(name)) {
+            let mut names: Vec<&str> =
+                model.features.iter().map(|f| f.parameter.as_str()).collect();
+            names.dedup();
+            return Err(PredictError::UnknownParameter {
+                name: name.clone(),
+                known: if names.is_empty() { "none".into() } else { names.join(", ") },
+            });
+        }
+        let features = feature_values(&model.features, &parameters)
+            .map_err(|e| PredictError::Parameters(Box::new(e)))?;
+        let mass_kg = masses.effective_kg();
+        let same_mass = (mass_kg / model.masses().effective_kg() - 1.0).abs() <= SAME_MASS;
+        let kinetic_energy_j =
+            masses.kinetic_energy_j(Speed { m_per_s: v, kind: model.speed_kind });
+        Ok(Self { model, v, masses, mass_kg, same_mass, parameters, features, kinetic_energy_j })
+    }
+
+    fn at(&self) -> At<'_> {
+        At {
+            speed_m_per_s: self.v,
+            features: &self.features,
+            mass_kg: self.mass_kg,
+            closing_m_per_s: None,
+        }
+    }
+
+    /// The force of the body's motion, beyond any maximal crush.
+    fn body(&self) -> Result<Envelope, PredictError> {
+        let longest = self.model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
+        let along = grid(REACH * longest, POINTS);
+        let force_n = self.model.body_force_n(&self.at(), &along);
+        let force_n = sound(self.model, &along, force_n, true)?;
+        Ok(Envelope::new(along, force_n)?)
+    }
+
+    /// The rule for the maximal crush.
+    fn rule(&self, query: &Query) -> MaxCrushRule {
+        let (low, high) = self.model.range_m_per_s();
+        query.rule.unwrap_or(match self.model.max_crush_rule {
+            // Crush over speed is that of the trained mass and speeds; the motion knows both.
+            MaxCrushRule::Spline | MaxCrushRule::Monotone
+                if !(self.same_mass && (low..=high).contains(&self.v)) =>
+            {
+                MaxCrushRule::Motion
+            }
+            rule => rule,
+        })
+    }
+
+    /// The rebound after the body's force was `top_n` at the maximal crush.
+    fn rebound(&self, top_n: f64) -> Option<Rebound> {
+        // Another mass gets the same energy back: the structure's, not the car's.
+        let trained_kg = self.model.masses().effective_kg();
+        rebound_speed(self.model, self.v)
+            .map(|speed| Rebound {
+                speed_m_per_s: speed * (trained_kg / self.mass_kg).sqrt(),
+                stiffness_n_per_m: top_n * top_n / (trained_kg * speed * speed),
+            })
+            .filter(|r| r.stiffness_n_per_m > 0.0 && r.stiffness_n_per_m.is_finite())
+    }
+
+    /// What must be said of unloading, mass, and of an energy over the kinetic energy.
+    fn warn(&self, warnings: &mut Vec<Warning>, unloading: Option<f64>, energy: f64) {
+        if unloading.is_none() {
+            warnings.push(Warning::no_unloading());
+        }
+        let mass_is_feature = self.model.features.iter().any(|f| f.parameter == MASS);
+        if !mass_is_feature && !self.same_mass {
+            let trained_kg = self.model.masses().effective_kg();
+            warnings.push(Warning::other_mass(self.mass_kg, trained_kg));
+        }
+        if (energy - 1.0).abs() > EnergyAudit::TOLERANCE {
+            warnings.push(Warning::energy_mismatch(energy));
+        }
+    }
+}
+
+fn evenly(end_m: f64) -> Vec<f64> {
+    (0..=POINTS).map(|i| end_m * i as f64 / POINTS as f64).collect()
+}
+
+/// What drives a body of one mass: the force of its motion and how it unloads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// To the maximal crush.
+    pub envelope: Envelope,
+    /// Along even deflections beyond it: neighbours in a train push on where a body by itself
+    /// would have stopped.
+    pub beyond: Envelope,
+    /// From the maximal crush.
+    pub unloading_stiffness_n_per_m: f64,
+    pub warnings: Vec<Warning>,
+}
+
+/// The part of a prediction that moves bodies, at a fraction of its cost; `None` if the model
+/// has no force of the body's own, or if the rule for the crush needs the other one.
+///
+/// # Errors
+/// As [`predict`].
+pub fn drive(model: &Model, query: &Query) -> Result<Option<Drive>, PredictError> {
+    let asked = Asked::new(model, query)?;
+    let rule = asked.rule(query);
+    if !model.has_body_force() || rule == MaxCrushRule::Energy || query.energy_correct {
+        return Ok(None);
+    }
+    let beyond = asked.body()?;
+    // The energy rule's answer is not asked for.
+    let crush = max_crush(model, asked.v, &beyond, &beyond, asked.kinetic_energy_j);
+    let deflection_m = evenly(chosen(&crush, rule)?);
+    let force_n = deflection_m.iter().map(|&d| beyond.force_at(d)).collect();
+    let envelope = Envelope::new(deflection_m, force_n)?;
+    let unloading = over_speed(model, asked.v, |c| c.unloading_stiffness_n_per_m);
+    let mut warnings = model.warnings(&asked.at());
+    asked.warn(&mut warnings, unloading, envelope.work() / asked.kinetic_energy_j);
+    let rebound = asked.rebound(envelope.force_at(envelope.end_m()));
+    let unloading_stiffness_n_per_m = match rebound {
+        Some(rebound) => rebound.stiffness_n_per_m,
+        None => unloading.unwrap_or(0.0).max(envelope.max_slope()),
+    };
+    Ok(Some(Drive { envelope, beyond, unloading_stiffness_n_per_m, warnings }))
+}
+
 /// As [`predict`], with the forces beyond the maximal crush.
 ///
 /// # Errors
@@ -223,55 +390,13 @@ pub fn predict_beyond(
     model: &Model,
     query: &Query,
 ) -> Result<(PredictedCurve, Beyond), PredictError> {
-    let v = query.speed_m_per_s;
-    if !(v > 0.0 && v.is_finite()) {
-        return Err(PredictError::Speed { speed_m_per_s: v });
-    }
-    let mut parameters = query.parameters.clone();
-    let other = match parameters.get(OTHER_MASS) {
-        Some(Parameter::Number(mass)) if *mass > 0.0 && mass.is_finite() => Some(*mass),
-        _ => None,
-    };
-    let masses = match query.mass_kg {
-        Some(mass) => {
-            let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
-            Masses { body_kg: mass, other_kg }
-        }
-        None => Masses {
-            other_kg: model.other_mass_kg.map(|trained| other.unwrap_or(trained)),
-            ..model.masses()
-        },
-    };
-    if let Some(mass) = query.mass_kg {
-        parameters.insert(MASS.into(), Parameter::Number(mass));
-    }
-    if let Some(other) = masses.other_kg {
-        parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other));
-    }
-    let known = |name: &str| {
-        let of_pairs = name == OTHER_MASS && model.other_mass_kg.is_some();
-        name == MASS || of_pairs || model.features.iter().any(|f| f.parameter == name)
-    };
-    if let Some(name) = query.parameters.keys().find(|name| !known(name)) {
-        let mut names: Vec<&str> = model.features.iter().map(|f| f.parameter.as_str()).collect();
-        names.dedup();
-        return Err(PredictError::UnknownParameter {
-            name: name.clone(),
-            known: if names.is_empty() { "none".into() } else { names.join(", ") },
-        });
-    }
-    let features = feature_values(&model.features, &parameters)
-        .map_err(|e| PredictError::Parameters(Box::new(e)))?;
-    let speed = Speed { m_per_s: v, kind: model.speed_kind };
-    let mass_kg = masses.effective_kg();
-    let at = At { speed_m_per_s: v, features: &features, mass_kg, closing_m_per_s: None };
-    let kinetic_energy_j = masses.kinetic_energy_j(speed);
+    let asked = Asked::new(model, query)?;
+    let (v, mass_kg, at) = (asked.v, asked.mass_kg, asked.at());
+    let kinetic_energy_j = asked.kinetic_energy_j;
 
     // The motion first: crush and the speeds along it follow from the body's force.
-    let reach = REACH * model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
-    let along = grid(reach, POINTS);
-    let body_n = sound(model, &along, model.body_force_n(&at, &along), true)?;
-    let body = Envelope::new(along.clone(), body_n)?;
+    let body = asked.body()?;
+    let along = body.deflection_m().to_vec();
     let closing_at = |&d: &f64| (v * v - 2.0 * body.work_to(d) / mass_kg).max(0.0).sqrt();
     let declared_over = |deflection_m: &[f64]| {
         if !model.has_body_force() {
@@ -283,20 +408,10 @@ pub fn predict_beyond(
     };
     let declared = Envelope::new(along.clone(), declared_over(&along)?)?;
     let crush = max_crush(model, v, &declared, &body, kinetic_energy_j);
-    let same_mass = (mass_kg / model.masses().effective_kg() - 1.0).abs() <= SAME_MASS;
-    let (low, high) = model.range_m_per_s();
-    let rule = query.rule.unwrap_or(match model.max_crush_rule {
-        // Crush over speed is that of the trained mass and speeds; the motion knows both.
-        MaxCrushRule::Spline | MaxCrushRule::Monotone
-            if !(same_mass && (low..=high).contains(&v)) =>
-        {
-            MaxCrushRule::Motion
-        }
-        rule => rule,
-    });
+    let rule = asked.rule(query);
     let end = chosen(&crush, rule)?;
 
-    let deflection_m: Vec<f64> = (0..=POINTS).map(|i| end * i as f64 / POINTS as f64).collect();
+    let deflection_m = evenly(end);
     let force_n = declared_over(&deflection_m)?;
     let body_n = deflection_m.iter().map(|&d| body.force_at(d)).collect();
     let mut warnings = model.warnings(&at);
@@ -325,33 +440,18 @@ pub fn predict_beyond(
     let body_energy_over_kinetic = body.as_ref().map(|b| b.work() / kinetic_energy_j);
 
     let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
-    if unloading.is_none() {
-        warnings.push(Warning::no_unloading());
-    }
-    let mass_is_feature = model.features.iter().any(|f| f.parameter == MASS);
-    if !mass_is_feature && !same_mass {
-        warnings.push(Warning::other_mass(mass_kg, model.masses().effective_kg()));
-    }
     let worst = body_energy_over_kinetic
         .filter(|e| (e - 1.0).abs() > (energy_over_kinetic - 1.0).abs())
         .unwrap_or(energy_over_kinetic);
-    if (worst - 1.0).abs() > EnergyAudit::TOLERANCE {
-        warnings.push(Warning::energy_mismatch(worst));
-    }
-    let top = body.as_ref().unwrap_or(&envelope).force_at(end);
-    // Another mass gets the same energy back: the structure's, not the car's.
-    let trained_kg = model.masses().effective_kg();
-    let rebound = rebound_speed(model, v)
-        .map(|speed| Rebound {
-            speed_m_per_s: speed * (trained_kg / mass_kg).sqrt(),
-            stiffness_n_per_m: top * top / (trained_kg * speed * speed),
-        })
-        .filter(|r| r.stiffness_n_per_m > 0.0 && r.stiffness_n_per_m.is_finite());
+    asked.warn(&mut warnings, unloading, worst);
+    let rebound = asked.rebound(body.as_ref().unwrap_or(&envelope).force_at(end));
     let nearest =
         model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
     let band = model.leave_one_out.as_ref().and_then(|v| v.band);
     let (force_low_n, force_high_n) = band.map(|b| b.around(envelope.force_n())).unzip();
+    let mut parameters = asked.parameters.clone();
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
+    let (low, high) = model.range_m_per_s();
     let curve = PredictedCurve {
         // A softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),
@@ -371,7 +471,7 @@ pub fn predict_beyond(
         },
         speed_m_per_s: v,
         speed_kind: model.speed_kind,
-        mass_kg: masses.body_kg,
+        mass_kg: asked.masses.body_kg,
         model: model.options.name().into(),
         warnings,
         provenance: Provenance {
@@ -408,23 +508,24 @@ fn sound(
     }
     let mut force_n: Vec<f64> = force_n.into_iter().map(|f| f.max(0.0)).collect();
     let step = deflection_m[1] - deflection_m[0];
-    let (declared, body) = model.curves();
-    let curves = if of_body && !body.is_empty() { body } else { declared };
     // How far a point lies above both of its neighbours, or below both.
     let stands_out = |before: f64, at: f64, after: f64| {
         let (a, b) = (at - before, at - after);
         if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 }
     };
-    let mut most = 0.0_f64;
-    for curve in curves {
-        // Far finer steps than the curve's own find no other kinks.
-        let probes = (2.0 * curve.end_m() / step).clamp(2.0, PROBES) as usize;
-        for k in 0..probes {
-            let d = step + (curve.end_m() - 2.0 * step).max(0.0) * k as f64 / probes as f64;
-            let [a, b, c] = [d - step, d, d + step].map(|d| curve.force_at(d));
-            most = most.max(stands_out(a, b, c));
+    let most = model.most_kink_n(of_body, step, |curves| {
+        let mut most = 0.0_f64;
+        for curve in curves {
+            // Far finer steps than the curve's own find no other kinks.
+            let probes = (2.0 * curve.end_m() / step).clamp(2.0, PROBES) as usize;
+            for k in 0..probes {
+                let d = step + (curve.end_m() - 2.0 * step).max(0.0) * k as f64 / probes as f64;
+                let [a, b, c] = [d - step, d, d + step].map(|d| curve.force_at(d));
+                most = most.max(stands_out(a, b, c));
+            }
         }
-    }
+        most
+    });
     // Taking one point back may leave its neighbour standing: a few rounds settle it.
     for _ in 0..ROUNDS {
         let mut settled = true;

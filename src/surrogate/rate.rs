@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::curves::neighbours;
+use super::kept::Kept;
 use super::{At, CaseCurve, Surrogate};
 
 /// `F = Q(d; v) R(ḋ)` with `R(u) = 1 + β √u`.
@@ -16,11 +17,21 @@ use super::{At, CaseCurve, Surrogate};
 ///
 /// Where a slower neighbour ends, its Q goes on as the next faster one's, at the level that
 /// it had against it, which fades: the blend has no step there.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
+    #[serde(skip)]
+    levels: Kept<Levels>,
+}
+
+/// Level of each curve at its end against the next faster one, 1 for the fastest.
+#[derive(Clone, Debug)]
+struct Levels {
+    /// Speed, end and work of the curves that have them.
+    of: Vec<[f64; 3]>,
+    levels: Vec<f64>,
 }
 
 /// β is looked for from 0 to this: R doubles between standing and 4 m/s.
@@ -47,7 +58,7 @@ impl Rate {
         let best = (0..=STEPS)
             .map(|k| (k, disagreement(cases, trial(k))))
             .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
-        Self { sensitivity: 0.5 * trial(best.0) }
+        Self { sensitivity: 0.5 * trial(best.0), levels: Kept::default() }
     }
 
     /// # Errors
@@ -75,8 +86,18 @@ impl Rate {
         self.quotient(cases, levels, i + 1, d) * (1.0 + (levels[i] - 1.0) * fading)
     }
 
-    /// Level of each curve at its end against the next faster one.
+    /// The levels, kept for the first curves that are asked for: a model has no others.
     fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
+        let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
+        let kept =
+            self.levels.or_find(|| Levels { of: of().collect(), levels: self.find_levels(cases) });
+        match kept.of.iter().copied().eq(of()) {
+            true => kept.levels.clone(),
+            false => self.find_levels(cases),
+        }
+    }
+
+    fn find_levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let mut levels = vec![1.0; cases.len()];
         for i in (0..cases.len().saturating_sub(1)).rev() {
             let end = cases[i].end_m();
@@ -124,8 +145,8 @@ impl Surrogate for Rate {
         if speeds.is_empty() {
             return vec![f64::NAN; deflection_m.len()];
         }
-        let levels = self.levels(cases);
         let (low, high, share) = neighbours(&speeds, at.speed_m_per_s);
+        let levels = self.levels(cases);
         let quotient = |d: f64| {
             let of = |i| self.quotient(cases, &levels, i, d);
             if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
@@ -180,7 +201,7 @@ mod tests {
         let cases: Vec<CaseCurve> = [8.0, 12.0, 20.0].map(|v| made(v, 0.06, 24e3)).to_vec();
         let fitted = Rate::fit(&cases);
         assert!((fitted.sensitivity - 0.03).abs() < 0.003, "{}", fitted.sensitivity);
-        let exact = Rate { sensitivity: 0.06 };
+        let exact = Rate { sensitivity: 0.06, levels: Kept::default() };
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
         let at = At { speed_m_per_s: 15.0, features: &[], mass_kg: 24e3, closing_m_per_s: None };
@@ -201,7 +222,7 @@ mod tests {
     #[test]
     fn given_speeds_are_used() {
         let cases: Vec<CaseCurve> = [8.0, 20.0].map(|v| made(v, 0.0, 24e3)).to_vec();
-        let rate = Rate { sensitivity: 0.1 };
+        let rate = Rate { sensitivity: 0.1, levels: Kept::default() };
         let at = |closing| At {
             speed_m_per_s: 8.0,
             features: &[],
