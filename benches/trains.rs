@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let coarse = RunSettings { output_interval_s: 3e-3, ..summary(fourth) };
     for (name, settings) in [
         ("fourth order", fourth),
-        ("fourth order, twice the step", fourth.with_step(2.0 * fourth.step_s)),
+        ("fourth order, 0.375 ms", fourth.with_step(3.75e-4)),
         ("fourth order, half the step", fourth.with_step(0.5 * fourth.step_s)),
         ("fourth order, summary only", summary(fourth)),
         ("fourth order, summary, outputs each 3 ms", coarse),

@@ -9,7 +9,8 @@
 
 use super::integrator::{Record, Run, RunSettings, SimulationError};
 use super::interface::ForceLaw;
-use super::ledger::Account;
+use super::ledger::{Account, Balance};
+use super::rows::{Places, Rows};
 use super::train::Chain;
 use super::watch::Watch;
 
@@ -209,9 +210,9 @@ pub(super) fn run(
         })
         .collect();
     let mut account = Account::open(chain);
-    let mut watch = Watch::new(chain);
+    let mut watch = Watch::new(chain, &Places::new(n));
     let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
-    record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
+    let mut interfaces_j = record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
     for output in 1..=outputs {
         let end_s = output as f64 * settings.output_interval_s;
         let mut time_s = (output - 1) as f64 * settings.output_interval_s;
@@ -258,13 +259,14 @@ pub(super) fn run(
                 return Err(SimulationError::Stuck { step_s: SHORTEST_S, time_s });
             }
         }
-        record(&motion, &y, end_s, settings.record, run, &mut account, &mut watch);
+        interfaces_j = record(&motion, &y, end_s, settings.record, run, &mut account, &mut watch);
     }
     watch.close(run, settings.record, settings.output_interval_s);
-    run.ledger = account.close();
+    run.ledger = account.close(interfaces_j.0, interfaces_j.1);
     Ok(())
 }
 
+/// Records the state; gives what the interfaces have stored and dissipated, in J.
 fn record(
     motion: &Motion<'_>,
     y: &[f64],
@@ -273,12 +275,13 @@ fn record(
     run: &mut Run,
     account: &mut Account,
     watch: &mut Watch,
-) {
+) -> (f64, f64) {
     let chain = motion.chain;
     let n = chain.bodies().len();
     let rates = motion.rates(y);
     let histories = what == Record::Histories;
-    account.begin();
+    let (mut kinetic_j, mut momentum) = (0.0, 0.0);
+    let (mut stored_j, mut dissipated_j) = (0.0, 0.0);
     let mut pushed = vec![false; chain.interfaces().len()];
     for (k, history) in run.interfaces.iter_mut().enumerate() {
         let interface = &chain.interfaces()[k];
@@ -289,7 +292,8 @@ fn record(
             let pulls = tension.law.energies_j(contact.extension_m, motion.pulled_m[k]);
             (stored, dissipated) = (stored + pulls.0, dissipated + pulls.1);
         }
-        account.interface(stored, dissipated);
+        stored_j += stored;
+        dissipated_j += dissipated;
         let force_n = contact.spring_n + contact.damper_n;
         watch.output_interface(k, contact.deflection_m, force_n, time_s);
         if histories {
@@ -302,20 +306,31 @@ fn record(
         pushed[k] = contact.spring_n != 0.0;
     }
     for (i, history) in run.bodies.iter_mut().enumerate() {
-        account.body(chain.bodies()[i].mass_kg, y[n + i]);
+        let (mass_kg, v) = (chain.bodies()[i].mass_kg, y[n + i]);
+        kinetic_j += 0.5 * mass_kg * v * v;
+        momentum += mass_kg * v;
         let behind = i > 0 && pushed[i - 1];
         let touched = behind || pushed.get(i).copied().unwrap_or(false);
         watch.body(i, touched, time_s, y[n + i]);
-        watch.output_body(i, y[n + i], rates[n + i], time_s);
         history.v_m_per_s.push(y[n + i]);
         if histories {
             history.x_m.push(y[i]);
             history.a_m_per_s2.push(rates[n + i]);
         }
     }
+    let places = Places::new(n);
+    let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, n, value);
+    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| rates[n + i]), time_s);
     if histories {
         run.time_s.push(time_s);
     }
-    account.rates(y[2 * n + 1], y[2 * n + 2]);
-    account.end(y[2 * n]);
+    account.audit(&Balance {
+        kinetic_j,
+        interfaces_j: stored_j + dissipated_j,
+        damped_j: y[2 * n + 1],
+        resisted_j: y[2 * n + 2],
+        momentum,
+        impulse: y[2 * n],
+    });
+    (stored_j, dissipated_j)
 }

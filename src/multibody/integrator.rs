@@ -9,7 +9,7 @@ use super::{engine, extrapolation};
 /// ones hold.
 pub const DEFAULT_STEP_S: f64 = 1e-5;
 /// Default step of the fourth-order scheme.
-pub const FOURTH_ORDER_STEP_S: f64 = 1.875e-4;
+pub const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
 /// A curve's own run ends where the curve does, but for rounding.
 const AT_END_M: f64 = 1e-4;
 /// Bounds that no real scenario reaches; they keep a mistyped duration from running for days.

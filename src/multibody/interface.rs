@@ -39,7 +39,16 @@ pub struct UnloadingShape {
 impl UnloadingShape {
     /// The straight line.
     pub fn line() -> Self {
-        Self { length: vec![0.0, 1.0], force: vec![1.0, 0.0], rest: vec![0.5, 0.0] }
+        Self::of(vec![0.0, 1.0], vec![1.0, 0.0])
+    }
+
+    fn of(length: Vec<f64>, force: Vec<f64>) -> Self {
+        let n = length.len();
+        let mut rest = vec![0.0; n];
+        for j in (0..n - 1).rev() {
+            rest[j] = rest[j + 1] + 0.5 * (force[j] + force[j + 1]) * (length[j + 1] - length[j]);
+        }
+        Self { length, force, rest }
     }
 
     /// From a branch that was recorded: deflections in m, falling, and forces in N. Points at
@@ -69,15 +78,7 @@ impl UnloadingShape {
             return None;
         }
         let length = points.iter().map(|(d, _)| (top_m - d) / (top_m - end_m)).collect();
-        let mut shape =
-            Self { length, force: points.iter().map(|p| p.1).collect(), rest: Vec::new() };
-        let mut rest = vec![0.0; points.len()];
-        for j in (0..points.len() - 1).rev() {
-            let step = shape.length[j + 1] - shape.length[j];
-            rest[j] = rest[j + 1] + 0.5 * (shape.force[j] + shape.force[j + 1]) * step;
-        }
-        shape.rest = rest;
-        Some(shape)
+        Some(Self::of(length, points.iter().map(|p| p.1).collect()))
     }
 
     /// Share of force × length that is given back: ½ for the line.
@@ -139,19 +140,29 @@ pub(super) struct Branch {
     pub length_m: f64,
 }
 
-/// A straight piece of the law: `F = force_n + slope δ` between two deflections.
+/// A straight piece of the law: `F = at_zero_n + slope δ` between two deflections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
     pub from_m: f64,
     pub to_m: f64,
     pub at_zero_n: f64,
     pub slope_n_per_m: f64,
+    pub known: Known,
+}
+
+/// A point of a piece, and the work done up to it: what is stored and dissipated there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Known {
+    pub deflection_m: f64,
+    pub force_n: f64,
+    pub work_j: f64,
 }
 
 impl Piece {
-    /// No force up to a deflection.
-    pub fn open_to(to_m: f64) -> Self {
-        Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0 }
+    /// No force up to a deflection, after this work.
+    pub fn open_to(to_m: f64, work_j: f64) -> Self {
+        let known = Known { deflection_m: to_m, force_n: 0.0, work_j };
+        Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0, known }
     }
 }
 
@@ -286,6 +297,7 @@ impl ForceLaw {
 
     /// Index of the envelope's piece that holds δ ≥ 0, searched from a piece near by; the last
     /// one reaches beyond the end.
+    #[inline]
     pub(super) fn piece_index(&self, near: usize, deflection_m: f64) -> usize {
         let d = self.envelope.deflection_m();
         let mut i = near.min(d.len() - 1);
@@ -303,6 +315,7 @@ impl ForceLaw {
     }
 
     /// Piece `i` of the envelope.
+    #[inline(always)]
     pub(super) fn envelope_piece(&self, i: usize) -> Piece {
         let (d, f) = (self.envelope.deflection_m(), self.envelope.force_n());
         let slope_n_per_m = self.slope_n_per_m[i];
@@ -311,12 +324,8 @@ impl ForceLaw {
             to_m: d.get(i + 1).copied().unwrap_or(f64::INFINITY),
             at_zero_n: f[i] - slope_n_per_m * d[i],
             slope_n_per_m,
+            known: Known { deflection_m: d[i], force_n: f[i], work_j: self.envelope.work_j()[i] },
         }
-    }
-
-    /// Largest force of the envelope's points `from..=to`.
-    pub(super) fn peak_between_n(&self, from: usize, to: usize) -> f64 {
-        self.envelope.force_n()[from..=to].iter().copied().fold(0.0, f64::max)
     }
 
     /// Force and work on the envelope at δ ≥ 0 in piece `i`, in N and J.
@@ -330,40 +339,62 @@ impl ForceLaw {
     /// The unloading branch from δ in piece `i` of the envelope.
     pub(super) fn branch(&self, i: usize, largest_m: f64) -> Branch {
         let (top_n, work) = self.on_envelope(i, largest_m);
-        let Unloading::Memory { stiffness_n_per_m } = self.unloading else {
-            return Branch { largest_m, top_n, stored_j: work, dissipated_j: 0.0, length_m: 0.0 };
-        };
-        // Within a piece A − S is monotone for either bound, so its ends and δ decide.
-        let stored = self.stored_by_rule(largest_m, top_n, work, stiffness_n_per_m);
-        let dissipated = self.dissipated_j[i].max(work - stored);
-        let stored_j = match self.by_mean {
-            true => (work - dissipated).min(top_n * self.shape.share().min(0.5) * largest_m),
-            false => {
-                let least = self.storable(largest_m, top_n, self.steepest_n_per_m);
-                (work - dissipated).max(least)
-            }
-        };
-        let length_m = match top_n > 0.0 && stored_j > 0.0 {
+        let stored_j = self.stored_j(i, largest_m, top_n, work);
+        let length_m = match self.has_memory() && top_n > 0.0 && stored_j > 0.0 {
             true => stored_j / (top_n * self.shape.share()),
             false => 0.0, // the envelope itself has no force here
         };
         Branch { largest_m, top_n, stored_j, dissipated_j: work - stored_j, length_m }
     }
 
-    /// The piece of an unloading branch that holds δ below its top.
-    pub(super) fn branch_piece(&self, branch: &Branch, deflection_m: f64) -> Piece {
-        let zero_m = branch.largest_m - branch.length_m;
-        if deflection_m <= zero_m || branch.length_m <= 0.0 {
-            return Piece::open_to(zero_m.max(0.0));
+    /// Energy that would come back from δ in piece `i` of the envelope, with force and work there.
+    #[inline]
+    pub(super) fn stored_j(&self, i: usize, largest_m: f64, top_n: f64, work_j: f64) -> f64 {
+        let Unloading::Memory { stiffness_n_per_m } = self.unloading else { return work_j };
+        // Within a piece A − S is monotone for either bound, so its ends and δ decide.
+        let stored = self.stored_by_rule(largest_m, top_n, work_j, stiffness_n_per_m);
+        let dissipated = self.dissipated_j[i].max(work_j - stored);
+        let least = self.storable(largest_m, top_n, self.steepest_n_per_m);
+        let stored = (work_j - dissipated).max(least);
+        match self.by_mean {
+            true => stored.min(top_n * self.shape.share().min(0.5) * largest_m),
+            false => stored,
         }
-        let j = self.shape.piece((branch.largest_m - deflection_m) / branch.length_m);
-        let at = |j: usize| branch.largest_m - self.shape.length[j] * branch.length_m;
-        let slope_n_per_m = -self.shape.slope(j) * branch.top_n / branch.length_m;
+    }
+
+    /// Straight pieces of an unloading branch, from its top down; none if it has no length.
+    pub(super) fn branch_pieces(&self, branch: &Branch) -> usize {
+        match self.has_memory() && branch.length_m > 0.0 {
+            true => self.shape.length.len() - 1,
+            false => 0,
+        }
+    }
+
+    /// Piece `j` of an unloading branch.
+    pub(super) fn branch_piece(&self, branch: &Branch, j: usize) -> Piece {
+        let shape = &self.shape;
+        let at = |j: usize| branch.largest_m - shape.length[j] * branch.length_m;
+        let slope_n_per_m = -shape.slope(j) * branch.top_n / branch.length_m;
         Piece {
             from_m: at(j + 1),
             to_m: if j == 0 { branch.largest_m } else { at(j) },
-            at_zero_n: branch.top_n * self.shape.force[j] - slope_n_per_m * at(j),
+            at_zero_n: branch.top_n * shape.force[j] - slope_n_per_m * at(j),
             slope_n_per_m,
+            known: Known {
+                deflection_m: at(j + 1),
+                force_n: branch.top_n * shape.force[j + 1],
+                work_j: branch.dissipated_j + branch.stored_j * shape.rest[j + 1] / shape.share(),
+            },
+        }
+    }
+
+    /// What follows below an unloading branch: no force.
+    pub(super) fn below_branch(&self, branch: &Branch) -> Piece {
+        match self.has_memory() {
+            true => {
+                Piece::open_to((branch.largest_m - branch.length_m).max(0.0), branch.dissipated_j)
+            }
+            false => Piece::open_to(0.0, 0.0),
         }
     }
 
@@ -416,7 +447,11 @@ impl ForceLaw {
             return self.envelope_n(deflection_m);
         }
         let branch = self.branch(self.piece_index(0, largest_m), largest_m);
-        let piece = self.branch_piece(&branch, deflection_m);
+        let length = (branch.largest_m - deflection_m) / branch.length_m;
+        if branch.length_m <= 0.0 || length >= 1.0 {
+            return 0.0;
+        }
+        let piece = self.branch_piece(&branch, self.shape.piece(length));
         (piece.at_zero_n + piece.slope_n_per_m * deflection_m).max(0.0)
     }
 

@@ -57,13 +57,23 @@ pub const ENERGY_TOLERANCE: f64 = 1e-3;
 /// Imbalance of momentum over which a warning is due.
 pub const MOMENTUM_TOLERANCE: f64 = 1e-10;
 
-/// The running account of a simulation: at each output [`Account::begin`], every body and
-/// interface, [`Account::end`].
+/// What is where at an output: energies in J, momentum and impulse in N s.
+pub(super) struct Balance {
+    pub kinetic_j: f64,
+    /// Stored and dissipated by all interfaces.
+    pub interfaces_j: f64,
+    pub damped_j: f64,
+    pub resisted_j: f64,
+    pub momentum: f64,
+    /// What wall and track have taken so far.
+    pub impulse: f64,
+}
+
+/// The running account of a simulation.
 pub(super) struct Account {
     ledger: Ledger,
     initial_momentum: f64,
     momentum_scale: f64,
-    momentum: f64,
 }
 
 impl Account {
@@ -76,38 +86,15 @@ impl Account {
             ledger,
             initial_momentum: bodies.iter().map(|b| b.mass_kg * b.speed_m_per_s).sum(),
             momentum_scale: bodies.iter().map(|b| b.mass_kg * b.speed_m_per_s.abs()).sum(),
-            momentum: 0.0,
         }
     }
 
-    pub fn begin(&mut self) {
+    /// Audits an output.
+    pub fn audit(&mut self, now: &Balance) {
         let ledger = &mut self.ledger;
-        (ledger.kinetic_j, ledger.stored_j, ledger.dissipated_j) = (0.0, 0.0, 0.0);
-        self.momentum = 0.0;
-    }
-
-    pub fn body(&mut self, mass_kg: f64, v: f64) {
-        self.ledger.kinetic_j += 0.5 * mass_kg * v * v;
-        self.momentum += mass_kg * v;
-    }
-
-    pub fn interface(&mut self, stored_j: f64, dissipated_j: f64) {
-        self.ledger.stored_j += stored_j;
-        self.ledger.dissipated_j += dissipated_j;
-    }
-
-    pub fn rates(&mut self, damped_j: f64, resisted_j: f64) {
-        (self.ledger.damped_j, self.ledger.resisted_j) = (damped_j, resisted_j);
-    }
-
-    /// Audits the state. `impulse` is what wall and track have taken so far, in N s.
-    pub fn end(&mut self, impulse: f64) {
-        let ledger = &mut self.ledger;
-        let energy = ledger.kinetic_j
-            + ledger.stored_j
-            + ledger.dissipated_j
-            + ledger.damped_j
-            + ledger.resisted_j;
+        (ledger.kinetic_j, ledger.damped_j, ledger.resisted_j) =
+            (now.kinetic_j, now.damped_j, now.resisted_j);
+        let energy = now.kinetic_j + now.interfaces_j + now.damped_j + now.resisted_j;
         let share = |difference: f64, scale: f64| match difference == 0.0 {
             true => 0.0,
             // What is not finite is out of any tolerance.
@@ -117,12 +104,13 @@ impl Account {
         };
         let energy_error = share(energy - ledger.initial_kinetic_j, ledger.initial_kinetic_j);
         let momentum_error =
-            share(self.momentum + impulse - self.initial_momentum, self.momentum_scale);
+            share(now.momentum + now.impulse - self.initial_momentum, self.momentum_scale);
         ledger.max_energy_error = ledger.max_energy_error.max(energy_error);
         ledger.max_momentum_error = ledger.max_momentum_error.max(momentum_error);
     }
 
-    pub fn close(self) -> Ledger {
-        self.ledger
+    /// Stored and dissipated are those of the last output.
+    pub fn close(self, stored_j: f64, dissipated_j: f64) -> Ledger {
+        Ledger { stored_j, dissipated_j, ..self.ledger }
     }
 }

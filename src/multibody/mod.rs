@@ -11,6 +11,7 @@ mod extrapolation;
 pub mod integrator;
 pub mod interface;
 pub mod ledger;
+mod rows;
 pub mod train;
 mod watch;
 

@@ -1,6 +1,7 @@
 //! Watch: extremes and events of a run between its outputs.
 
 use super::integrator::{Record, Run};
+use super::rows::{LANES, Place, Places, Row, Rows, each, larger, smaller};
 use super::train::Chain;
 
 /// Window of the moving mean deceleration, in s (EN 15227).
@@ -12,6 +13,26 @@ const COARSEST_S: f64 = 0.005;
 pub(super) struct Watch {
     interfaces: Vec<Extremes>,
     bodies: Vec<Phase>,
+    places: Places,
+    present: Present,
+}
+
+/// What every output asks of all bodies.
+struct Present {
+    /// 1 for bodies that no force acts on, else 0.
+    is_free: Rows,
+    /// 1 for bodies in a span whose sign is not yet known, else 0.
+    waits: Rows,
+    /// Direction of the net force in the open span, 0 if not known.
+    sign: Rows,
+    /// Largest magnitude of the acceleration at the outputs of the open span.
+    peak: Rows,
+    /// Speed before the contact.
+    free_speed: Rows,
+    /// The last output.
+    time_s: f64,
+    v: Rows,
+    a: Rows,
 }
 
 #[derive(Clone, Default)]
@@ -35,8 +56,6 @@ struct Span {
     begin_v: f64,
     end_s: f64,
     end_v: f64,
-    /// Direction of the net force, 0 until it is known.
-    sign: f64,
     /// Largest magnitude of the acceleration at the outputs.
     peak: f64,
 }
@@ -44,12 +63,8 @@ struct Span {
 #[derive(Clone, Default)]
 struct Phase {
     mass_kg: f64,
-    /// Speed before the contact.
-    free_speed: f64,
     open: Option<Span>,
     closed: Vec<Span>,
-    /// The last output: time, speed, acceleration.
-    last: (f64, f64, f64),
 }
 
 /// Contacts of which the first that counts is among them.
@@ -62,15 +77,26 @@ const LEAST_SHARE: f64 = 0.005;
 const SLOWEST_APPROACH: f64 = 0.1;
 
 impl Watch {
-    pub fn new(chain: &Chain) -> Self {
-        let body = |b: &super::Body| Phase {
-            mass_kg: b.mass_kg,
-            free_speed: b.speed_m_per_s,
-            ..Phase::default()
+    pub fn new(chain: &Chain, places: &Places) -> Self {
+        let bodies = chain.bodies();
+        let of = |value: &dyn Fn(usize) -> f64| Rows::of(places, bodies.len(), value);
+        let none = || of(&|_| 0.0);
+        let present = Present {
+            is_free: of(&|_| 1.0),
+            waits: none(),
+            sign: none(),
+            peak: none(),
+            free_speed: of(&|i| bodies[i].speed_m_per_s),
+            time_s: 0.0,
+            v: none(),
+            a: none(),
         };
+        let phase = |b: &super::Body| Phase { mass_kg: b.mass_kg, ..Phase::default() };
         Self {
             interfaces: vec![Extremes::default(); chain.interfaces().len()],
-            bodies: chain.bodies().iter().map(body).collect(),
+            bodies: bodies.iter().map(phase).collect(),
+            places: places.clone(),
+            present,
         }
     }
 
@@ -115,17 +141,35 @@ impl Watch {
 
     /// Contact forces on body `i` act or have ended at `time_s`, with its speed.
     pub fn body(&mut self, i: usize, touched: bool, time_s: f64, speed: f64) {
-        let phase = &mut self.bodies[i];
-        match (touched, phase.open) {
+        let place = self.places.of(i);
+        match (touched, self.bodies[i].open) {
             (true, None) => {
-                let begin_v = phase.free_speed;
-                phase.open = Some(Span { begin_s: time_s, begin_v, ..Span::default() });
+                let begin_v = self.present.free_speed[place];
+                self.open(i, place, Span { begin_s: time_s, begin_v, ..Span::default() });
             }
             (false, Some(_)) => {
-                phase.close(time_s, speed);
-                phase.free_speed = speed;
+                self.close_span(i, place, time_s, speed);
+                self.present.free_speed[place] = speed;
             }
             _ => {}
+        }
+    }
+
+    fn open(&mut self, i: usize, place: Place, span: Span) {
+        self.bodies[i].open = Some(span);
+        let present = &mut self.present;
+        (present.is_free[place], present.waits[place]) = (0.0, 1.0);
+        (present.sign[place], present.peak[place]) = (0.0, 0.0);
+    }
+
+    fn close_span(&mut self, i: usize, place: Place, end_s: f64, end_v: f64) {
+        let (phase, present) = (&mut self.bodies[i], &mut self.present);
+        (present.is_free[place], present.waits[place], present.sign[place]) = (1.0, 0.0, 0.0);
+        let peak = present.peak[place];
+        if let Some(span) = phase.open.take()
+            && phase.closed.len() < MOST_SPANS
+        {
+            phase.closed.push(Span { end_s, end_v, peak, ..span });
         }
     }
 
@@ -137,34 +181,69 @@ impl Watch {
         }
     }
 
-    pub fn output_body(&mut self, i: usize, v: f64, a: f64, time_s: f64) {
-        let phase = &mut self.bodies[i];
-        let (before_s, before_v, before_a) = phase.last;
-        match &mut phase.open {
-            None => phase.free_speed = v,
-            Some(span) => {
-                if span.sign * a < 0.0 {
-                    // The net force has changed its sign since the last output.
-                    let share = before_a / (before_a - a);
-                    let until = (time_s - before_s) * share.clamp(0.0, 1.0);
-                    let at_v = before_v + 0.5 * before_a * until;
-                    phase.close(before_s + until, at_v);
-                    let (begin_s, begin_v) = (before_s + until, at_v);
-                    phase.open = Some(Span { begin_s, begin_v, ..Span::default() });
-                }
-                if let Some(span) = &mut phase.open {
-                    span.peak = span.peak.max(a.abs());
-                    if span.sign == 0.0 && a != 0.0 {
-                        span.sign = a.signum();
-                    }
-                }
+    /// Speeds and accelerations of all bodies at an output.
+    #[inline(always)]
+    pub fn output_bodies<const N: usize>(&mut self, v: &Rows, a: &Rows, time_s: f64) {
+        let n = self.places.known::<N>();
+        let (vs, accelerations) = (v.values(n), a.values(n));
+        let (waits, sign) = (self.present.waits.values(n), self.present.sign.values(n));
+        let mut least: Row = [0.0; LANES];
+        for c in 0..n {
+            let a = accelerations[c];
+            let turns = each(|j| sign[c][j] * a[j]);
+            let begins = each(|j| -waits[c][j] * a[j].abs());
+            least = smaller(least, smaller(turns, begins));
+        }
+        if least.iter().any(|&l| l < 0.0) {
+            self.follow_signs(a, time_s);
+        }
+        let Present { is_free, peak, free_speed, .. } = &mut self.present;
+        let (is_free, peak) = (is_free.values(n), peak.values_mut(n));
+        let free_speed = free_speed.values_mut(n);
+        for c in 0..n {
+            let (v, a) = (vs[c], accelerations[c]);
+            peak[c] = larger(peak[c], each(|j| a[j].abs()));
+            free_speed[c] = each(|j| if is_free[c][j] > 0.0 { v[j] } else { free_speed[c][j] });
+        }
+        self.present.v.values_mut(n).copy_from_slice(vs);
+        self.present.a.values_mut(n).copy_from_slice(accelerations);
+        self.present.time_s = time_s;
+    }
+
+    /// Closes spans where the net force has changed its sign since the last output; learns the
+    /// signs of new ones.
+    #[cold]
+    #[inline(never)]
+    fn follow_signs(&mut self, a: &Rows, time_s: f64) {
+        for i in 0..self.bodies.len() {
+            let place = self.places.of(i);
+            let a = a[place];
+            if self.bodies[i].open.is_none() {
+                continue;
+            }
+            let present = &self.present;
+            if present.sign[place] * a < 0.0 {
+                let (before_v, before_a) = (present.v[place], present.a[place]);
+                let share = (before_a / (before_a - a)).clamp(0.0, 1.0);
+                let until_s = (time_s - present.time_s) * share;
+                let begin_s = present.time_s + until_s;
+                let begin_v = before_v + 0.5 * before_a * until_s;
+                self.close_span(i, place, begin_s, begin_v);
+                self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
+            }
+            if self.present.waits[place] > 0.0 && a != 0.0 {
+                (self.present.sign[place], self.present.waits[place]) = (a.signum(), 0.0);
             }
         }
-        phase.last = (time_s, v, a);
     }
 
     /// Fills in the summary; `interval_s` lies between the outputs.
-    pub fn close(self, run: &mut Run, record: Record, interval_s: f64) {
+    pub fn close(mut self, run: &mut Run, record: Record, interval_s: f64) {
+        for i in 0..self.bodies.len() {
+            let place = self.places.of(i);
+            self.close_span(i, place, self.present.time_s, self.present.v[place]);
+            run.bodies[i].final_v_m_per_s = self.present.v[place];
+        }
         for (history, seen) in run.interfaces.iter_mut().zip(self.interfaces) {
             history.peak_force_n = seen.peak_n;
             history.max_deflection_m = seen.max_deflection_m;
@@ -179,10 +258,7 @@ impl Watch {
             history.peak_tension_n = seen.peak_tension_n;
             history.max_extension_m = seen.max_extension_m;
         }
-        for (history, mut phase) in run.bodies.iter_mut().zip(self.bodies) {
-            let (last_s, last_v, _) = phase.last;
-            phase.close(last_s, last_v);
-            history.final_v_m_per_s = last_v;
+        for (history, phase) in run.bodies.iter_mut().zip(self.bodies) {
             history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
@@ -193,14 +269,6 @@ impl Watch {
 }
 
 impl Phase {
-    fn close(&mut self, time_s: f64, speed: f64) {
-        if let Some(span) = self.open.take()
-            && self.closed.len() < MOST_SPANS
-        {
-            self.closed.push(Span { end_s: time_s, end_v: speed, ..span });
-        }
-    }
-
     /// Over the first contact that counts; 0 without one.
     fn mean_deceleration(&self) -> f64 {
         let most = self.closed.iter().map(|s| s.peak).fold(0.0, f64::max);
@@ -224,10 +292,21 @@ fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
     // Rounding shall not make 160 intervals of 0.75 ms a little more than 120 ms.
     let back = (window - 1e-9).ceil();
     let share = back - window;
-    let back = back as usize;
-    let mean = |j: usize| {
-        let (before, after) = (speeds[j - back], speeds[j - back + 1]);
-        (before + share * (after - before) - speeds[j]) / MOVING_MEAN_S
-    };
-    (back.max(1)..speeds.len()).map(mean).reduce(|a, b| if b.abs() > a.abs() { b } else { a })
+    let back = (back as usize).max(1);
+    let now = speeds.get(back..)?;
+    let (before, after) = (&speeds[..now.len()], &speeds[1..][..now.len()]);
+    let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    let fall = |before: f64, after: f64, now: f64| before + share * (after - before) - now;
+    let mut most = [0.0; LANES];
+    let (rows, rest) = now.as_chunks::<LANES>();
+    for ((now, before), after) in
+        rows.iter().zip(before.as_chunks::<LANES>().0).zip(after.as_chunks::<LANES>().0)
+    {
+        most = each(|j| larger(most[j], fall(before[j], after[j], now[j])));
+    }
+    let mut most = most.into_iter().fold(0.0, larger);
+    for j in now.len() - rest.len()..now.len() {
+        most = larger(most, fall(before[j], after[j], now[j]));
+    }
+    (!now.is_empty()).then_some(most / MOVING_MEAN_S)
 }

@@ -1,0 +1,224 @@
+//! Outputs: the state at the end of each output interval, into the ledger and the histories.
+
+use super::super::bank::At;
+use super::super::integrator::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
+use super::super::ledger::{Account, Balance};
+use super::super::rows::{LANES, Places, Row, Rows, each, larger};
+use super::super::train::Chain;
+use super::Engine;
+
+/// Outputs that are kept before they are appended to the histories: one history at a time is
+/// written faster than one value of each.
+const OUTPUTS: usize = 32;
+
+type OfBody = fn(&mut BodyHistory) -> &mut Vec<f64>;
+type OfInterface = fn(&mut InterfaceHistory) -> &mut Vec<f64>;
+
+/// The histories that are kept. The moving mean needs the speeds in any case.
+fn kinds(record: Record) -> (&'static [OfBody], &'static [OfInterface]) {
+    const OF_BODY: [OfBody; 3] = [|b| &mut b.v_m_per_s, |b| &mut b.x_m, |b| &mut b.a_m_per_s2];
+    const OF_INTERFACE: [OfInterface; 5] = [
+        |i| &mut i.deflection_m,
+        |i| &mut i.force_n,
+        |i| &mut i.largest_deflection_m,
+        |i| &mut i.stored_j,
+        |i| &mut i.dissipated_j,
+    ];
+    match record {
+        Record::Histories => (&OF_BODY, &OF_INTERFACE),
+        Record::Summary => (&OF_BODY[..1], &[]),
+    }
+}
+
+/// What the outputs gather.
+pub(super) struct Recorder {
+    account: Account,
+    record: Record,
+    recent: Recent,
+    /// Work of the interfaces, their largest deflections, what is dissipated.
+    work_j: Rows,
+    largest_m: Rows,
+    dissipated_j: Rows,
+    /// The same of couplings.
+    pulled: [Rows; 3],
+}
+
+impl Recorder {
+    pub fn new(chain: &Chain, places: &Places, record: Record) -> Self {
+        let zeros = || Rows::zeros(places);
+        let (of_body, of_interface) = kinds(record);
+        let rows = (of_body.len() + of_interface.len()) * places.rows();
+        Self {
+            account: Account::open(chain),
+            record,
+            recent: Recent { values: vec![[[0.0; OUTPUTS]; LANES]; rows], outputs: 0 },
+            work_j: zeros(),
+            largest_m: zeros(),
+            dissipated_j: zeros(),
+            pulled: std::array::from_fn(|_| zeros()),
+        }
+    }
+}
+
+/// The last values of the histories, by kind and place.
+struct Recent {
+    values: Vec<[[f64; OUTPUTS]; LANES]>,
+    outputs: usize,
+}
+
+impl Recent {
+    /// Values of one kind at an output.
+    #[inline(always)]
+    fn keep(&mut self, kind: usize, n: usize, row: impl Fn(usize) -> Row) {
+        let output = self.outputs % OUTPUTS;
+        for (c, recent) in self.values[kind * n..][..n].iter_mut().enumerate() {
+            let row = row(c);
+            for j in 0..LANES {
+                recent[j][output] = row[j];
+            }
+        }
+    }
+
+    /// Appends the last values to the histories.
+    fn flush(&mut self, record: Record, run: &mut Run, places: &Places) {
+        let (of_body, of_interface) = kinds(record);
+        let recent = |kind: usize, i: usize| {
+            let place = places.of(i);
+            let row = kind * places.rows() + place.row();
+            &self.values[row][place.lane()][..self.outputs]
+        };
+        for (i, body) in run.bodies.iter_mut().enumerate() {
+            for (kind, of) in of_body.iter().enumerate() {
+                of(body).extend_from_slice(recent(kind, i));
+            }
+        }
+        for (k, interface) in run.interfaces.iter_mut().enumerate() {
+            for (kind, of) in of_interface.iter().enumerate() {
+                of(interface).extend_from_slice(recent(of_body.len() + kind, k));
+            }
+        }
+        self.outputs = 0;
+    }
+}
+
+impl Engine<'_> {
+    /// Records the state, with `v` in step with `x`.
+    ///
+    /// # Errors
+    /// [`SimulationError::Diverged`] names the first body whose speed is not finite.
+    #[inline(always)]
+    pub(super) fn output<const N: usize>(
+        &mut self,
+        recorder: &mut Recorder,
+        run: &mut Run,
+        time_s: f64,
+    ) -> Result<(), SimulationError> {
+        let n = self.places.known::<N>();
+        let (mut twice_kinetic, mut momentum) = ([0.0; LANES], [0.0; LANES]);
+        let (m, v) = (self.mass_kg.values(n), self.v.values(n));
+        for c in 0..n {
+            let of_row = each(|j| m[c][j] * v[c][j]);
+            momentum = each(|j| momentum[j] + of_row[j]);
+            twice_kinetic = each(|j| twice_kinetic[j] + of_row[j] * v[c][j]);
+        }
+        let kinetic_j = 0.5 * twice_kinetic.iter().sum::<f64>();
+        if !kinetic_j.is_finite()
+            && let Some((_, body)) = (self.chain.bodies().iter().enumerate())
+                .find(|&(i, _)| !self.v[self.places.of(i)].is_finite())
+        {
+            return Err(SimulationError::Diverged { body: body.name.clone(), time_s });
+        }
+        let interfaces_j = self.sum_work::<N>(recorder);
+        recorder.account.audit(&Balance {
+            kinetic_j,
+            interfaces_j,
+            damped_j: self.rates.damped_j,
+            resisted_j: self.rates.resisted_j,
+            momentum: momentum.iter().sum(),
+            impulse: self.wall_impulse + self.rates.impulse,
+        });
+        self.watch.output_bodies::<N>(&self.v, &self.a, time_s);
+        let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
+        recorder.recent.keep(0, n, |c| v[c]);
+        if recorder.record == Record::Histories {
+            run.time_s.push(time_s);
+            recorder.recent.keep(1, n, |c| x[c]);
+            recorder.recent.keep(2, n, |c| a[c]);
+            self.record_interfaces::<N>(recorder);
+        }
+        recorder.recent.outputs += 1;
+        if recorder.recent.outputs == OUTPUTS {
+            recorder.recent.flush(recorder.record, run, &self.places);
+        }
+        Ok(())
+    }
+
+    /// Work done at all interfaces so far, in J.
+    #[inline(always)]
+    fn sum_work<const N: usize>(&self, recorder: &mut Recorder) -> f64 {
+        let n = self.places.known::<N>();
+        self.push.works_j::<N>(&mut recorder.work_j);
+        let Some(pull) = &self.pull else { return recorder.work_j.sum(n) };
+        pull.works_j::<0>(&mut recorder.pulled[0]);
+        recorder.work_j.sum(n) + recorder.pulled[0].sum(n)
+    }
+
+    /// After [`Self::sum_work`]: what of it is stored and dissipated, of all interfaces.
+    #[inline(always)]
+    fn split_work<const N: usize>(&self, recorder: &mut Recorder) {
+        let Recorder { work_j, largest_m, dissipated_j, pulled, .. } = recorder;
+        self.push.largest_and_dissipated::<N>(work_j, largest_m, dissipated_j);
+        if let Some(pull) = &self.pull {
+            let n = self.places.rows();
+            let [pulled_j, largest_m, lost_j] = pulled;
+            pull.largest_and_dissipated::<0>(pulled_j, largest_m, lost_j);
+            for (ours, pulls) in [(work_j, pulled_j), (dissipated_j, lost_j)] {
+                for (ours, pulls) in ours.values_mut(n).iter_mut().zip(pulls.values(n)) {
+                    *ours = each(|j| ours[j] + pulls[j]);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn record_interfaces<const N: usize>(&self, recorder: &mut Recorder) {
+        let n = self.places.known::<N>();
+        self.split_work::<N>(recorder);
+        let Recorder { recent, work_j, largest_m, dissipated_j, .. } = recorder;
+        let (d, f) = (self.push.deflections_m(At::End).values(n), self.forces_n(At::End).values(n));
+        let (work_j, lost_j) = (work_j.values(n), dissipated_j.values(n));
+        let largest_m = largest_m.values(n);
+        // A branch ends at zero but for rounding.
+        let least = [if self.net_n.is_none() { 0.0 } else { f64::NEG_INFINITY }; LANES];
+        let stored = |c: usize| each(|j| work_j[c][j] - lost_j[c][j]);
+        recent.keep(3, n, |c| d[c]);
+        recent.keep(4, n, |c| larger(f[c], least));
+        recent.keep(5, n, |c| largest_m[c]);
+        recent.keep(6, n, |c| larger(stored(c), [0.0; LANES]));
+        recent.keep(7, n, |c| lost_j[c]);
+    }
+
+    /// Fills in what is known at the end of the run.
+    pub(super) fn close(
+        mut self,
+        mut recorder: Recorder,
+        run: &mut Run,
+        end_s: f64,
+        interval_s: f64,
+    ) {
+        recorder.recent.flush(recorder.record, run, &self.places);
+        self.sum_work::<0>(&mut recorder);
+        self.split_work::<0>(&mut recorder);
+        let n = self.places.rows();
+        let dissipated_j = recorder.dissipated_j.sum(n);
+        run.ledger = recorder.account.close(recorder.work_j.sum(n) - dissipated_j, dissipated_j);
+        for k in 0..self.chain.interfaces().len() {
+            let deflection_m = self.push.deflection_m(At::End, k);
+            self.watch.output_interface(k, deflection_m, self.push.peak_n(k), end_s);
+            if let Some(pull) = &self.pull {
+                self.watch.tension(k, pull.peak_n(k), pull.largest_m(At::End, k).max(0.0));
+            }
+        }
+        self.watch.close(run, recorder.record, interval_s);
+    }
+}

@@ -1,0 +1,164 @@
+//! Rows: values of a chain's bodies or interfaces, laid out for vectors.
+//!
+//! Lane `j` holds the `j`-th stretch of the chain. The neighbour of each value then stands in
+//! the next row and the same lane, and a pass over the chain loads no vector that overlaps two
+//! others; only the ends of the stretches have their neighbours in another lane.
+
+use std::ops::{Index, IndexMut};
+
+/// Values are worked on in groups of as many, so that the compiler works on whole vectors.
+pub(super) const LANES: usize = 4;
+
+pub(super) type Row = [f64; LANES];
+
+#[inline(always)]
+pub(super) fn each(value: impl Fn(usize) -> f64) -> Row {
+    std::array::from_fn(value)
+}
+
+#[inline(always)]
+pub(super) fn larger(a: Row, b: Row) -> Row {
+    each(|j| if a[j] > b[j] { a[j] } else { b[j] })
+}
+
+#[inline(always)]
+pub(super) fn smaller(a: Row, b: Row) -> Row {
+    each(|j| if a[j] < b[j] { a[j] } else { b[j] })
+}
+
+/// Where a body, or the interface in front of it, stands: counted along the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place(usize);
+
+impl Place {
+    pub fn new(row: usize, lane: usize) -> Self {
+        Self(row * LANES + lane)
+    }
+
+    #[inline(always)]
+    pub fn row(self) -> usize {
+        self.0 / LANES
+    }
+
+    #[inline(always)]
+    pub fn lane(self) -> usize {
+        self.0 % LANES
+    }
+}
+
+/// The places of a chain.
+#[derive(Clone, Debug)]
+pub(super) struct Places(Vec<Place>);
+
+impl Places {
+    /// Of as many bodies, and of a last one that never moves.
+    pub fn new(bodies: usize) -> Self {
+        let rows = bodies.div_ceil(LANES);
+        // Without a body that is only a pad, the last one stands behind the end.
+        let place = |i: usize| match i < rows * LANES {
+            true => Place::new(i % rows, i / rows),
+            false => Place::new(rows, 0),
+        };
+        Self((0..=bodies).map(place).collect())
+    }
+
+    #[inline(always)]
+    pub fn of(&self, i: usize) -> Place {
+        self.0[i]
+    }
+
+    /// Rows that hold the bodies: `N`, or as many as there are if that is 0. With `N` the
+    /// compiler unrolls the passes.
+    #[inline(always)]
+    pub fn known<const N: usize>(&self) -> usize {
+        if N > 0 { N } else { self.rows() }
+    }
+
+    /// Rows that hold the bodies.
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        (self.0.len() - 1).div_ceil(LANES)
+    }
+
+    /// What stands at a place.
+    #[inline(always)]
+    pub fn index(&self, place: Place) -> usize {
+        place.lane() * self.rows() + place.row()
+    }
+}
+
+/// One value per body, 0 for pads and in a last row.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows(Vec<Row>);
+
+impl Rows {
+    pub fn zeros(places: &Places) -> Self {
+        Self(vec![[0.0; LANES]; places.rows() + 1])
+    }
+
+    /// A value for each of the first `count` bodies.
+    pub fn of(places: &Places, count: usize, value: impl Fn(usize) -> f64) -> Self {
+        let mut rows = Self::zeros(places);
+        for i in 0..count {
+            rows[places.of(i)] = value(i);
+        }
+        rows
+    }
+
+    #[inline(always)]
+    pub fn values(&self, n: usize) -> &[Row] {
+        &self.0[..n]
+    }
+
+    #[inline(always)]
+    pub fn values_mut(&mut self, n: usize) -> &mut [Row] {
+        &mut self.0[..n]
+    }
+
+    /// Sum of the first `n` rows.
+    #[inline(always)]
+    pub fn sum(&self, n: usize) -> f64 {
+        let mut lanes = [0.0; LANES];
+        for row in self.values(n) {
+            lanes = each(|j| lanes[j] + row[j]);
+        }
+        lanes.iter().sum()
+    }
+}
+
+/// Of the neighbours in front of row `c`; the last body never moves.
+#[inline(always)]
+pub(super) fn ahead(rows: &[Row], c: usize) -> Row {
+    match c + 1 < rows.len() {
+        true => rows[c + 1],
+        false => [rows[0][1], rows[0][2], rows[0][3], 0.0],
+    }
+}
+
+/// Of the neighbours behind row `c`; there is nothing behind the first body.
+#[inline(always)]
+pub(super) fn behind(rows: &[Row], c: usize) -> Row {
+    match c > 0 {
+        true => rows[c - 1],
+        false => {
+            let last = &rows[rows.len() - 1];
+            [0.0, last[0], last[1], last[2]]
+        }
+    }
+}
+
+impl Index<Place> for Rows {
+    type Output = f64;
+
+    #[inline(always)]
+    fn index(&self, place: Place) -> &f64 {
+        &self.0.as_flattened()[place.0]
+    }
+}
+
+impl IndexMut<Place> for Rows {
+    #[inline(always)]
+    fn index_mut(&mut self, place: Place) -> &mut f64 {
+        &mut self.0.as_flattened_mut()[place.0]
+    }
+}
