@@ -80,7 +80,7 @@ impl<'a> Engine<'a> {
             self.check_end(crossed)?;
             let Crossed { pulls, k, inside, ref kink, .. } = *crossed;
             let path = self.path(crossed, h);
-            let Some(left_s) = path.since(kink) else { continue };
+            let Some(left_s) = path.since(kink, h) else { continue };
             let (impulse, moment) = path.missed(kink, left_s, inside, h, method);
             let sign = if pulls { -1.0 } else { 1.0 };
             self.push_apart(k, sign * impulse, sign * moment);
@@ -127,7 +127,7 @@ impl<'a> Engine<'a> {
     /// A contact has begun or ended.
     fn see(&mut self, crossed: &Crossed, event: Event, h: f64, method: Method) {
         let k = crossed.k;
-        let left_s = self.path(crossed, h).since(&crossed.kink).unwrap_or(0.0).clamp(0.0, h);
+        let left_s = self.path(crossed, h).since(&crossed.kink, h).unwrap_or(0.0).clamp(0.0, h);
         self.damp_part_of_step(k, event, left_s, h);
         if crossed.pulls {
             return;
@@ -191,13 +191,14 @@ struct Path {
 }
 
 impl Path {
-    /// Time from the kink to the step's end; `None` if the path does not reach it.
+    /// Time from the kink to the end of the step of `h` seconds; `None` if the path does not reach
+    /// it. A turn may lie before the step's start, where the law had not yet noticed it.
     #[inline(always)]
-    fn since(&self, kink: &Kink) -> Option<f64> {
+    fn since(&self, kink: &Kink, h: f64) -> Option<f64> {
         let Self { end_m, end_speed, rate } = *self;
         let beyond = end_m - kink.at_m;
         if kink.way == Way::Turn {
-            return (rate < 0.0).then(|| (end_speed / rate).max(0.0));
+            return (rate < 0.0).then(|| (end_speed / rate).clamp(0.0, 2.0 * h));
         }
         let squared = end_speed * end_speed - 2.0 * rate * beyond;
         if squared.is_nan() || squared < 0.0 {
@@ -210,7 +211,8 @@ impl Path {
             true => 2.0 * beyond / sum,
             false => difference / rate,
         };
-        (s >= 0.0 && s.is_finite()).then_some(s)
+        // Rates that change their sign within the step may put it anywhere.
+        (s >= 0.0).then(|| s.min(h))
     }
 
     /// Impulse and moment about the step's end of the force that the kink, `s` seconds before
