@@ -33,6 +33,7 @@ struct Totals {
     known_m: Row,
     known_n: Row,
     known_j: Row,
+    known_jm: Row,
     /// −∞ while loading.
     largest_m: Row,
     dissipated_j: Row,
@@ -47,24 +48,12 @@ pub(super) enum Stage {
     Below,
 }
 
-/// A piece of a law.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Spot {
-    /// No force.
-    Open,
-    /// On the unloading branch, counted from its top.
-    Branch(usize),
-    /// On the envelope, counted from 0.
-    Envelope(usize),
-}
-
 /// What changes seldom.
 #[derive(Clone, Debug)]
 struct Contact<'a> {
     law: Option<&'a ForceLaw>,
     stage: Stage,
-    spot: Spot,
-    /// Piece of the envelope that holds the largest deflection.
+    /// Piece of the envelope near the largest deflection; while loading, the current one.
     index: usize,
     /// From the largest deflection, once the deflection has fallen.
     branch: Branch,
@@ -72,67 +61,39 @@ struct Contact<'a> {
 }
 
 impl Contact<'_> {
+    /// The piece of the envelope that holds a new largest deflection.
     #[inline(always)]
-    fn piece(&self, law: &ForceLaw) -> Piece {
-        match (self.spot, self.stage) {
-            (Spot::Envelope(i), Stage::Loading) => law.envelope_piece(i),
-            (Spot::Envelope(i), Stage::Below) => {
-                let piece = law.envelope_piece(i);
-                Piece { to_m: piece.to_m.min(self.branch.largest_m), ..piece }
-            }
-            (Spot::Branch(j), _) => law.branch_piece(&self.branch, j),
-            (Spot::Open, _) => law.below_branch(&self.branch),
+    fn load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
+        let before = self.index;
+        self.index = law.piece_index(before, deflection_m);
+        let passed_n = law.peak_between_n(before, self.index);
+        if passed_n > self.peak_n {
+            self.peak_n = passed_n;
         }
-    }
-
-    /// To the next piece of more deflection.
-    #[inline(always)]
-    fn up(&mut self, law: &ForceLaw) {
-        let pieces = law.branch_pieces(&self.branch);
-        match (self.spot, self.stage) {
-            (Spot::Envelope(i), Stage::Loading) => self.load(law, i + 1),
-            // Without memory the envelope is also the way back.
-            (Spot::Envelope(i), Stage::Below) if i < self.index => {
-                self.spot = Spot::Envelope(i + 1);
-            }
-            (Spot::Open, _) if !law.has_memory() && self.branch.largest_m > 0.0 => {
-                self.spot = Spot::Envelope(0);
-            }
-            (Spot::Open, _) if pieces > 0 => self.spot = Spot::Branch(pieces - 1),
-            (Spot::Branch(j), _) if j > 0 => self.spot = Spot::Branch(j - 1),
-            _ => self.load(law, self.index),
-        }
-    }
-
-    #[inline(always)]
-    fn load(&mut self, law: &ForceLaw, index: usize) {
-        (self.stage, self.spot, self.index) = (Stage::Loading, Spot::Envelope(index), index);
-        let force_n = law.envelope_piece(index).known.force_n;
-        if force_n > self.peak_n {
-            self.peak_n = force_n;
-        }
-    }
-
-    /// To the next piece of less deflection, once it has fallen below its largest.
-    fn down(&mut self, law: &ForceLaw) {
-        self.spot = match self.spot {
-            Spot::Branch(j) if j + 1 < law.branch_pieces(&self.branch) => Spot::Branch(j + 1),
-            Spot::Envelope(i) if i > 0 => Spot::Envelope(i - 1),
-            Spot::Envelope(_) | Spot::Branch(_) | Spot::Open => Spot::Open,
-        };
+        self.stage = Stage::Loading;
+        Piece { from_m: deflection_m, ..law.envelope_piece(self.index) }
     }
 
     /// From here on the deflection is below its largest.
     fn turn(&mut self, law: &ForceLaw, largest_m: f64) {
-        self.index = law.piece_index(self.index, largest_m);
+        let before = self.index;
+        self.index = law.piece_index(before, largest_m);
         self.branch = law.branch(self.index, largest_m);
-        self.peak_n = self.peak_n.max(self.branch.top_n);
+        let passed_n = law.peak_between_n(before.min(self.index), self.index);
+        self.peak_n = self.peak_n.max(self.branch.top_n).max(passed_n);
         self.stage = Stage::Below;
-        self.spot = match law.has_memory() {
-            true if law.branch_pieces(&self.branch) > 0 => Spot::Branch(0),
-            true => Spot::Open,
-            false => Spot::Envelope(self.index),
-        };
+    }
+
+    /// The piece that holds a deflection below its largest.
+    fn unload(&self, law: &ForceLaw, deflection_m: f64) -> Piece {
+        match law.has_memory() {
+            true => law.branch_piece(&self.branch, deflection_m),
+            false if deflection_m <= 0.0 => Piece::open_to(0.0, 0.0, 0.0),
+            false => {
+                let piece = law.envelope_piece(law.piece_index(self.index, deflection_m));
+                Piece { to_m: piece.to_m.min(self.branch.largest_m), ..piece }
+            }
+        }
     }
 }
 
@@ -151,35 +112,15 @@ pub(super) struct Bank<'a> {
     outside_m: Rows,
 }
 
-/// Where an interface went from one piece to another: beyond, the force differs by
-/// `jump_n + stiffer_n_per_m (δ − at_m)` from what the former piece would have given.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Kink {
-    pub at_m: f64,
-    pub stiffer_n_per_m: f64,
-    pub jump_n: f64,
-    pub way: Way,
-    pub event: Option<Event>,
-}
-
-/// The deflection's motion at a kink.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
-    Up,
-    Down,
-    /// At the largest deflection.
-    Turn,
-}
-
-/// What a kink is beside a change of stiffness.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Event {
-    /// The first contact, from no force.
-    Contact,
-    /// From no force to some.
-    Closed,
+/// What leaving a piece led to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Move {
+    /// From no force or an unloading branch to a new largest deflection.
+    pub loads: bool,
+    /// From no force to some, at this deflection.
+    pub closed_m: Option<f64>,
     /// The force has fallen to zero.
-    Opened,
+    pub opened: bool,
 }
 
 impl<'a> Bank<'a> {
@@ -197,13 +138,13 @@ impl<'a> Bank<'a> {
             known_m: [0.0; LANES],
             known_n: [0.0; LANES],
             known_j: [0.0; LANES],
+            known_jm: [0.0; LANES],
             largest_m: [0.0; LANES],
             dissipated_j: [0.0; LANES],
         };
         let contact = |&(law, _): &(Option<&'a ForceLaw>, f64)| Contact {
             law,
             stage: Stage::Below,
-            spot: Spot::Open,
             index: 0,
             branch: Branch::default(),
             peak_n: 0.0,
@@ -223,7 +164,7 @@ impl<'a> Bank<'a> {
             let place = places.of(k);
             bank.lanes[place.row()].gap_m[place.lane()] = gap_m;
             if law.is_some() {
-                bank.set(k, place, Piece::open_to(0.0, 0.0));
+                bank.set(k, place, Piece::open_to(0.0, 0.0, 0.0));
             }
         }
         bank
@@ -242,6 +183,7 @@ impl<'a> Bank<'a> {
         totals.known_m[lane] = piece.known.deflection_m;
         totals.known_n[lane] = piece.known.force_n;
         totals.known_j[lane] = piece.known.work_j;
+        totals.known_jm[lane] = piece.known.sum_jm;
         match contact.stage {
             Stage::Loading => {
                 lanes.follow[lane] = f64::INFINITY;
@@ -273,6 +215,10 @@ impl<'a> Bank<'a> {
         &self.force_n[at as usize]
     }
 
+    pub fn slope_n_per_m(&self, place: Place) -> f64 {
+        self.lanes[place.row()].slope_n_per_m[place.lane()]
+    }
+
     pub fn has_law(&self, k: usize) -> bool {
         self.contacts[k].law.is_some()
     }
@@ -291,7 +237,7 @@ impl<'a> Bank<'a> {
             && closes
             && let Some(law) = self.contacts[k].law
         {
-            self.contacts[k].load(law, 0);
+            self.contacts[k].stage = Stage::Loading;
             self.set(k, place, Piece { from_m: 0.0, ..law.envelope_piece(0) });
             self.force_n[At::End as usize][place] = law.envelope_n(0.0);
         }
@@ -386,68 +332,55 @@ impl<'a> Bank<'a> {
             && self.deflections_m(at)[place] < self.lanes[place.row()].from_m[place.lane()]
     }
 
-    /// Follows the law to the piece that holds the deflection of `k`, over `kink` after kink. If
-    /// it [turns](Self::turns), it was largest at `top_m`.
+    /// Finds the piece for the deflection of `k`. If it [turns](Self::turns), it was largest at
+    /// `top_m`.
     #[inline(always)]
-    pub fn settle(
-        &mut self,
-        at: At,
-        k: usize,
-        place: Place,
-        top_m: Option<f64>,
-        mut kink: impl FnMut(Kink),
-    ) {
+    pub fn settle(&mut self, at: At, k: usize, place: Place, top_m: Option<f64>) -> Move {
         let contact = &mut self.contacts[k];
-        let Some(law) = contact.law else { return };
+        let Some(law) = contact.law else { return Move::default() };
         let deflection = self.deflection_m[at as usize][place];
-        let start = self.deflection_m[At::Start as usize][place];
-        let mut before = contact.piece(law);
-        let mut go = |contact: &Contact<'_>, before: &mut Piece, at_m: f64, way, event| {
-            let piece = contact.piece(law);
-            let stiffer_n_per_m = piece.slope_n_per_m - before.slope_n_per_m;
-            let jump_n = piece.at_zero_n - before.at_zero_n + stiffer_n_per_m * at_m;
-            kink(Kink { at_m, stiffer_n_per_m, jump_n, way, event });
-            *before = piece;
-        };
-        if let Some(top_m) = top_m {
-            let top_m = top_m.max(start);
-            while top_m > before.to_m {
-                let at_m = before.to_m;
-                contact.up(law);
-                go(contact, &mut before, at_m, Way::Up, None);
+        let mut what = Move::default();
+        let piece = match (contact.stage, top_m) {
+            // The next piece of the envelope, as a rule.
+            (Stage::Loading, None) => contact.load(law, deflection),
+            _ => {
+                if let Some(top_m) = top_m {
+                    contact.turn(law, top_m.max(self.deflection_m[At::Start as usize][place]));
+                }
+                let piece = if deflection > 0.0 && deflection >= contact.branch.largest_m {
+                    what.loads = true;
+                    contact.load(law, deflection)
+                } else {
+                    contact.unload(law, deflection)
+                };
+                let (lanes, lane) = (&self.lanes[place.row()], place.lane());
+                let was_open = lanes.from_m[lane] == f64::NEG_INFINITY;
+                let had_force = lanes.slope_n_per_m[lane] != 0.0 || lanes.at_zero_n[lane] != 0.0;
+                let is_open = piece.from_m == f64::NEG_INFINITY;
+                what.opened = is_open && had_force;
+                what.closed_m = (was_open && !is_open).then_some(lanes.to_m[lane]);
+                piece
             }
-            contact.turn(law, top_m);
-            before = law.envelope_piece(contact.index);
-            let had_force = before.slope_n_per_m != 0.0 || before.at_zero_n != 0.0;
-            let opens = contact.spot == Spot::Open && had_force;
-            go(contact, &mut before, top_m, Way::Turn, opens.then_some(Event::Opened));
-        }
-        while deflection > before.to_m {
-            let at_m = before.to_m;
-            let never = contact.branch.largest_m <= 0.0;
-            let event = match contact.spot {
-                Spot::Open if never => Some(Event::Contact),
-                Spot::Open => Some(Event::Closed),
-                Spot::Branch(_) | Spot::Envelope(_) => None,
-            };
-            contact.up(law);
-            go(contact, &mut before, at_m, Way::Up, event);
-        }
-        while deflection < before.from_m && contact.stage == Stage::Below {
-            let at_m = before.from_m;
-            contact.down(law);
-            let event = (contact.spot == Spot::Open).then_some(Event::Opened);
-            go(contact, &mut before, at_m, Way::Down, event);
-        }
-        if contact.stage == Stage::Loading {
-            before.from_m = deflection;
-        }
-        let force = before.at_zero_n + before.slope_n_per_m * deflection;
+        };
+        let force = piece.at_zero_n + piece.slope_n_per_m * deflection;
         if at == At::End && force > contact.peak_n {
             contact.peak_n = force;
         }
-        self.set(k, place, before);
+        self.set(k, place, piece);
         self.force_n[at as usize][place] = force;
+        what
+    }
+
+    /// Work done at an interface so far in J (what is stored and dissipated, from the law's
+    /// tables), and its integral over the deflection in J m.
+    #[inline(always)]
+    pub fn work(&self, at: At, place: Place) -> (f64, f64) {
+        let (totals, lane) = (&self.totals[place.row()], place.lane());
+        let along = self.deflections_m(at)[place] - totals.known_m[lane];
+        let (known, force) = (totals.known_n[lane], self.forces_n(at)[place]);
+        let work_j = totals.known_j[lane] + 0.5 * (known + force) * along;
+        let mean_j = totals.known_j[lane] + (2.0 * known + force) * (1.0 / 6.0) * along;
+        (work_j, totals.known_jm[lane] + mean_j * along)
     }
 
     /// The work of all interfaces, into `out_j`.
@@ -501,6 +434,12 @@ impl<'a> Bank<'a> {
     /// Whether the deflection of `k` has not yet fallen since it was last at its largest.
     pub fn is_loading(&self, k: usize) -> bool {
         self.contacts[k].stage == Stage::Loading
+    }
+
+    /// Deflection below which `k` is open.
+    pub fn opens_at_m(&self, k: usize) -> f64 {
+        let place = self.places.of(k);
+        self.lanes[place.row()].to_m[place.lane()]
     }
 
     pub fn is_open(&self, k: usize) -> bool {

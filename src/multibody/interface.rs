@@ -34,6 +34,8 @@ pub struct UnloadingShape {
     force: Vec<f64>,
     /// `∫` from each point to the end; the first is the share of `F δ` that is given back.
     rest: Vec<f64>,
+    /// `∫` of `rest` from the first point to each.
+    rest_so_far: Vec<f64>,
 }
 
 impl UnloadingShape {
@@ -48,7 +50,14 @@ impl UnloadingShape {
         for j in (0..n - 1).rev() {
             rest[j] = rest[j + 1] + 0.5 * (force[j] + force[j + 1]) * (length[j + 1] - length[j]);
         }
-        Self { length, force, rest }
+        let mut rest_so_far = vec![0.0; n];
+        for j in 0..n - 1 {
+            let step = length[j + 1] - length[j];
+            rest_so_far[j + 1] = rest_so_far[j]
+                + rest[j + 1] * step
+                + (force[j] / 6.0 + force[j + 1] / 3.0) * step * step;
+        }
+        Self { length, force, rest, rest_so_far }
     }
 
     /// From a branch that was recorded: deflections in m, falling, and forces in N. Points at
@@ -123,6 +132,8 @@ pub struct ForceLaw {
     slope_n_per_m: Vec<f64>,
     /// Steepest rise of the envelope, or the unloading stiffness if that is more.
     steepest_n_per_m: f64,
+    /// Integral of the work over the deflection at each point of the envelope.
+    sum_jm: Vec<f64>,
     /// `D` at each point of the envelope, in J; empty without memory.
     dissipated_j: Vec<f64>,
     /// Whether the mean force so far, not the force itself, tells what is stored.
@@ -138,6 +149,8 @@ pub(super) struct Branch {
     pub dissipated_j: f64,
     /// Deflection given back until the force is zero.
     pub length_m: f64,
+    /// Integral of the work over the deflection up to the top.
+    pub sum_jm: f64,
 }
 
 /// A straight piece of the law: `F = at_zero_n + slope δ` between two deflections.
@@ -156,12 +169,14 @@ pub(super) struct Known {
     pub deflection_m: f64,
     pub force_n: f64,
     pub work_j: f64,
+    /// Integral of the work over the deflection, from 0 along the envelope.
+    pub sum_jm: f64,
 }
 
 impl Piece {
-    /// No force up to a deflection, after this work.
-    pub fn open_to(to_m: f64, work_j: f64) -> Self {
-        let known = Known { deflection_m: to_m, force_n: 0.0, work_j };
+    /// No force up to a deflection, after this work with this integral.
+    pub fn open_to(to_m: f64, work_j: f64, sum_jm: f64) -> Self {
+        let known = Known { deflection_m: to_m, force_n: 0.0, work_j, sum_jm };
         Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0, known }
     }
 }
@@ -224,6 +239,12 @@ impl ForceLaw {
             EnvelopeEnd::Slope => slope_n_per_m[n - 2].max(0.0),
             EnvelopeEnd::Hold | EnvelopeEnd::Error => 0.0,
         });
+        let mut sum_jm = vec![0.0; n];
+        for i in 1..n {
+            let step = d[i] - d[i - 1];
+            let along = envelope.work_j()[i - 1] + (f[i - 1] / 3.0 + f[i] / 6.0) * step;
+            sum_jm[i] = sum_jm[i - 1] + along * step;
+        }
         let steepest_n_per_m = match unloading {
             Unloading::Elastic => envelope.max_slope(),
             Unloading::Memory { stiffness_n_per_m } => envelope.max_slope().max(stiffness_n_per_m),
@@ -235,6 +256,7 @@ impl ForceLaw {
             end,
             slope_n_per_m,
             steepest_n_per_m,
+            sum_jm,
             dissipated_j: Vec::new(),
             by_mean,
         };
@@ -324,8 +346,19 @@ impl ForceLaw {
             to_m: d.get(i + 1).copied().unwrap_or(f64::INFINITY),
             at_zero_n: f[i] - slope_n_per_m * d[i],
             slope_n_per_m,
-            known: Known { deflection_m: d[i], force_n: f[i], work_j: self.envelope.work_j()[i] },
+            known: Known {
+                deflection_m: d[i],
+                force_n: f[i],
+                work_j: self.envelope.work_j()[i],
+                sum_jm: self.sum_jm[i],
+            },
         }
+    }
+
+    /// Largest force of the envelope's points `from..=to`.
+    #[inline(always)]
+    pub(super) fn peak_between_n(&self, from: usize, to: usize) -> f64 {
+        self.envelope.force_n()[from..=to].iter().copied().fold(0.0, f64::max)
     }
 
     /// Force and work on the envelope at δ ≥ 0 in piece `i`, in N and J.
@@ -344,7 +377,19 @@ impl ForceLaw {
             true => stored_j / (top_n * self.shape.share()),
             false => 0.0, // the envelope itself has no force here
         };
-        Branch { largest_m, top_n, stored_j, dissipated_j: work - stored_j, length_m }
+        let (i_m, i_n) = (self.envelope.deflection_m()[i], self.envelope.force_n()[i]);
+        let along = largest_m - i_m;
+        let sum_jm = self.sum_jm[i]
+            + (self.envelope.work_j()[i] + (i_n / 3.0 + top_n / 6.0) * along) * along;
+        Branch { largest_m, top_n, stored_j, dissipated_j: work - stored_j, length_m, sum_jm }
+    }
+
+    /// Integral of the work over the deflection up to point `j` of a branch.
+    fn sum_on_jm(&self, branch: &Branch, j: usize) -> f64 {
+        let Branch { stored_j, dissipated_j, length_m, sum_jm, .. } = *branch;
+        let shape = &self.shape;
+        let stored = stored_j * shape.rest_so_far[j] / shape.share();
+        sum_jm - length_m * (stored + dissipated_j * shape.length[j])
     }
 
     /// Energy that would come back from δ in piece `i` of the envelope, with force and work there.
@@ -362,17 +407,15 @@ impl ForceLaw {
         }
     }
 
-    /// Straight pieces of an unloading branch, from its top down; none if it has no length.
-    pub(super) fn branch_pieces(&self, branch: &Branch) -> usize {
-        match self.has_memory() && branch.length_m > 0.0 {
-            true => self.shape.length.len() - 1,
-            false => 0,
+    /// The piece of an unloading branch that holds δ below its top.
+    pub(super) fn branch_piece(&self, branch: &Branch, deflection_m: f64) -> Piece {
+        let zero_m = branch.largest_m - branch.length_m;
+        if deflection_m <= zero_m || branch.length_m <= 0.0 {
+            let sum_jm = self.sum_on_jm(branch, self.shape.length.len() - 1);
+            return Piece::open_to(zero_m.max(0.0), branch.dissipated_j, sum_jm);
         }
-    }
-
-    /// Piece `j` of an unloading branch.
-    pub(super) fn branch_piece(&self, branch: &Branch, j: usize) -> Piece {
         let shape = &self.shape;
+        let j = shape.piece((branch.largest_m - deflection_m) / branch.length_m);
         let at = |j: usize| branch.largest_m - shape.length[j] * branch.length_m;
         let slope_n_per_m = -shape.slope(j) * branch.top_n / branch.length_m;
         Piece {
@@ -384,17 +427,8 @@ impl ForceLaw {
                 deflection_m: at(j + 1),
                 force_n: branch.top_n * shape.force[j + 1],
                 work_j: branch.dissipated_j + branch.stored_j * shape.rest[j + 1] / shape.share(),
+                sum_jm: self.sum_on_jm(branch, j + 1),
             },
-        }
-    }
-
-    /// What follows below an unloading branch: no force.
-    pub(super) fn below_branch(&self, branch: &Branch) -> Piece {
-        match self.has_memory() {
-            true => {
-                Piece::open_to((branch.largest_m - branch.length_m).max(0.0), branch.dissipated_j)
-            }
-            false => Piece::open_to(0.0, 0.0),
         }
     }
 
@@ -447,11 +481,7 @@ impl ForceLaw {
             return self.envelope_n(deflection_m);
         }
         let branch = self.branch(self.piece_index(0, largest_m), largest_m);
-        let length = (branch.largest_m - deflection_m) / branch.length_m;
-        if branch.length_m <= 0.0 || length >= 1.0 {
-            return 0.0;
-        }
-        let piece = self.branch_piece(&branch, self.shape.piece(length));
+        let piece = self.branch_piece(&branch, deflection_m);
         (piece.at_zero_n + piece.slope_n_per_m * deflection_m).max(0.0)
     }
 

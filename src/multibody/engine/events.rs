@@ -1,18 +1,29 @@
 //! Events: what happens where an interface leaves its piece within a step.
 
-use super::super::bank::{At, Bank, Event, Kink, Way};
+use super::super::bank::{At, Bank, Move};
 use super::super::integrator::{Method, SimulationError};
 use super::super::rows::Place;
 use super::{Engine, ahead};
 
-/// A kink that an interface went over within the step.
-pub(super) struct Crossed {
+/// An interface that has left its piece within the step.
+pub(super) struct Missed {
     pulls: bool,
     k: usize,
     place: Place,
-    /// Whether the force inside the step is already that beyond it.
-    inside: bool,
-    kink: Kink,
+    /// Work done up to the start of the step in J, and its integral over the deflection.
+    work_j: f64,
+    sum_jm: f64,
+    what: Move,
+    turn: Option<Turn>,
+}
+
+/// The deflection was largest `after_s` after the step's start (or before it); there the
+/// stiffness changed by `stiffer_n_per_m`. `rate` is the second derivative of the deflection.
+#[derive(Clone, Copy)]
+struct Turn {
+    after_s: f64,
+    rate: f64,
+    stiffer_n_per_m: f64,
 }
 
 impl<'a> Engine<'a> {
@@ -41,69 +52,94 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    fn settle_one(&mut self, pulls: bool, place: Place, at: At, h: f64, share: f64) {
-        let k = self.places.index(place);
-        let inside = at == At::Inside;
-        let turns = self.bank(pulls).turns(at, k, place);
-        let top_m = if turns { Some(self.top_m(pulls, k, at, h, share)) } else { None };
-        let (crossed, bank) = match &mut self.pull {
-            Some(pull) if pulls => (&mut self.crossed, pull),
-            _ => (&mut self.crossed, &mut self.push),
-        };
-        bank.settle(at, k, place, top_m, |kink| {
-            crossed.push(Crossed { pulls, k, place, inside, kink });
-        });
+    fn bank_mut(&mut self, pulls: bool) -> &mut Bank<'a> {
+        match &mut self.pull {
+            Some(pull) if pulls => pull,
+            _ => &mut self.push,
+        }
     }
 
-    /// Where the deflection of an interface was largest: the vertex of the parabola through the
-    /// nearest state whose speed is known.
-    fn top_m(&mut self, pulls: bool, k: usize, at: At, h: f64, share: f64) -> f64 {
+    #[inline(always)]
+    fn settle_one(&mut self, pulls: bool, place: Place, at: At, h: f64, share: f64) {
+        let k = self.places.index(place);
+        let known = self.missed.iter().position(|m| m.k == k && m.pulls == pulls);
+        let known = known.unwrap_or_else(|| {
+            let (work_j, sum_jm) = self.bank(pulls).work(At::Start, place);
+            let what = Move::default();
+            self.missed.push(Missed { pulls, k, place, work_j, sum_jm, what, turn: None });
+            self.missed.len() - 1
+        });
+        let what = if self.bank(pulls).turns(at, k, place) {
+            self.turn(pulls, k, known, at, h, share)
+        } else {
+            self.bank_mut(pulls).settle(at, k, place, None)
+        };
+        let seen = &mut self.missed[known].what;
+        seen.loads |= what.loads;
+        seen.closed_m = seen.closed_m.or(what.closed_m);
+        seen.opened |= what.opened;
+    }
+
+    /// The deflection of an interface has begun to fall.
+    fn turn(&mut self, pulls: bool, k: usize, missed: usize, at: At, h: f64, share: f64) -> Move {
+        let place = self.places.of(k);
+        // Where it was largest: the vertex of the parabola through the nearest state whose speed
+        // is known.
         let sign = if pulls { -1.0 } else { 1.0 };
         let rate = sign * self.between(if share >= 0.0 { &self.a_start } else { &self.a }, k);
         let speed = sign * self.closing(k) - share * h * rate;
-        let bank = self.bank(pulls);
-        let start_m = bank.deflection_m(At::Start, k);
-        let near_m = if share >= 0.0 { start_m } else { bank.deflection_m(at, k) };
-        let top_m = if rate < 0.0 { near_m + speed * speed / (-2.0 * rate) } else { near_m };
-        let into_s = if rate < 0.0 { speed / -rate } else { 0.0 };
-        let after_s = (if share >= 0.0 { into_s } else { h + into_s }).clamp(-h, h);
-        self.watch.turned(pulls, k, top_m.max(start_m), self.end_s - h + after_s);
-        top_m
+        let bank = self.bank_mut(pulls);
+        let near = bank.deflection_m(if share >= 0.0 { At::Start } else { at }, k);
+        let top_m = if rate < 0.0 { near + speed * speed / (-2.0 * rate) } else { near };
+        let stiffness = bank.slope_n_per_m(place);
+        let what = bank.settle(at, k, place, Some(top_m));
+        let stiffer_n_per_m = bank.slope_n_per_m(place) - stiffness;
+        let largest_m = bank.largest_m(at, k);
+        let into = if rate < 0.0 { speed / -rate } else { 0.0 };
+        let after_s = (if share >= 0.0 { into } else { h + into }).clamp(-h, h);
+        self.watch.turned(pulls, k, largest_m, self.end_s - h + after_s);
+        let turn = &mut self.missed[missed].turn;
+        *turn = turn.or(Some(Turn { after_s, rate, stiffer_n_per_m }));
+        what
     }
 
     /// What the quadrature of the step has missed, and what happened in it.
     #[cold]
     #[inline(never)]
     pub(super) fn finish(&mut self, h: f64, method: Method) -> Result<(), SimulationError> {
-        let all = std::mem::take(&mut self.crossed);
-        for crossed in &all {
-            self.check_end(crossed)?;
-            let Crossed { pulls, k, inside, ref kink, .. } = *crossed;
-            let path = self.path(crossed, h);
-            let Some(left_s) = path.since(kink, h) else { continue };
-            let (impulse, moment) = path.missed(kink, left_s, inside, h, method);
-            let sign = if pulls { -1.0 } else { 1.0 };
-            self.push_apart(k, sign * impulse, sign * moment);
-        }
-        for crossed in &all {
-            if let Some(event) = crossed.kink.event {
-                self.see(crossed, event, h, method);
+        let missed = std::mem::take(&mut self.missed);
+        let mut happened = false;
+        for m in &missed {
+            self.check_end(m)?;
+            let (impulse, moment) = match m.turn {
+                Some(turn) if !(m.what.loads || m.what.opened) => turn.missed(h, method),
+                Some(_) => (0.0, 0.0),
+                None => self.missed_along(m, h, method),
+            };
+            let sign = if m.pulls { -1.0 } else { 1.0 };
+            self.push_apart(m.k, sign * impulse, sign * moment);
+            if m.what != Move::default() {
+                happened = true;
+                self.damp_part_of_step(m, h);
             }
         }
-        self.crossed = all;
-        self.crossed.clear();
+        if happened {
+            self.watch_contacts(&missed, h, method);
+        }
+        self.missed = missed;
+        self.missed.clear();
         Ok(())
     }
 
     /// Fails if a curve that must not be left has ended.
     #[inline(always)]
-    fn check_end(&self, crossed: &Crossed) -> Result<(), SimulationError> {
-        let interface = &self.chain.interfaces()[crossed.k];
+    fn check_end(&self, m: &Missed) -> Result<(), SimulationError> {
+        let interface = &self.chain.interfaces()[m.k];
         let (law, bank, what) = match (&interface.tension, &self.pull) {
-            (Some(tension), Some(pull)) if crossed.pulls => (&tension.law, pull, "pulled apart by"),
+            (Some(tension), Some(pull)) if m.pulls => (&tension.law, pull, "pulled apart by"),
             _ => (&interface.law, &self.push, "crushed"),
         };
-        let deflection_m = bank.deflections_m(At::End)[crossed.place];
+        let deflection_m = bank.deflection_m(At::End, m.k);
         if !law.is_beyond_end(deflection_m) {
             return Ok(());
         }
@@ -112,64 +148,91 @@ impl<'a> Engine<'a> {
         Err(SimulationError::CurveEnd { interface, what, deflection_m, time_s, end_m })
     }
 
-    /// The deflection over the step.
-    #[inline(always)]
-    fn path(&self, crossed: &Crossed, h: f64) -> Path {
-        let bank = self.bank(crossed.pulls);
-        let end_m = bank.deflections_m(At::End)[crossed.place];
-        let moved = end_m - bank.deflections_m(At::Start)[crossed.place];
-        let sign = if crossed.pulls { -1.0 } else { 1.0 };
-        let rates = self.between(&self.a_start, crossed.k) + self.between(&self.a, crossed.k);
-        let rate = 0.5 * sign * rates;
-        Path { end_m, end_speed: moved / h + 0.5 * rate * h, rate }
+    /// Contacts that began or ended in the step.
+    fn watch_contacts(&mut self, missed: &[Missed], h: f64, method: Method) {
+        for m in missed.iter().filter(|m| !m.pulls) {
+            let k = m.k;
+            let behind = ahead(method) * h;
+            let rate = self.between(&self.a, k);
+            let closing = self.closing(k) - behind * rate;
+            let (start, end) =
+                (self.push.deflection_m(At::Start, k), self.push.deflection_m(At::End, k));
+            let end_s = self.end_s;
+            let crossing = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
+            if m.what.loads && start <= 0.0 {
+                // What the contact has not yet braked.
+                let before = closing - h * rate * end / (end - start);
+                self.watch.contact(k, before.max(closing));
+                self.watch_sides(k, crossing(0.0), behind);
+            }
+            if m.what.opened {
+                self.watch.opened(k, -closing);
+                self.watch_sides(k, crossing(self.push.opens_at_m(k)), behind);
+            }
+        }
     }
 
-    /// A contact has begun or ended.
-    fn see(&mut self, crossed: &Crossed, event: Event, h: f64, method: Method) {
-        let k = crossed.k;
-        let left_s = self.path(crossed, h).since(&crossed.kink, h).unwrap_or(0.0).clamp(0.0, h);
-        self.damp_part_of_step(k, event, left_s, h);
-        if crossed.pulls {
-            return;
+    /// Impulse and moment about the step's end that the quadrature has missed where the
+    /// deflection went on in one direction.
+    #[inline(always)]
+    fn missed_along(&self, m: &Missed, h: f64, method: Method) -> (f64, f64) {
+        let bank = self.bank(m.pulls);
+        let place = m.place;
+        let moved = bank.deflections_m(At::End)[place] - bank.deflections_m(At::Start)[place];
+        if moved == 0.0 {
+            return (0.0, 0.0);
         }
-        let ahead_s = ahead(method) * h;
-        let rate = self.between(&self.a, k);
-        let closing = self.closing(k) - ahead_s * rate;
-        match event {
-            // What the contact has not yet braked.
-            Event::Contact => self.watch.contact(k, (closing - left_s * rate).max(closing)),
-            Event::Closed => {}
-            Event::Opened => self.watch.opened(k, -closing),
+        let (first, last) = (bank.forces_n(At::Start)[place], bank.forces_n(At::End)[place]);
+        // Means over the step of the force, and of the force times the share of the step that is
+        // still to come, as the quadrature has them.
+        let (by_rule, ahead_by_rule) = match method {
+            Method::FourthOrder => {
+                let inside = bank.forces_n(At::Inside)[place] + bank.gradient_n()[place];
+                ((first + 4.0 * inside + last) / 6.0, first / 6.0 + inside / 3.0)
+            }
+            Method::Verlet | Method::Reference => (0.5 * (first + last), 0.5 * first),
+        };
+        // The same from the law, at constant speed.
+        let (work_j, sum_jm) = bank.work(At::End, place);
+        let mean = (work_j - m.work_j) / moved;
+        let ahead = (sum_jm - m.sum_jm - m.work_j * moved) / (moved * moved);
+        // What the speed's change adds to the mean: the path leaves the straight one by
+        // `bend τ(τ − 1)`, whose product with the law's slope is integrated by parts. Not near a
+        // turn.
+        let sign = if m.pulls { -1.0 } else { 1.0 };
+        let rates = self.between(&self.a_start, m.k) + self.between(&self.a, m.k);
+        let bend = 0.25 * h * h * sign * rates;
+        if bend.abs() > 0.5 * moved.abs() {
+            return (h * (mean - by_rule), 0.0);
         }
-        for i in self.sides(k) {
-            let forces =
-                |j: usize| j < self.chain.interfaces().len() && self.force_n(At::End, j) != 0.0;
-            let touched = forces(i) || i > 0 && forces(i - 1);
-            let place = self.places.of(i);
-            let speed = self.v[place] - ahead_s * self.a[place];
-            self.watch.body(i, touched, self.end_s - left_s, speed);
-        }
+        let mean = mean + bend / moved * (2.0 * ahead - mean);
+        (h * (mean - by_rule), h * h * (ahead - ahead_by_rule))
     }
 
     /// Impulse of a damper that acted over a part of the step only, where its contact closed or
     /// a coupling opened; the quadrature has half of it.
-    fn damp_part_of_step(&mut self, k: usize, event: Event, left_s: f64, h: f64) {
-        let interface = &self.chain.interfaces()[k];
+    fn damp_part_of_step(&mut self, m: &Missed, h: f64) {
+        let interface = &self.chain.interfaces()[m.k];
         let Some(damping) = &interface.damping else { return };
-        let acts_s = match event {
-            Event::Contact | Event::Closed => left_s,
-            Event::Opened if interface.tension.is_some() => h - left_s,
-            // What only pushes has no force any more when it opens.
-            Event::Opened => return,
-        };
-        let closing = self.closing(k) - ahead(Method::Verlet) * h * self.between(&self.a, k);
-        let impulse = (acts_s - 0.5 * h) * damping.at(closing) * closing;
-        self.rates.damped_j += impulse * closing;
-        self.push_apart(k, impulse, 0.0);
+        let bank = self.bank(m.pulls);
+        let (start, end) = (bank.deflection_m(At::Start, m.k), bank.deflection_m(At::End, m.k));
+        let mut part = 0.0;
+        if let Some(closed_m) = m.what.closed_m {
+            part += ((end - closed_m) / (end - start)).clamp(0.0, 1.0) - 0.5;
+        }
+        // What only pushes has no force any more when it opens.
+        if m.what.opened && interface.tension.is_some() {
+            part += ((bank.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
+        }
+        let closing = self.closing(m.k) - ahead(Method::Verlet) * h * self.between(&self.a, m.k);
+        let impulse = part * h * damping.at(closing) * closing;
+        if impulse.is_finite() {
+            self.rates.damped_j += impulse * closing;
+            self.push_apart(m.k, impulse, 0.0);
+        }
     }
 
     /// An impulse between the bodies at interface `k`, and its moment about the step's end.
-    #[inline(always)]
     fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
         let (behind, ahead) = (self.places.of(k), self.places.of(k + 1));
         self.v[behind] -= impulse * self.per_kg[behind];
@@ -180,66 +243,33 @@ impl<'a> Engine<'a> {
             self.wall_impulse += impulse;
         }
     }
-}
 
-/// The parabola of a deflection over a step, seen from its end: `s` seconds before, the
-/// deflection is `end − end_speed s + ½ rate s²`.
-struct Path {
-    end_m: f64,
-    end_speed: f64,
-    rate: f64,
-}
-
-impl Path {
-    /// Time from the kink to the end of the step of `h` seconds; `None` if the path does not reach
-    /// it. A turn may lie before the step's start, where the law had not yet noticed it.
-    #[inline(always)]
-    fn since(&self, kink: &Kink, h: f64) -> Option<f64> {
-        let Self { end_m, end_speed, rate } = *self;
-        let beyond = end_m - kink.at_m;
-        if kink.way == Way::Turn {
-            return (rate < 0.0).then(|| (end_speed / rate).clamp(0.0, 2.0 * h));
+    /// Tells the watch whether forces act on the bodies at interface `k` from `at_s` on; `v` is
+    /// `ahead_s` ahead.
+    fn watch_sides(&mut self, k: usize, at_s: f64, ahead_s: f64) {
+        for i in self.sides(k) {
+            let forces =
+                |j: usize| j < self.chain.interfaces().len() && self.force_n(At::End, j) != 0.0;
+            let touched = forces(i) || i > 0 && forces(i - 1);
+            let place = self.places.of(i);
+            self.watch.body(i, touched, at_s, self.v[place] - ahead_s * self.a[place]);
         }
-        let squared = end_speed * end_speed - 2.0 * rate * beyond;
-        if squared.is_nan() || squared < 0.0 {
-            return None;
-        }
-        let speed = if kink.way == Way::Up { squared.sqrt() } else { -squared.sqrt() };
-        let (sum, difference) = (end_speed + speed, end_speed - speed);
-        // Of two forms of the root the one that does not cancel.
-        let s = match sum.abs() >= difference.abs() {
-            true => 2.0 * beyond / sum,
-            false => difference / rate,
-        };
-        // Rates that change their sign within the step may put it anywhere.
-        (s >= 0.0).then(|| s.min(h))
     }
+}
 
-    /// Impulse and moment about the step's end of the force that the kink, `s` seconds before
-    /// the end, has added, less what the quadrature has of them.
-    #[inline(always)]
-    fn missed(&self, kink: &Kink, s: f64, inside: bool, h: f64, method: Method) -> (f64, f64) {
-        let Self { end_m, end_speed, rate } = *self;
-        let Kink { at_m, stiffer_n_per_m, jump_n, .. } = *kink;
-        let beyond = end_m - at_m;
-        let added = |s: f64| jump_n + stiffer_n_per_m * (beyond - s * (end_speed - 0.5 * rate * s));
-        let impulse = s
-            * (jump_n
-                + stiffer_n_per_m * (beyond - s * (0.5 * end_speed - s * rate * (1.0 / 6.0))));
-        let moment = s
-            * s
-            * (0.5 * jump_n
-                + stiffer_n_per_m
-                    * (0.5 * beyond - s * (end_speed * (1.0 / 3.0) - s * 0.125 * rate)));
-        match method {
+impl Turn {
+    /// Impulse and moment about the step's end that the quadrature has missed: after the turn
+    /// the force differs by `stiffer × ½ rate (t − after)²` from what it was before.
+    fn missed(self, h: f64, method: Method) -> (f64, f64) {
+        let factor = 0.5 * self.rate * self.stiffer_n_per_m;
+        let left = h - self.after_s;
+        let inside = (0.5 * h - self.after_s).max(0.0);
+        let (impulse, moment) = match method {
             Method::FourthOrder => {
-                let inside = if inside { added(0.5 * h) } else { 0.0 };
-                (
-                    impulse - h * (1.0 / 6.0) * (4.0 * inside + added(0.0)),
-                    moment - h * h * (1.0 / 3.0) * inside,
-                )
+                (h / 6.0 * (4.0 * inside * inside + left * left), h * h / 3.0 * inside * inside)
             }
-            Method::Verlet | Method::Reference => (impulse - 0.5 * h * added(0.0), moment),
-        }
+            Method::Verlet | Method::Reference => (0.5 * h * left * left, 0.0),
+        };
+        (factor * (left.powi(3) / 3.0 - impulse), factor * (left.powi(4) / 12.0 - moment))
     }
 }

@@ -1,9 +1,9 @@
 //! Fixed steps over a chain: velocity Verlet, and a scheme of fourth order.
 //!
 //! Where an interface goes from one piece of its law to another within a step, the quadrature
-//! misses some of the impulse and of its moment. Both are added from the kink and the parabola
-//! of the deflection (`events.rs`). Without it every knot, contact, turn and opening would leave
-//! an error of the order h².
+//! misses some of the impulse and of its moment. Both follow from the law's tables (`events.rs`):
+//! along the step's path the mean force is the work done over the change of deflection. Without
+//! it every knot, contact and opening would leave an error of the order h².
 
 mod events;
 mod outputs;
@@ -17,7 +17,7 @@ use super::integrator::{Method, Record, Run, SimulationError};
 use super::rows::{Place, Places, Rows, behind, each};
 use super::train::{Chain, Tension};
 use super::watch::Watch;
-use events::Crossed;
+use events::Missed;
 use outputs::Recorder;
 
 /// Everything that changes from step to step.
@@ -36,8 +36,7 @@ pub(super) struct Engine<'a> {
     pull: Option<Bank<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     net_n: Option<Rows>,
-    /// Kinks of the step.
-    crossed: Vec<Crossed>,
+    missed: Vec<Missed>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
     left: Vec<(bool, Place)>,
     step_s: f64,
@@ -86,7 +85,7 @@ impl<'a> Engine<'a> {
             push: Bank::new(&places, &laws, 1.0),
             net_n: net.then(|| of(&|_| 0.0)),
             pull,
-            crossed: Vec::new(),
+            missed: Vec::new(),
             left: Vec::new(),
             step_s,
             end_s: 0.0,
@@ -360,7 +359,7 @@ fn outputs<'a, const N: usize>(
                 Method::FourthOrder => engine.fourth_order::<N>(h),
                 Method::Verlet | Method::Reference => engine.verlet::<N>(h),
             }
-            if !engine.crossed.is_empty() {
+            if !engine.missed.is_empty() {
                 engine.finish(h, method)?;
             }
         }
