@@ -595,3 +595,44 @@ fn a_straight_branch_of_many_points_is_the_line() {
         assert!(difference(&line, &many) < 1e-9, "{:e} m/s", difference(&line, &many));
     }
 }
+
+/// A contact counts from where its force begins, whatever announces it: a curve that begins
+/// without force, a coupling, or brakes that act already.
+#[test]
+fn mean_decelerations_begin_with_the_force() {
+    let tonnes = 24.0 * TONNES;
+    let late = || Envelope::new(vec![0.0, 0.1, 0.1 + 1e-9, 9.0], vec![0.0, 0.0, 2e6, 2e6]).unwrap();
+    let law = |curve| ForceLaw::new(curve, memory(), EnvelopeEnd::Hold);
+    let bodies = |speeds: [f64; 2]| {
+        ["A", "B"].iter().zip(speeds).map(|(name, v)| Body::new(*name, tonnes, v)).collect()
+    };
+    let (a, closing) = (2e6 / tonnes, 10.0);
+    // As long as the force acts: to the common velocity and a quarter of the unloading's period.
+    let e = 2e6 / (80e6 * 0.5 * tonnes).sqrt() / closing;
+    let ends = 0.5 * closing / a + std::f64::consts::FRAC_PI_2 * (0.5 * tonnes / 80e6).sqrt();
+    let mean = (0.5 * closing) * (1.0 + e) / ends;
+    let late_push = |bodies| {
+        Chain::new(bodies, vec![Interface::new("A|B", law(late()), 0.2)]).unwrap()
+    };
+    let mut braked: Vec<Body> = bodies([10.0, 0.0]);
+    braked[0].resistance.braking = 0.1;
+    let coupled = Interface::new("A|B", law(constant(1e6)), 1.0).with_tension(law(late()), 0.0);
+    let chains = [
+        (late_push(bodies([10.0, 0.0])), mean, 1e-4),
+        (Chain::new(bodies([0.0, 10.0]), vec![coupled]).unwrap(), -mean, 1e-2),
+        // Brakes of 0.1 g add to the 83 m/s² while A moves.
+        (late_push(braked), mean + 0.1 * STANDARD_GRAVITY_M_PER_S2, 1e-2),
+    ];
+    for (chain, exact, tolerance) in &chains {
+        for method in [Method::Verlet, Method::FourthOrder, Method::Reference] {
+            if method == Method::FourthOrder && chain.has_rates() {
+                continue;
+            }
+            let found = run(chain, &RunSettings::new(0.2, OUTPUT_S).with_method(method)).bodies[0]
+                .mean_deceleration_m_per_s2;
+            let tolerance = if method == Method::Reference { 1e-2 } else { *tolerance };
+            let error = (found / exact - 1.0).abs();
+            assert!(error < tolerance, "{method:?}: {found} against {exact}");
+        }
+    }
+}

@@ -26,6 +26,14 @@ struct Lanes {
     follow: Row,
 }
 
+impl Lanes {
+    /// Whether the piece has no force.
+    #[inline(always)]
+    fn is_idle(&self, lane: usize) -> bool {
+        self.slope_n_per_m[lane] == 0.0 && self.at_zero_n[lane] == 0.0
+    }
+}
+
 /// What only the outputs ask of a row of interfaces: a point of the current piece and the work
 /// done up to it; the largest deflection and what is dissipated once it has fallen from there.
 #[derive(Clone, Debug)]
@@ -117,8 +125,10 @@ pub(super) struct Bank<'a> {
 pub(super) struct Move {
     /// From no force or an unloading branch to a new largest deflection.
     pub loads: bool,
-    /// From no force to some, at this deflection.
+    /// From no contact to some, at this deflection.
     pub closed_m: Option<f64>,
+    /// From a stretch of the envelope without force to one with some, at this deflection.
+    pub presses_m: Option<f64>,
     /// The force has fallen to zero.
     pub opened: bool,
 }
@@ -342,7 +352,11 @@ impl<'a> Bank<'a> {
         let mut what = Move::default();
         let piece = match (contact.stage, top_m) {
             // The next piece of the envelope, as a rule.
-            (Stage::Loading, None) => contact.load(law, deflection),
+            (Stage::Loading, None) => {
+                let (lanes, lane) = (&self.lanes[place.row()], place.lane());
+                what.presses_m = lanes.is_idle(lane).then_some(lanes.to_m[lane]);
+                contact.load(law, deflection)
+            }
             _ => {
                 if let Some(top_m) = top_m {
                     contact.turn(law, top_m.max(self.deflection_m[At::Start as usize][place]));
@@ -355,7 +369,7 @@ impl<'a> Bank<'a> {
                 };
                 let (lanes, lane) = (&self.lanes[place.row()], place.lane());
                 let was_open = lanes.from_m[lane] == f64::NEG_INFINITY;
-                let had_force = lanes.slope_n_per_m[lane] != 0.0 || lanes.at_zero_n[lane] != 0.0;
+                let had_force = !lanes.is_idle(lane);
                 let is_open = piece.from_m == f64::NEG_INFINITY;
                 what.opened = is_open && had_force;
                 what.closed_m = (was_open && !is_open).then_some(lanes.to_m[lane]);
@@ -434,6 +448,12 @@ impl<'a> Bank<'a> {
     /// Whether the deflection of `k` has not yet fallen since it was last at its largest.
     pub fn is_loading(&self, k: usize) -> bool {
         self.contacts[k].stage == Stage::Loading
+    }
+
+    /// Whether the piece of `k` has any force.
+    pub fn presses(&self, k: usize) -> bool {
+        let place = self.places.of(k);
+        !self.lanes[place.row()].is_idle(place.lane())
     }
 
     /// Deflection below which `k` is open.

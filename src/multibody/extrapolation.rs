@@ -282,7 +282,7 @@ fn record(
     let histories = what == Record::Histories;
     let (mut kinetic_j, mut momentum) = (0.0, 0.0);
     let (mut stored_j, mut dissipated_j) = (0.0, 0.0);
-    let mut pushed = vec![false; chain.interfaces().len()];
+    let mut forces_n = vec![0.0; chain.interfaces().len()];
     for (k, history) in run.interfaces.iter_mut().enumerate() {
         let interface = &chain.interfaces()[k];
         let contact = motion.contact(y, k);
@@ -303,15 +303,19 @@ fn record(
             history.stored_j.push(stored);
             history.dissipated_j.push(dissipated);
         }
-        pushed[k] = contact.spring_n != 0.0;
+        forces_n[k] = force_n;
     }
+    let mut by_contacts = vec![0.0; n];
     for (i, history) in run.bodies.iter_mut().enumerate() {
         let (mass_kg, v) = (chain.bodies()[i].mass_kg, y[n + i]);
         kinetic_j += 0.5 * mass_kg * v * v;
         momentum += mass_kg * v;
-        let behind = i > 0 && pushed[i - 1];
-        let touched = behind || pushed.get(i).copied().unwrap_or(false);
-        watch.body(i, touched, time_s, y[n + i]);
+        let behind_n = if i > 0 { forces_n[i - 1] } else { 0.0 };
+        let ahead_n = forces_n.get(i).copied().unwrap_or(0.0);
+        by_contacts[i] = (behind_n - ahead_n) / mass_kg;
+        if behind_n == 0.0 && ahead_n == 0.0 {
+            watch.body(i, false, time_s, v);
+        }
         history.v_m_per_s.push(y[n + i]);
         if histories {
             history.x_m.push(y[i]);
@@ -320,7 +324,7 @@ fn record(
     }
     let places = Places::new(n);
     let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, n, value);
-    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| rates[n + i]), time_s);
+    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| by_contacts[i]), time_s);
     if histories {
         run.time_s.push(time_s);
     }

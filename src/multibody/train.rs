@@ -223,8 +223,12 @@ impl Chain {
 
     /// Whether forces depend on speeds: dampers, resistance.
     pub fn has_rates(&self) -> bool {
-        self.interfaces.iter().any(|i| i.damping.is_some())
-            || self.bodies.iter().any(|b| !b.resistance.is_none())
+        self.interfaces.iter().any(|i| i.damping.is_some()) || self.has_resistance()
+    }
+
+    /// Whether the track brakes any body.
+    pub fn has_resistance(&self) -> bool {
+        self.bodies.iter().any(|b| !b.resistance.is_none())
     }
 
     /// Shortest `sqrt(m/k)` of all interfaces in s, with the lighter of the two bodies and the

@@ -181,21 +181,22 @@ impl Watch {
         }
     }
 
-    /// Speeds and accelerations of all bodies at an output.
+    /// Speeds of all bodies at an output, and accelerations by contact forces.
     #[inline(always)]
     pub fn output_bodies<const N: usize>(&mut self, v: &Rows, a: &Rows, time_s: f64) {
         let n = self.places.known::<N>();
         let (vs, accelerations) = (v.values(n), a.values(n));
-        let (waits, sign) = (self.present.waits.values(n), self.present.sign.values(n));
+        let Present { is_free, waits, sign, .. } = &self.present;
+        let (is_free, waits, sign) = (is_free.values(n), waits.values(n), sign.values(n));
         let mut least: Row = [0.0; LANES];
         for c in 0..n {
             let a = accelerations[c];
             let turns = each(|j| sign[c][j] * a[j]);
-            let begins = each(|j| -waits[c][j] * a[j].abs());
+            let begins = each(|j| -(is_free[c][j] + waits[c][j]) * a[j].abs());
             least = smaller(least, smaller(turns, begins));
         }
         if least.iter().any(|&l| l < 0.0) {
-            self.follow_signs(a, time_s);
+            self.follow_signs(v, a, time_s);
         }
         let Present { is_free, peak, free_speed, .. } = &mut self.present;
         let (is_free, peak) = (is_free.values(n), peak.values_mut(n));
@@ -211,15 +212,24 @@ impl Watch {
     }
 
     /// Closes spans where the net force has changed its sign since the last output; learns the
-    /// signs of new ones.
+    /// signs of new ones; opens those that no contact has announced: of couplings that pull, and
+    /// where a curve begins without force.
     #[cold]
     #[inline(never)]
-    fn follow_signs(&mut self, a: &Rows, time_s: f64) {
+    fn follow_signs(&mut self, v: &Rows, a: &Rows, time_s: f64) {
         for i in 0..self.bodies.len() {
             let place = self.places.of(i);
             let a = a[place];
+            let present = &self.present;
             if self.bodies[i].open.is_none() {
-                continue;
+                if a == 0.0 {
+                    continue;
+                }
+                // As if the force had grown evenly since it began.
+                let begin_v = present.free_speed[place];
+                let since_s = 2.0 * (v[place] - begin_v) / a;
+                let begin_s = time_s - since_s.clamp(0.0, time_s - present.time_s);
+                self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
             }
             let present = &self.present;
             if present.sign[place] * a < 0.0 {

@@ -77,6 +77,7 @@ impl<'a> Engine<'a> {
         let seen = &mut self.missed[known].what;
         seen.loads |= what.loads;
         seen.closed_m = seen.closed_m.or(what.closed_m);
+        seen.presses_m = seen.presses_m.or(what.presses_m);
         seen.opened |= what.opened;
     }
 
@@ -88,15 +89,18 @@ impl<'a> Engine<'a> {
         let sign = if pulls { -1.0 } else { 1.0 };
         let rate = sign * self.between(if share >= 0.0 { &self.a_start } else { &self.a }, k);
         let speed = sign * self.closing(k) - share * h * rate;
+        let into = if rate < 0.0 { speed / -rate } else { 0.0 };
+        // In this step or the last: next to no rate would put the vertex anywhere.
+        let near_s = if share >= 0.0 { 0.0 } else { h };
+        let after_s = (near_s + into).clamp(-h, h);
+        let into_s = after_s - near_s;
         let bank = self.bank_mut(pulls);
         let near = bank.deflection_m(if share >= 0.0 { At::Start } else { at }, k);
-        let top_m = if rate < 0.0 { near + speed * speed / (-2.0 * rate) } else { near };
+        let top_m = near + (speed + 0.5 * rate * into_s) * into_s;
         let stiffness = bank.slope_n_per_m(place);
         let what = bank.settle(at, k, place, Some(top_m));
         let stiffer_n_per_m = bank.slope_n_per_m(place) - stiffness;
         let largest_m = bank.largest_m(at, k);
-        let into = if rate < 0.0 { speed / -rate } else { 0.0 };
-        let after_s = (if share >= 0.0 { into } else { h + into }).clamp(-h, h);
         self.watch.turned(pulls, k, largest_m, self.end_s - h + after_s);
         let turn = &mut self.missed[missed].turn;
         *turn = turn.or(Some(Turn { after_s, rate, stiffer_n_per_m }));
@@ -148,26 +152,34 @@ impl<'a> Engine<'a> {
         Err(SimulationError::CurveEnd { interface, what, deflection_m, time_s, end_m })
     }
 
-    /// Contacts that began or ended in the step.
+    /// Forces that began or ended in the step; restitution is that of compression.
     fn watch_contacts(&mut self, missed: &[Missed], h: f64, method: Method) {
-        for m in missed.iter().filter(|m| !m.pulls) {
+        for m in missed {
             let k = m.k;
             let behind = ahead(method) * h;
             let rate = self.between(&self.a, k);
             let closing = self.closing(k) - behind * rate;
-            let (start, end) =
-                (self.push.deflection_m(At::Start, k), self.push.deflection_m(At::End, k));
+            let bank = self.bank(m.pulls);
+            let (start, end) = (bank.deflection_m(At::Start, k), bank.deflection_m(At::End, k));
+            let opens_at_m = bank.opens_at_m(k);
             let end_s = self.end_s;
             let crossing = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
             if m.what.loads && start <= 0.0 {
-                // What the contact has not yet braked.
-                let before = closing - h * rate * end / (end - start);
-                self.watch.contact(k, before.max(closing));
+                if !m.pulls {
+                    // What the contact has not yet braked.
+                    let before = closing - h * rate * end / (end - start);
+                    self.watch.contact(k, before.max(closing));
+                }
                 self.watch_sides(k, crossing(0.0), behind);
             }
+            if let Some(at_m) = m.what.presses_m {
+                self.watch_sides(k, crossing(at_m), behind);
+            }
             if m.what.opened {
-                self.watch.opened(k, -closing);
-                self.watch_sides(k, crossing(self.push.opens_at_m(k)), behind);
+                if !m.pulls {
+                    self.watch.opened(k, -closing);
+                }
+                self.watch_sides(k, crossing(opens_at_m), behind);
             }
         }
     }

@@ -99,6 +99,9 @@ impl<'a> Engine<'a> {
         for k in 0..interfaces.len() {
             if engine.push.is_loading(k) {
                 engine.watch.contact(k, engine.closing(k));
+                if !engine.push.presses(k) {
+                    continue;
+                }
                 for i in engine.sides(k) {
                     engine.watch.body(i, true, 0.0, bodies[i].speed_m_per_s);
                 }
@@ -214,6 +217,7 @@ impl<'a> Engine<'a> {
             net[self.places.of(k)] = force;
             self.rates.damper_w += (force - spring) * closing;
             self.watch.peak_n(k, force);
+            self.watch.tension(k, -force, 0.0);
         }
         (self.rates.resistance_w, self.rates.resistance_n) = (0.0, 0.0);
         let mut behind = 0.0;
