@@ -64,8 +64,9 @@ pub enum CsvError {
     Pulling { path: PathBuf, point: usize },
 }
 
-/// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`), its
-/// second the force (`force_N`, `force_kN`, `force_MN`); further columns are ignored.
+/// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`,
+/// `deflection_m`), its second the force (`force_N`, `force_kN`, `force_MN`); further columns
+/// are ignored.
 ///
 /// # Errors
 /// [`CsvError`] with line and field.
@@ -78,14 +79,15 @@ pub fn read(path: &Path) -> Result<Envelope, CsvError> {
         .from_reader(File::open(path).map_err(io)?);
     let header = reader.headers().map_err(malformed)?.clone();
     let line = header.position().map_or(1, csv::Position::line);
-    let unit = |field: usize, prefix: &str, of: &crate::unit::Dimension, wanted, example| {
+    let unit = |field: usize, prefixes: &[&str], of: &crate::unit::Dimension, wanted, example| {
         let found = header.get(field).unwrap_or_default();
-        found.strip_prefix(prefix).and_then(|unit| of.size_of(unit)).ok_or_else(|| {
+        let size = prefixes.iter().find_map(|prefix| of.size_of(found.strip_prefix(prefix)?));
+        size.ok_or_else(|| {
             CsvError::Header { path: path.into(), line, wanted, example, found: found.into() }
         })
     };
-    let length = unit(0, "d_", &LENGTH, "deflection", "d_m or d_mm")?;
-    let force = unit(1, "force_", &FORCE, "force", "force_N or force_kN")?;
+    let length = unit(0, &["d_", "deflection_"], &LENGTH, "deflection", "d_m or d_mm")?;
+    let force = unit(1, &["force_"], &FORCE, "force", "force_N or force_kN")?;
     let (mut deflection_m, mut force_n) = (Vec::new(), Vec::new());
     for record in reader.records() {
         let record = record.map_err(malformed)?;

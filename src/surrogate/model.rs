@@ -511,7 +511,7 @@ impl Model {
 
     /// The most by which a point of the training curves lies above both neighbours at
     /// `step_m`, or below both, in N; `most` finds it in curves. Kept for the first step that is
-    /// asked for: every prediction asks for the same one.
+    /// asked for.
     pub(super) fn most_kink_n(
         &self,
         of_body: bool,

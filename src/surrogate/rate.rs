@@ -86,7 +86,7 @@ impl Rate {
         self.quotient(cases, levels, i + 1, d) * (1.0 + (levels[i] - 1.0) * fading)
     }
 
-    /// The levels, kept for the first curves that are asked for: a model has no others.
+    /// The levels, kept for the first curves that are asked for.
     fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let kept =
