@@ -67,15 +67,14 @@ impl Values {
 
 /// Name of the dataset that lists the columns in their order.
 const COLUMNS: &str = "columns";
-/// Tables up to this size are put together in memory.
-const SMALL_BYTES: u64 = 1 << 20;
+/// Columns up to this size are held in memory.
+const SMALL_BYTES: u64 = 1 << 16;
 
 /// Writes a table to `path` as a whole; `fill` puts the values of all columns, in any order.
 ///
 /// A column is a dataset of its name, in which `_` stands for `/`; the dataset `columns` lists
-/// the names in their order. Nothing is held but what `fill` holds, and the same values give
-/// the same bytes in whatever pieces they are put. Columns of a table larger than 1 MiB need
-/// 24 bytes at least.
+/// the names in their order. Nothing is held but what `fill` holds and columns up to 64 KiB,
+/// and the same values give the same bytes in whatever pieces they are put.
 ///
 /// # Errors
 /// [`DatabaseError`] if the target cannot be written, or of `fill`.
@@ -85,6 +84,50 @@ pub fn write_table(
     columns: &[Column],
     fill: impl FnOnce(&mut Put<'_>) -> io::Result<()>,
 ) -> Result<(), DatabaseError> {
+    let mut held: Vec<Option<Vec<u8>>> = columns
+        .iter()
+        .map(|c| {
+            let bytes = c.rows.saturating_mul(c.values.size() as u64);
+            (bytes <= SMALL_BYTES).then(|| vec![0; bytes as usize])
+        })
+        .collect();
+    let written = write_at(path, |file: &DiskFile| {
+        // The places of the large columns do not depend on what the small ones hold, so the
+        // file is laid out before there are values, and again with those that were held.
+        let (out, skeleton) = lay_out(attributes, columns, &held)?;
+        let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
+        let mut large = offsets.iter();
+        let offsets: Vec<Option<u64>> =
+            held.iter().map(|h| if h.is_none() { large.next().copied() } else { None }).collect();
+        fill(&mut |column, row, values| {
+            let from = row * columns[column].values.size() as u64;
+            match (&mut held[column], offsets[column]) {
+                (None, Some(offset)) => write_all_at(file, values, offset + from),
+                (Some(held), _) => {
+                    let target = held.get_mut(from as usize..from as usize + values.len());
+                    target.ok_or(io::ErrorKind::InvalidInput)?.copy_from_slice(values);
+                    Ok(())
+                }
+                (None, None) => Err(io::ErrorKind::InvalidInput.into()),
+            }
+        })?;
+        let (out, skeleton) = lay_out(attributes, columns, &held)?;
+        let again = skeleton.write(out, file)?;
+        if again.is_none_or(|again| !again.iter().copied().eq(offsets.iter().copied().flatten())) {
+            return Ok(None);
+        }
+        file.sync_all().map(Some)
+    })?;
+    let detail = || "a large column is not written in one piece".into();
+    written.ok_or_else(|| DatabaseError::Encode { detail: detail() })
+}
+
+/// The file with the values of the columns that are held, and places for the others.
+fn lay_out(
+    attributes: &[(&str, Attribute)],
+    columns: &[Column],
+    held: &[Option<Vec<u8>>],
+) -> io::Result<(FileBuilder, Skeleton)> {
     let mut out = FileBuilder::new();
     for (name, value) in attributes {
         let value = match value {
@@ -94,43 +137,19 @@ pub fn write_table(
         out.set_attr(name, value);
     }
     let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
-    let failed = |detail: String| DatabaseError::Encode { detail };
-    out.create_dataset(COLUMNS).with_strings(&names).map_err(|e| failed(e.to_string()))?;
-    let datasets = dataset_names(&names);
-    let bytes = |c: &Column| c.rows.saturating_mul(c.values.size() as u64);
-    let total = columns.iter().map(bytes).fold(0, u64::saturating_add);
-    if total <= SMALL_BYTES {
-        let mut held: Vec<Vec<u8>> = columns.iter().map(|c| vec![0; bytes(c) as usize]).collect();
-        fill(&mut |column, row, values| {
-            let from = row as usize * columns[column].values.size();
-            let target = held[column].get_mut(from..from + values.len());
-            target.ok_or(io::ErrorKind::InvalidInput)?.copy_from_slice(values);
-            Ok(())
-        })
-        .map_err(|e| failed(e.to_string()))?;
-        for ((column, name), held) in columns.iter().zip(&datasets).zip(held) {
-            out.create_dataset(name).with_raw_data(column.values.datatype(), held, column.rows);
-        }
-        write_at(path, |file| {
-            let bytes = out.finish().map_err(io::Error::other)?;
-            write_all_at(file, &bytes, 0).map(Some)
-        })?;
-        return Ok(());
-    }
+    out.create_dataset(COLUMNS).with_strings(&names).map_err(io::Error::other)?;
     let mut skeleton = Skeleton::default();
-    for (column, name) in columns.iter().zip(&datasets) {
+    for ((column, name), held) in columns.iter().zip(&dataset_names(&names)).zip(held) {
         let (datatype, size) = (column.values.datatype(), column.values.size());
-        skeleton.reserve_values(out.create_dataset(name), datatype, size, &[column.rows]);
+        let dataset = out.create_dataset(name);
+        match held {
+            Some(held) => {
+                dataset.with_raw_data(datatype, held.clone(), column.rows);
+            }
+            None => skeleton.reserve_values(dataset, datatype, size, &[column.rows]),
+        }
     }
-    let written = write_at(path, |file: &DiskFile| {
-        let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
-        fill(&mut |column, row, values| {
-            let at = offsets[column] + row * columns[column].values.size() as u64;
-            write_all_at(file, values, at)
-        })?;
-        file.sync_all().map(Some)
-    })?;
-    written.ok_or_else(|| failed("a column is too short for a large table".into()))
+    Ok((out, skeleton))
 }
 
 /// Names that datasets can have, each another.
@@ -236,18 +255,21 @@ mod tests {
     #[test]
     fn tables_come_back() {
         let folder = tempfile::tempdir().unwrap();
-        for rows in [0u64, 1, 5, 70_000] {
-            let path = folder.path().join(format!("{rows}.h5"));
-            let column = |name: &str, values| Column { name: name.into(), values, rows };
+        for (rows, others) in [(0u64, 1), (1, 0), (5, 5), (70_000, 70_000), (70_000, 1), (70_000, 0)] {
+            let path = folder.path().join(format!("{rows}-{others}.h5"));
+            let column = |name: &str, values, rows| Column { name: name.into(), values, rows };
             let columns = [
-                column("item", Values::Integer),
-                column("x_m[A/1]", Values::Real),
-                column("name", Values::Text { width: 7 }),
+                column("item", Values::Integer, rows),
+                column("x_m[A/1]", Values::Real, rows),
+                column("name", Values::Text { width: 7 }, rows),
+                // As of a large table in which hardly any row has a message.
+                column("message", Values::Text { width: 3 }, others),
             ];
             let value = |c: usize, row: u64| match c {
                 0 => (row as i64 - 3).to_le_bytes().to_vec(),
                 1 => (row as f64 * 0.1).to_le_bytes().to_vec(),
-                _ => format!("{:<7}", row % 1000).into_bytes(),
+                2 => format!("{:<7}", row % 1000).into_bytes(),
+                _ => format!("{:<3}", row % 10).into_bytes(),
             };
             let bytes = |c: usize, from: u64, to: u64| -> Vec<u8> {
                 (from..to).flat_map(|row| value(c, row)).collect()
@@ -259,9 +281,9 @@ mod tests {
                     &[("format", Attribute::Text("a table".into())), ("n", Attribute::Integer(5))],
                     &columns,
                     |put| {
-                        for from in (0..rows).step_by(piece) {
-                            let to = rows.min(from + piece as u64);
-                            for c in 0..3 {
+                        for (c, column) in columns.iter().enumerate() {
+                            for from in (0..column.rows).step_by(piece) {
+                                let to = column.rows.min(from + piece as u64);
                                 put(c, from, &bytes(c, from, to))?;
                             }
                         }
@@ -275,7 +297,8 @@ mod tests {
             let table = Table::open(&path, "a table").unwrap();
             assert_eq!(table.columns, columns);
             assert_eq!(table.attribute("n").unwrap(), Some(Attribute::Integer(5)));
-            for c in 0..3 {
+            for (c, column) in columns.iter().enumerate() {
+                let rows = column.rows;
                 assert!(table.read(c, 0, rows).unwrap() == bytes(c, 0, rows));
                 if rows > 2 {
                     assert!(table.read(c, 1, 2).unwrap() == bytes(c, 1, 3));

@@ -13,8 +13,6 @@ use crate::database::table::{Attribute, Column, Put, Table, Values, write_table}
 /// Number of a row's message; 0 is the empty one.
 const MESSAGE_NUMBER: &str = "message_number";
 const MESSAGE: &str = "message";
-/// Bytes of a message at least.
-const LEAST_WIDTH: usize = 24;
 /// Rows that are held at once.
 const ROWS: u64 = 4096;
 
@@ -27,7 +25,7 @@ struct Widths {
 
 impl Widths {
     fn new(columns: usize) -> Self {
-        Self { columns: vec![1; columns], message: LEAST_WIDTH, messages: 1 }
+        Self { columns: vec![1; columns], message: 1, messages: 1 }
     }
 
     /// The datasets of a file of `head`.
