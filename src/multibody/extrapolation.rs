@@ -11,8 +11,8 @@ use super::integrator::{Record, Run, RunSettings, SimulationError};
 use super::interface::ForceLaw;
 use super::ledger::{Account, Balance};
 use super::rows::{Places, Rows};
-use super::train::Chain;
-use super::watch::Watch;
+use super::train::{Body, Chain};
+use super::watch::{Stride, Watch};
 
 /// Error per step, relative to the speeds and crushes of the run.
 const TOLERANCE: f64 = 1e-12;
@@ -106,6 +106,23 @@ impl Motion<'_> {
             rates[2 * n] += behind;
         }
         rates
+    }
+
+    /// Accelerations of the bodies by the forces between them, and whether any acts.
+    fn by_contacts(&self, y: &[f64]) -> Vec<(f64, bool)> {
+        let mut behind_n = 0.0;
+        let of = |(i, body): (usize, &Body)| {
+            let mut ahead_n = 0.0;
+            if i < self.chain.interfaces().len() {
+                let contact = self.contact(y, i);
+                ahead_n = contact.spring_n + contact.damper_n;
+            }
+            let found =
+                ((behind_n - ahead_n) / body.mass_kg, behind_n != 0.0 || ahead_n != 0.0);
+            behind_n = ahead_n;
+            found
+        };
+        self.chain.bodies().iter().enumerate().map(of).collect()
     }
 
     /// Gragg's rule over `h` with `2 (row + 1)` substeps.
@@ -213,6 +230,7 @@ pub(super) fn run(
     let mut watch = Watch::new(chain, &Places::new(n));
     let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
     let mut interfaces_j = record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
+    let mut contacts = motion.by_contacts(&y);
     for output in 1..=outputs {
         let end_s = output as f64 * settings.output_interval_s;
         let mut time_s = (output - 1) as f64 * settings.output_interval_s;
@@ -226,8 +244,19 @@ pub(super) fn run(
                 // The secant's step; it is taken anew until it ends at the turn.
                 h = share * step;
             } else if error <= 1.0 {
-                y = next;
+                let (start_s, before) = (time_s, std::mem::replace(&mut y, next));
                 time_s = if last { end_s } else { time_s + step };
+                let start = std::mem::replace(&mut contacts, motion.by_contacts(&y));
+                for i in 0..n {
+                    let ((start_a, acted), (end_a, acts)) = (start[i], contacts[i]);
+                    let end_v = y[n + i];
+                    watch.follow(i, &Stride { start_s, end_s: time_s, end_v, start_a, end_a });
+                    if acted && !acts {
+                        // As if the force had fallen evenly.
+                        let acted_s = 2.0 * (end_v - before[n + i]) / start_a;
+                        watch.body(i, false, start_s + acted_s.clamp(0.0, step), end_v);
+                    }
+                }
                 for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
                     if interface.law.is_beyond_end(contact.deflection_m) {
@@ -282,7 +311,6 @@ fn record(
     let histories = what == Record::Histories;
     let (mut kinetic_j, mut momentum) = (0.0, 0.0);
     let (mut stored_j, mut dissipated_j) = (0.0, 0.0);
-    let mut forces_n = vec![0.0; chain.interfaces().len()];
     for (k, history) in run.interfaces.iter_mut().enumerate() {
         let interface = &chain.interfaces()[k];
         let contact = motion.contact(y, k);
@@ -303,28 +331,21 @@ fn record(
             history.stored_j.push(stored);
             history.dissipated_j.push(dissipated);
         }
-        forces_n[k] = force_n;
     }
-    let mut by_contacts = vec![0.0; n];
     for (i, history) in run.bodies.iter_mut().enumerate() {
         let (mass_kg, v) = (chain.bodies()[i].mass_kg, y[n + i]);
         kinetic_j += 0.5 * mass_kg * v * v;
         momentum += mass_kg * v;
-        let behind_n = if i > 0 { forces_n[i - 1] } else { 0.0 };
-        let ahead_n = forces_n.get(i).copied().unwrap_or(0.0);
-        by_contacts[i] = (behind_n - ahead_n) / mass_kg;
-        if behind_n == 0.0 && ahead_n == 0.0 {
-            watch.body(i, false, time_s, v);
-        }
         history.v_m_per_s.push(y[n + i]);
         if histories {
             history.x_m.push(y[i]);
             history.a_m_per_s2.push(rates[n + i]);
         }
     }
+    let contacts = motion.by_contacts(y);
     let places = Places::new(n);
     let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, n, value);
-    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| by_contacts[i]), time_s);
+    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| contacts[i].0), time_s);
     if histories {
         run.time_s.push(time_s);
     }

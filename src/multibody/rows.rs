@@ -21,11 +21,6 @@ pub(super) fn larger(a: Row, b: Row) -> Row {
     each(|j| if a[j] > b[j] { a[j] } else { b[j] })
 }
 
-#[inline(always)]
-pub(super) fn smaller(a: Row, b: Row) -> Row {
-    each(|j| if a[j] < b[j] { a[j] } else { b[j] })
-}
-
 /// Where a body, or the interface in front of it, stands: counted along the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place(usize);

@@ -1,7 +1,7 @@
 //! Watch: extremes and events of a run between its outputs.
 
 use super::integrator::{Record, Run};
-use super::rows::{LANES, Place, Places, Row, Rows, each, larger, smaller};
+use super::rows::{LANES, Place, Places, Row, Rows, each, larger};
 use super::train::Chain;
 
 /// Window of the moving mean deceleration, in s (EN 15227).
@@ -17,22 +17,30 @@ pub(super) struct Watch {
     present: Present,
 }
 
-/// What every output asks of all bodies.
+/// What every step and output asks of all bodies.
 struct Present {
     /// 1 for bodies that no force acts on, else 0.
     is_free: Rows,
-    /// 1 for bodies in a span whose sign is not yet known, else 0.
-    waits: Rows,
-    /// Direction of the net force in the open span, 0 if not known.
-    sign: Rows,
-    /// Largest magnitude of the acceleration at the outputs of the open span.
+    /// Between these an acceleration is nothing new: 0 and ±∞ in a span of known sign, else both
+    /// 0.
+    least: Rows,
+    most: Rows,
+    /// Largest magnitude of the acceleration known of the open span.
     peak: Rows,
     /// Speed before the contact.
     free_speed: Rows,
-    /// The last output.
+    /// Speeds at the last output.
     time_s: f64,
     v: Rows,
-    a: Rows,
+}
+
+/// A body at the start and at the end of a step: speed at its end, accelerations by contacts.
+pub(super) struct Stride {
+    pub start_s: f64,
+    pub end_s: f64,
+    pub end_v: f64,
+    pub start_a: f64,
+    pub end_a: f64,
 }
 
 #[derive(Clone, Default)]
@@ -56,7 +64,7 @@ struct Span {
     begin_v: f64,
     end_s: f64,
     end_v: f64,
-    /// Largest magnitude of the acceleration at the outputs.
+    /// Largest magnitude of the acceleration at outputs and ends.
     peak: f64,
 }
 
@@ -83,13 +91,12 @@ impl Watch {
         let none = || of(&|_| 0.0);
         let present = Present {
             is_free: of(&|_| 1.0),
-            waits: none(),
-            sign: none(),
+            least: none(),
+            most: none(),
             peak: none(),
             free_speed: of(&|i| bodies[i].speed_m_per_s),
             time_s: 0.0,
             v: none(),
-            a: none(),
         };
         let phase = |b: &super::Body| Phase { mass_kg: b.mass_kg, ..Phase::default() };
         Self {
@@ -158,13 +165,14 @@ impl Watch {
     fn open(&mut self, i: usize, place: Place, span: Span) {
         self.bodies[i].open = Some(span);
         let present = &mut self.present;
-        (present.is_free[place], present.waits[place]) = (0.0, 1.0);
-        (present.sign[place], present.peak[place]) = (0.0, 0.0);
+        (present.is_free[place], present.peak[place]) = (0.0, 0.0);
+        (present.least[place], present.most[place]) = (0.0, 0.0);
     }
 
     fn close_span(&mut self, i: usize, place: Place, end_s: f64, end_v: f64) {
         let (phase, present) = (&mut self.bodies[i], &mut self.present);
-        (present.is_free[place], present.waits[place], present.sign[place]) = (1.0, 0.0, 0.0);
+        present.is_free[place] = 1.0;
+        (present.least[place], present.most[place]) = (0.0, 0.0);
         let peak = present.peak[place];
         if let Some(span) = phase.open.take()
             && phase.closed.len() < MOST_SPANS
@@ -181,23 +189,55 @@ impl Watch {
         }
     }
 
+    /// Whether the accelerations by contact forces are news to [`Self::follow`].
+    #[inline(always)]
+    pub fn is_news<const N: usize>(&self, a: &Rows) -> bool {
+        let n = self.places.known::<N>();
+        let (least, most) = (self.present.least.values(n), self.present.most.values(n));
+        let mut outside: Row = [0.0; LANES];
+        for (c, a) in a.values(n).iter().enumerate() {
+            let below = each(|j| least[c][j] - a[j]);
+            outside = larger(outside, larger(below, each(|j| a[j] - most[c][j])));
+        }
+        outside.iter().any(|&o| o > 0.0)
+    }
+
+    /// Closes the span of body `i` where its net force has changed its sign in a step; learns the
+    /// sign of a new one; opens those that no contact has announced: of couplings that pull, and
+    /// where a curve begins without force.
+    pub fn follow(&mut self, i: usize, stride: &Stride) {
+        let place = self.places.of(i);
+        let &Stride { start_s, end_s, end_v, start_a, end_a } = stride;
+        let present = &self.present;
+        if end_a == 0.0 || end_a >= present.least[place] && end_a <= present.most[place] {
+            return;
+        }
+        if self.bodies[i].open.is_none() {
+            // As if the force had grown evenly since it began.
+            let begin_v = present.free_speed[place];
+            let since_s = 2.0 * (end_v - begin_v) / end_a;
+            let begin_s = end_s - since_s.clamp(0.0, end_s - start_s);
+            self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
+        } else if present.least[place] != present.most[place] {
+            let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
+            let (begin_s, begin_v) = (end_s - left_s, end_v - 0.5 * end_a * left_s);
+            self.present.peak[place] = present.peak[place].max(start_a.abs());
+            self.close_span(i, place, begin_s, begin_v);
+            self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
+        }
+        let present = &mut self.present;
+        present.peak[place] = end_a.abs();
+        match end_a > 0.0 {
+            true => present.most[place] = f64::INFINITY,
+            false => present.least[place] = f64::NEG_INFINITY,
+        }
+    }
+
     /// Speeds of all bodies at an output, and accelerations by contact forces.
     #[inline(always)]
     pub fn output_bodies<const N: usize>(&mut self, v: &Rows, a: &Rows, time_s: f64) {
         let n = self.places.known::<N>();
         let (vs, accelerations) = (v.values(n), a.values(n));
-        let Present { is_free, waits, sign, .. } = &self.present;
-        let (is_free, waits, sign) = (is_free.values(n), waits.values(n), sign.values(n));
-        let mut least: Row = [0.0; LANES];
-        for c in 0..n {
-            let a = accelerations[c];
-            let turns = each(|j| sign[c][j] * a[j]);
-            let begins = each(|j| -(is_free[c][j] + waits[c][j]) * a[j].abs());
-            least = smaller(least, smaller(turns, begins));
-        }
-        if least.iter().any(|&l| l < 0.0) {
-            self.follow_signs(v, a, time_s);
-        }
         let Present { is_free, peak, free_speed, .. } = &mut self.present;
         let (is_free, peak) = (is_free.values(n), peak.values_mut(n));
         let free_speed = free_speed.values_mut(n);
@@ -207,44 +247,7 @@ impl Watch {
             free_speed[c] = each(|j| if is_free[c][j] > 0.0 { v[j] } else { free_speed[c][j] });
         }
         self.present.v.values_mut(n).copy_from_slice(vs);
-        self.present.a.values_mut(n).copy_from_slice(accelerations);
         self.present.time_s = time_s;
-    }
-
-    /// Closes spans where the net force has changed its sign since the last output; learns the
-    /// signs of new ones; opens those that no contact has announced: of couplings that pull, and
-    /// where a curve begins without force.
-    #[cold]
-    #[inline(never)]
-    fn follow_signs(&mut self, v: &Rows, a: &Rows, time_s: f64) {
-        for i in 0..self.bodies.len() {
-            let place = self.places.of(i);
-            let a = a[place];
-            let present = &self.present;
-            if self.bodies[i].open.is_none() {
-                if a == 0.0 {
-                    continue;
-                }
-                // As if the force had grown evenly since it began.
-                let begin_v = present.free_speed[place];
-                let since_s = 2.0 * (v[place] - begin_v) / a;
-                let begin_s = time_s - since_s.clamp(0.0, time_s - present.time_s);
-                self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
-            }
-            let present = &self.present;
-            if present.sign[place] * a < 0.0 {
-                let (before_v, before_a) = (present.v[place], present.a[place]);
-                let share = (before_a / (before_a - a)).clamp(0.0, 1.0);
-                let until_s = (time_s - present.time_s) * share;
-                let begin_s = present.time_s + until_s;
-                let begin_v = before_v + 0.5 * before_a * until_s;
-                self.close_span(i, place, begin_s, begin_v);
-                self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
-            }
-            if self.present.waits[place] > 0.0 && a != 0.0 {
-                (self.present.sign[place], self.present.waits[place]) = (a.signum(), 0.0);
-            }
-        }
     }
 
     /// Fills in the summary; `interval_s` lies between the outputs.

@@ -16,7 +16,7 @@ use super::bank::{At, Bank};
 use super::integrator::{Method, Record, Run, SimulationError};
 use super::rows::{Place, Places, Rows, behind, each};
 use super::train::{Chain, Tension};
-use super::watch::Watch;
+use super::watch::{Stride, Watch};
 use events::Missed;
 use outputs::Recorder;
 
@@ -30,6 +30,8 @@ pub(super) struct Engine<'a> {
     a: Rows,
     /// At the start of the step.
     a_start: Rows,
+    /// Both without resistance, where there is some.
+    by_contacts: Option<[Rows; 2]>,
     mass_kg: Rows,
     per_kg: Rows,
     push: Bank<'a>,
@@ -80,6 +82,7 @@ impl<'a> Engine<'a> {
             v: of(&|i| bodies[i].speed_m_per_s),
             a: of(&|_| 0.0),
             a_start: of(&|_| 0.0),
+            by_contacts: chain.has_resistance().then(|| [of(&|_| 0.0), of(&|_| 0.0)]),
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
             push: Bank::new(&places, &laws, 1.0),
@@ -231,6 +234,9 @@ impl<'a> Engine<'a> {
                 self.rates.resistance_n += resistance;
             }
             self.a[place] = (behind - net[place] - resistance) * self.per_kg[place];
+            if let Some([now, _]) = &mut self.by_contacts {
+                now[place] = (behind - net[place]) * self.per_kg[place];
+            }
             behind = net[place];
         }
         self.net_n = Some(net);
@@ -329,9 +335,43 @@ impl<'a> Engine<'a> {
         }
     }
 
+    /// Tells the watch where forces on bodies begin or change their sign in the step.
+    #[inline(always)]
+    fn follow<const N: usize>(&mut self, h: f64, method: Method) {
+        let a = self.by_contacts.as_ref().map_or(&self.a, |[now, _]| now);
+        if self.watch.is_news::<N>(a) {
+            self.follow_bodies(h, ahead(method) * h);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn follow_bodies(&mut self, h: f64, ahead_s: f64) {
+        let (now, start) = match &self.by_contacts {
+            Some([now, start]) => (now, start),
+            None => (&self.a, &self.a_start),
+        };
+        for i in 0..self.chain.bodies().len() {
+            let place = self.places.of(i);
+            self.watch.follow(
+                i,
+                &Stride {
+                    start_s: self.end_s - h,
+                    end_s: self.end_s,
+                    end_v: self.v[place] - ahead_s * self.a[place],
+                    start_a: start[place],
+                    end_a: now[place],
+                },
+            );
+        }
+    }
+
     #[inline(always)]
     fn next(&mut self) {
         std::mem::swap(&mut self.a, &mut self.a_start);
+        if let Some([now, start]) = &mut self.by_contacts {
+            std::mem::swap(now, start);
+        }
         self.push.next();
         if let Some(pull) = &mut self.pull {
             pull.next();
@@ -366,6 +406,7 @@ fn outputs<'a, const N: usize>(
             if !engine.missed.is_empty() {
                 engine.finish(h, method)?;
             }
+            engine.follow::<N>(h, method);
         }
         engine.kick::<N>(-ahead * h);
         engine.on_wall(At::End, -ahead * h);

@@ -3,7 +3,7 @@
 use super::super::bank::At;
 use super::super::integrator::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
 use super::super::ledger::{Account, Balance};
-use super::super::rows::{LANES, Places, Row, Rows, behind, each, larger};
+use super::super::rows::{LANES, Places, Row, Rows, each, larger};
 use super::super::train::Chain;
 use super::Engine;
 
@@ -41,8 +41,6 @@ pub(super) struct Recorder {
     dissipated_j: Rows,
     /// The same of couplings.
     pulled: [Rows; 3],
-    /// Accelerations without resistance, where there is some.
-    by_contacts: Option<Rows>,
 }
 
 impl Recorder {
@@ -58,7 +56,6 @@ impl Recorder {
             largest_m: zeros(),
             dissipated_j: zeros(),
             pulled: std::array::from_fn(|_| zeros()),
-            by_contacts: chain.has_resistance().then(zeros),
         }
     }
 }
@@ -140,18 +137,8 @@ impl Engine<'_> {
             momentum: momentum.iter().sum(),
             impulse: self.wall_impulse + self.rates.impulse,
         });
-        let accelerations = match &mut recorder.by_contacts {
-            Some(by_contacts) => {
-                let (forces, per_kg) = (self.forces_n(At::End).values(n), self.per_kg.values(n));
-                for (c, a) in by_contacts.values_mut(n).iter_mut().enumerate() {
-                    let behind = behind(forces, c);
-                    *a = each(|j| (behind[j] - forces[c][j]) * per_kg[c][j]);
-                }
-                &*by_contacts
-            }
-            None => &self.a,
-        };
-        self.watch.output_bodies::<N>(&self.v, accelerations, time_s);
+        let a = self.by_contacts.as_ref().map_or(&self.a, |[now, _]| now);
+        self.watch.output_bodies::<N>(&self.v, a, time_s);
         let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
         recorder.recent.keep(0, n, |c| v[c]);
         if recorder.record == Record::Histories {
