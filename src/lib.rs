@@ -45,6 +45,8 @@ pub mod build;
 
 pub mod dataset;
 
+mod separated;
+
 mod stream;
 
 pub mod forest;

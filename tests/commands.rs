@@ -674,7 +674,7 @@ fn curve_files_in_newtons_and_kilonewtons_agree() {
         )
     };
     write("n.csv", "d_m,force_N\n0,0\n0.125,4000000\n1,2000000\n");
-    write("kn.csv", "# kilonewtons\ndeflection_mm,force_kN\n0,0\n125,4000\n1000,2000\n");
+    write("kn.csv", "# kilonewtons\ndeflection_mm;force_kN\n0;0\n125;4000\n1000;2000\n");
     write("n.toml", &scenario("n.csv"));
     write("kn.toml", &scenario("kn.csv"));
     let run = |name: &str| crumple_ok(folder.path(), &["simulate", name, "-o", "-"]);

@@ -611,9 +611,8 @@ fn mean_decelerations_begin_with_the_force() {
     let e = 2e6 / (80e6 * 0.5 * tonnes).sqrt() / closing;
     let ends = 0.5 * closing / a + std::f64::consts::FRAC_PI_2 * (0.5 * tonnes / 80e6).sqrt();
     let mean = (0.5 * closing) * (1.0 + e) / ends;
-    let late_push = |bodies| {
-        Chain::new(bodies, vec![Interface::new("A|B", law(late()), 0.2)]).unwrap()
-    };
+    let late_push =
+        |bodies| Chain::new(bodies, vec![Interface::new("A|B", law(late()), 0.2)]).unwrap();
     let mut braked: Vec<Body> = bodies([10.0, 0.0]);
     braked[0].resistance.braking = 0.1;
     let coupled = Interface::new("A|B", law(constant(1e6)), 1.0).with_tension(law(late()), 0.0);

@@ -121,6 +121,20 @@ fn a_grid_is_run_in_its_stated_order() {
     assert_eq!(values, expected);
 }
 
+/// A train that comes against the other has a speed below 0.
+#[test]
+fn oncoming_trains_have_their_speeds() {
+    let folder = Folder::new(
+        "[sweep]\nvary = [ { what = \"speed\", train = \"B\", values = [\"-1m/s\", \"-2m/s\"] } ]\n",
+    );
+    folder.ok("sweep s.toml -q -o out.csv");
+    let (header, rows) = rows(&folder.text("out.csv"));
+    let peak = header.iter().position(|h| h == "max_deflection_m[A1|B1]").unwrap();
+    let peaks: Vec<f64> = rows.iter().map(|r| r[peak].parse().unwrap()).collect();
+    assert_eq!([&*rows[0][1], &*rows[1][1]], ["-1.0", "-2.0"]);
+    assert!(peaks[1] > peaks[0], "{peaks:?}");
+}
+
 /// Each row is what `simulate` says of a scenario with these values written into it.
 #[test]
 fn rows_are_those_of_single_runs() {
@@ -738,8 +752,8 @@ fn wrong_plans_are_named_by_file_and_key() {
     );
     vary("what = \"speed\", train = \"A\", values = [\"1\"]", "values: speed \"1\" has no unit");
     vary(
-        "what = \"speed\", train = \"A\", values = [\"-1m/s\"]",
-        "values: -1m/s is out of range: expected 0 or more",
+        "what = \"gap\", curve = \"inner\", values = [\"-1mm\"]",
+        "values: -1mm is out of range: expected 0 or more",
     );
     vary(
         "what = \"speed\", train = \"A\", vehicle = \"A1\"",

@@ -65,6 +65,10 @@ fn shipped_scenarios_run() {
         if name.starts_with("en15227") {
             let statement = result["summary"]["limits"]["statement"].as_str().unwrap();
             assert!(statement.contains("no statement of conformity with EN 15227:2020"));
+            let over = result["summary"]["limits"]["over"].as_array().unwrap();
+            assert!(over.iter().all(|name| name != "O1" && name != "W1"), "{name}: {over:?}");
+            let warnings = result["warnings"].to_string();
+            assert!(!warnings.contains("beyond the end of its curve"), "{name}: {warnings}");
         }
         run += 1;
     }
@@ -256,6 +260,14 @@ fn wrong_trains_are_explained() {
     let limits =
         format!("{nose}\n[limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = -1.0");
     t(&limits, one, "mean_deceleration_g = -1: expected more than 0");
+    let limits = limits.replace("= -1.0", "= 5.0\ntrains = [\"Z\"]");
+    t(&limits, one, "[limits] trains: there is no train \"Z\": the scenario has A");
+    let gap = nose.replace("unloading", "gap = \"1mm\", unloading");
+    let zone = "vehicles = [ { name = \"A1\", mass = \"9t\", front = { mass = \"2t\", curve = \"nose\" } } ]";
+    t(&gap, zone, "front of vehicle \"A1\" is joined to the body without one");
+    let second = "[[train]]\nname = \"A\"\nspeed = \"0m/s\"\nvehicles = [ { name = \"B1\", mass = \"9t\" } ]";
+    let error = fails(&scenario(&nose, one, second));
+    assert!(error.contains("two trains are named \"A\""), "{error}");
 }
 
 /// Velocities of every vehicle against FE's run of the train, by every method.

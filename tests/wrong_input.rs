@@ -344,6 +344,7 @@ fn curve_files() {
         let error = crumple_fails(folder.path(), 1, &["simulate", "s.toml"]);
         assert!(error.contains(expected), "expected {expected}, found:\n{error}");
     }
+    t("d_m;force_N\n0;0\n1;x\n", "c.csv: line 3, field 2: expected a number, found \"x\"");
     t("d_m,force_N\n0,0\n1,x\n", "c.csv: line 3, field 2: expected a number, found \"x\"");
     t(
         "d,force_N\n0,0\n1,1\n",

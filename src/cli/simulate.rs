@@ -24,7 +24,7 @@ use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_inputs};
 pub struct Args {
     /// Scenario (TOML)
     scenario: PathBuf,
-    /// Result as CSV; \"-\" is standard output
+    /// Result as CSV; "-" is standard output
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
@@ -34,6 +34,8 @@ struct Summary {
     bodies: Vec<BodySummary>,
     interfaces: Vec<InterfaceSummary>,
     step_s: f64,
+    /// Time of the last output, which the final speeds are for.
+    end_s: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     limits: Option<Limits>,
 }
@@ -233,17 +235,23 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
         standard: limits.standard.clone(),
         edition: limits.edition.clone(),
         mean_deceleration_limit_g: limits.mean_deceleration_g,
-        over: bodies
+        over: prepared
+            .order
             .iter()
-            .filter(|b| b.mean_deceleration_g.abs() > limits.mean_deceleration_g)
-            .map(|b| b.name.clone())
+            .zip(&bodies)
+            .filter(|(i, b)| {
+                let over = b.mean_deceleration_g.abs() > limits.mean_deceleration_g;
+                over && prepared.limited.contains(i)
+            })
+            .map(|(_, b)| b.name.clone())
             .collect(),
         statement: format!(
             "mean decelerations are survival-independent figures of a one-dimensional model; this is no statement of conformity with {}:{}",
             limits.standard, limits.edition
         ),
     });
-    Summary { bodies, interfaces, step_s: run.step_s, limits }
+    let end_s = run.time_s.last().copied().unwrap_or_default();
+    Summary { bodies, interfaces, step_s: run.step_s, end_s, limits }
 }
 
 fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<()> {
@@ -277,7 +285,8 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
             ]
         })
         .collect();
-    output::table(out, &["body", "final speed", "mean deceleration", "over 120 ms"], &rows)?;
+    let speed = format!("speed at {} ms", (summary.end_s * 1e6).round() / 1e3);
+    output::table(out, &["body", &speed, "mean deceleration", "over 120 ms"], &rows)?;
     if let Some(limits) = &summary.limits {
         let over = match limits.over.is_empty() {
             true => "no body".into(),

@@ -42,7 +42,7 @@ pub struct Args {
     /// File (TOML) whose [sweep] table takes the place of the scenario's
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
-    /// Where to write: .csv, .h5 or .hdf5; \"-\" is CSV on standard output
+    /// Where to write: .csv, .h5 or .hdf5; "-" is CSV on standard output
     #[arg(short, long, required_unless_present = "dry_run")]
     output: Option<PathBuf>,
     /// Run block I of N blocks of the items

@@ -255,7 +255,9 @@ mod tests {
     #[test]
     fn tables_come_back() {
         let folder = tempfile::tempdir().unwrap();
-        for (rows, others) in [(0u64, 1), (1, 0), (5, 5), (70_000, 70_000), (70_000, 1), (70_000, 0)] {
+        for (rows, others) in
+            [(0u64, 1), (1, 0), (5, 5), (70_000, 70_000), (70_000, 1), (70_000, 0)]
+        {
             let path = folder.path().join(format!("{rows}-{others}.h5"));
             let column = |name: &str, values, rows| Column { name: name.into(), values, rows };
             let columns = [

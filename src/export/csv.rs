@@ -2,10 +2,12 @@
 
 use std::fmt::Write;
 use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::{ExportError, Options, headline, nine_digits};
 use crate::curve::{Envelope, EnvelopeError};
+use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
 use crate::unit::{FORCE, LENGTH};
 
@@ -66,24 +68,30 @@ pub enum CsvError {
 
 /// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`,
 /// `deflection_m`), its second the force (`force_N`, `force_kN`, `force_MN`); further columns
-/// are ignored.
+/// are ignored. Separated by commas, semicolons or tabs, whichever stand in the header.
 ///
 /// # Errors
 /// [`CsvError`] with line and field.
 pub fn read(path: &Path) -> Result<Envelope, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
+    let mut file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .from_reader(File::open(path).map_err(io)?);
+        .delimiter(separator(file.fill_buf().map_err(io)?))
+        .from_reader(file);
     let header = reader.headers().map_err(malformed)?.clone();
     let line = header.position().map_or(1, csv::Position::line);
     let unit = |field: usize, prefixes: &[&str], of: &crate::unit::Dimension, wanted, example| {
         let found = header.get(field).unwrap_or_default();
         let size = prefixes.iter().find_map(|prefix| of.size_of(found.strip_prefix(prefix)?));
-        size.ok_or_else(|| {
-            CsvError::Header { path: path.into(), line, wanted, example, found: found.into() }
+        size.ok_or_else(|| CsvError::Header {
+            path: path.into(),
+            line,
+            wanted,
+            example,
+            found: found.into(),
         })
     };
     let length = unit(0, &["d_", "deflection_"], &LENGTH, "deflection", "d_m or d_mm")?;

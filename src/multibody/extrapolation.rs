@@ -117,8 +117,7 @@ impl Motion<'_> {
                 let contact = self.contact(y, i);
                 ahead_n = contact.spring_n + contact.damper_n;
             }
-            let found =
-                ((behind_n - ahead_n) / body.mass_kg, behind_n != 0.0 || ahead_n != 0.0);
+            let found = ((behind_n - ahead_n) / body.mass_kg, behind_n != 0.0 || ahead_n != 0.0);
             behind_n = ahead_n;
             found
         };

@@ -479,6 +479,8 @@ impl Vary {
             // How far values scatter has no sign of its own to check here.
             _ if key == "sd" => (0.0, f64::INFINITY),
             (What::Band, _) => (-1.0, 1.0),
+            // A train may come against the other.
+            (What::Speed, false) => (f64::NEG_INFINITY, f64::INFINITY),
             // A mean or a bound below zero may be meant: what is drawn is checked by the run.
             _ if key != "values" && key != "from" && key != "to" => {
                 (f64::NEG_INFINITY, f64::INFINITY)

@@ -182,7 +182,7 @@ pub fn rate(
         }),
         warnings: Vec::new(),
     };
-    rating.warnings = warnings(&rating, r);
+    rating.warnings = warnings(&rating, r, settings);
     Ok(rating)
 }
 
@@ -203,8 +203,16 @@ fn first_peaks(pair: &Pair) -> Vec<Peak> {
     matched.into_iter().filter(|peak| peak.reference.1 > 0.0).map(peak).collect()
 }
 
-fn warnings(rating: &Rating, reference: &[f64]) -> Vec<String> {
+fn warnings(rating: &Rating, reference: &[f64], settings: &Settings) -> Vec<String> {
     let mut warnings = Vec::new();
+    let (from_s, to_s) =
+        (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
+    if from_s < rating.from_s - INTERVAL_S || to_s > rating.to_s + INTERVAL_S {
+        warnings.push(format!(
+            "{from_s} s to {to_s} s was asked for, but the signals have in common only {} s to {} s",
+            rating.from_s, rating.to_s
+        ));
+    }
     if reference.iter().all(|&r| r == 0.0) {
         warnings
             .push("the reference is zero throughout: there is nothing to be relative to".into());
@@ -318,6 +326,9 @@ mod tests {
     #[test]
     fn a_filter_comes_before_the_cut() {
         let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
+        let beyond = Settings { to_s: Some(5.0), ..Settings::default() };
+        let beyond = rate(&step, &step, &beyond).unwrap().warnings;
+        assert!(beyond.iter().any(|w| w.contains("to 5 s was asked for")), "{beyond:?}");
         let window = Settings { from_s: Some(0.052), cfc: Some(60), ..Settings::default() };
         let whole = Settings { from_s: None, ..window };
         let zero = signal(vec![0.0; 200]);

@@ -2,6 +2,8 @@
 
 use std::io::Read;
 
+use crate::separated::separator;
+
 /// Columns of a table that hold a signal: its times as they stand, and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
@@ -59,7 +61,7 @@ pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, Tabl
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .flexible(true)
-        .delimiter(delimiter(text))
+        .delimiter(separator(text))
         .from_reader(text);
     let header = reader.headers()?.clone();
     let line = header.position().map_or(1, csv::Position::line);
@@ -101,14 +103,6 @@ pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, Tabl
         values.push(value);
     }
     Ok(Columns { time_name: header[0].into(), name: header[column].into(), time, values })
-}
-
-/// What separates the columns of the first line that is no comment.
-fn delimiter(text: &[u8]) -> u8 {
-    let lines = text.split(|&byte| byte == b'\n');
-    let header = lines.into_iter().find(|line| !line.is_empty() && line[0] != b'#');
-    let has = |byte: u8| header.is_some_and(|line| line.contains(&byte));
-    [b',', b';', b'\t'].into_iter().find(|&byte| has(byte)).unwrap_or(b',')
 }
 
 /// The column to read.

@@ -6,7 +6,10 @@ use std::sync::Arc;
 use super::check::check;
 use super::layout::{Layout, Role, Slot, layout};
 use super::spring::{SpringError, spring};
-use super::{InterfaceSpeed, Prepared, Scenario, ScenarioError, Source, Sources, Used, local};
+use super::{
+    InterfaceSpeed, LimitsTable, Prepared, Scenario, ScenarioError, Source, Sources, TrainTable,
+    Used, VehicleTable, local,
+};
 use crate::multibody::{Chain, Damping, ForceLaw, Interface, Method, RunSettings, Tension};
 use crate::unit::SpeedKind;
 
@@ -92,7 +95,30 @@ pub(super) fn assemble_at(
         );
     }
     let limits = scenario.limits.clone();
-    Ok(Prepared { chain, settings, order, used, limits, warnings })
+    let limited = match &limits {
+        Some(limits) => limited(scenario, &order, limits),
+        None => Vec::new(),
+    };
+    Ok(Prepared { chain, settings, order, used, limits, limited, warnings })
+}
+
+/// The bodies of the trains that limits hold for; `order` lists the bodies of all trains.
+fn limited(scenario: &Scenario, order: &[usize], limits: &LimitsTable) -> Vec<usize> {
+    let bodies_of = |train: &TrainTable| -> usize {
+        let zones =
+            |v: &VehicleTable| usize::from(v.front.is_some()) + usize::from(v.rear.is_some());
+        train.vehicles.iter().map(|v| 1 + zones(v)).sum()
+    };
+    let mut rest = order;
+    let mut limited = Vec::new();
+    for train in &scenario.train {
+        let (own, others) = rest.split_at(bodies_of(train));
+        if limits.trains.as_ref().is_none_or(|trains| trains.contains(&train.name)) {
+            limited.extend(own);
+        }
+        rest = others;
+    }
+    limited
 }
 
 /// Gives a chain put together by [`assemble`] the masses, speeds and gaps of `scenario`, which

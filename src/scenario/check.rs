@@ -26,6 +26,20 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
             limits.mean_deceleration_g
         ));
     }
+    if let [first, second] = scenario.train.as_slice()
+        && first.name == second.name
+    {
+        return Err(format!("two trains are named \"{}\": give them different names", first.name));
+    }
+    for name in scenario.limits.iter().flat_map(|l| l.trains.iter().flatten()) {
+        if !scenario.train.iter().any(|train| train.name == *name) {
+            let known: Vec<&str> = scenario.train.iter().map(|t| t.name.as_str()).collect();
+            return Err(format!(
+                "[limits] trains: there is no train \"{name}\": the scenario has {}",
+                known.join(", ")
+            ));
+        }
+    }
     let mut names = std::collections::HashSet::new();
     let mut take = |name: String| match names.insert(name.clone()) {
         true => Ok(()),
@@ -56,8 +70,13 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
             check_name(name)?;
             take(name.clone())?;
             for (zone, end) in [(&vehicle.front, "front"), (&vehicle.rear, "rear")] {
-                if zone.is_some() {
-                    take(format!("{name} {end}"))?;
+                let Some(zone) = zone else { continue };
+                take(format!("{name} {end}"))?;
+                if scenario.curves.get(&zone.curve).is_some_and(|c| c.gap.is_some()) {
+                    return Err(format!(
+                        "curve \"{}\" has a gap, but {end} of vehicle \"{name}\" is joined to the body without one: give it a curve without gap",
+                        zone.curve
+                    ));
                 }
             }
             let is_split = vehicle.front.is_some() || vehicle.rear.is_some();

@@ -31,6 +31,8 @@ pub struct Prepared {
     /// What each interface of the chain uses.
     pub used: Vec<Used>,
     pub limits: Option<LimitsTable>,
+    /// Bodies that the limits hold for: indices into the chain.
+    pub limited: Vec<usize>,
     /// Warnings of the curves used.
     pub warnings: Vec<String>,
 }

@@ -45,6 +45,8 @@ pub struct LimitsTable {
     pub edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
     pub mean_deceleration_g: f64,
+    /// Trains whose vehicles are held against it, by name; all if absent.
+    pub trains: Option<Vec<String>>,
 }
 
 /// Where FE's speeds of the vehicles are.
@@ -75,6 +77,7 @@ fn x_velocity() -> String {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunTable {
+    /// From the first contact; the last output is the last whole output_interval in it.
     pub duration: TimeText,
     #[serde(default = "default_interval")]
     pub output_interval: TimeText,
@@ -147,7 +150,9 @@ pub struct CurveTable {
     pub gap: Option<LengthText>,
     /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
     pub tension: Option<String>,
-    /// Damper beside the curve while it is in contact.
+    /// Damper beside the curve. It acts while the curve has contact, also on a stretch without
+    /// force, but not where memory has left a gap; then it only pushes. With a tension curve it
+    /// acts along both and may pull.
     pub damping: Option<DampingTable>,
     #[serde(default)]
     pub law: LawName,

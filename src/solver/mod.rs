@@ -267,7 +267,7 @@ pub enum ReadError {
         "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
     )]
     Deck { path: PathBuf },
-    #[error("{path}: it has several sections: select one of {known}")]
+    #[error("{path}: it has several sections: select one of {known} (--section)")]
     SeveralSections { path: PathBuf, known: String },
     #[error("{path}: it has no section \"{section}\": it has {known}")]
     NoSuchSection { path: PathBuf, section: String, known: String },
