@@ -51,7 +51,7 @@ impl Recorder {
         Self {
             account: Account::open(chain),
             record,
-            recent: Recent { values: vec![[[0.0; OUTPUTS]; LANES]; rows], outputs: 0 },
+            recent: Recent { values: vec![[[0.0; LANES]; OUTPUTS]; rows], outputs: 0 },
             work_j: zeros(),
             largest_m: zeros(),
             dissipated_j: zeros(),
@@ -62,7 +62,7 @@ impl Recorder {
 
 /// The last values of the histories, by kind and place.
 struct Recent {
-    values: Vec<[[f64; OUTPUTS]; LANES]>,
+    values: Vec<[Row; OUTPUTS]>,
     outputs: usize,
 }
 
@@ -72,10 +72,7 @@ impl Recent {
     fn keep(&mut self, kind: usize, n: usize, row: impl Fn(usize) -> Row) {
         let output = self.outputs % OUTPUTS;
         for (c, recent) in self.values[kind * n..][..n].iter_mut().enumerate() {
-            let row = row(c);
-            for j in 0..LANES {
-                recent[j][output] = row[j];
-            }
+            recent[output] = row(c);
         }
     }
 
@@ -84,17 +81,17 @@ impl Recent {
         let (of_body, of_interface) = kinds(record);
         let recent = |kind: usize, i: usize| {
             let place = places.of(i);
-            let row = kind * places.rows() + place.row();
-            &self.values[row][place.lane()][..self.outputs]
+            let values = &self.values[kind * places.rows() + place.row()][..self.outputs];
+            values.iter().map(move |row| row[place.lane()])
         };
         for (i, body) in run.bodies.iter_mut().enumerate() {
             for (kind, of) in of_body.iter().enumerate() {
-                of(body).extend_from_slice(recent(kind, i));
+                of(body).extend(recent(kind, i));
             }
         }
         for (k, interface) in run.interfaces.iter_mut().enumerate() {
             for (kind, of) in of_interface.iter().enumerate() {
-                of(interface).extend_from_slice(recent(of_body.len() + kind, k));
+                of(interface).extend(recent(of_body.len() + kind, k));
             }
         }
         self.outputs = 0;
