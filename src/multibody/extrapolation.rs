@@ -12,7 +12,7 @@ use super::interface::ForceLaw;
 use super::ledger::{Account, Balance};
 use super::rows::{Places, Rows};
 use super::train::{Body, Chain};
-use super::watch::{Stride, Watch};
+use super::watch::Watch;
 
 /// Error per step, relative to the speeds and crushes of the run.
 const TOLERANCE: f64 = 1e-12;
@@ -226,7 +226,8 @@ pub(super) fn run(
         })
         .collect();
     let mut account = Account::open(chain);
-    let mut watch = Watch::new(chain, &Places::new(n));
+    let places = Places::new(n);
+    let mut watch = Watch::new(chain, &places);
     let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
     let mut interfaces_j = record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
     let mut contacts = motion.by_contacts(&y);
@@ -249,13 +250,14 @@ pub(super) fn run(
                 for i in 0..n {
                     let ((start_a, acted), (end_a, acts)) = (start[i], contacts[i]);
                     let end_v = y[n + i];
-                    watch.follow(i, &Stride { start_s, end_s: time_s, end_v, start_a, end_a });
+                    watch.follow(i, time_s, end_v, end_a);
                     if acted && !acts {
                         // As if the force had fallen evenly.
                         let acted_s = 2.0 * (end_v - before[n + i]) / start_a;
                         watch.body(i, false, start_s + acted_s.clamp(0.0, step), end_v);
                     }
                 }
+                watch.looked::<0>(&Rows::of(&places, n, |i| contacts[i].0), time_s);
                 for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
                     if interface.law.is_beyond_end(contact.deflection_m) {

@@ -25,6 +25,9 @@ struct Present {
     /// 0.
     least: Rows,
     most: Rows,
+    /// Accelerations by contacts at the last look.
+    seen_a: Rows,
+    seen_s: f64,
     /// Largest magnitude of the acceleration known of the open span.
     peak: Rows,
     /// Speed before the contact.
@@ -32,15 +35,6 @@ struct Present {
     /// Speeds at the last output.
     time_s: f64,
     v: Rows,
-}
-
-/// A body at the start and at the end of a step: speed at its end, accelerations by contacts.
-pub(super) struct Stride {
-    pub start_s: f64,
-    pub end_s: f64,
-    pub end_v: f64,
-    pub start_a: f64,
-    pub end_a: f64,
 }
 
 #[derive(Clone, Default)]
@@ -93,6 +87,8 @@ impl Watch {
             is_free: of(&|_| 1.0),
             least: none(),
             most: none(),
+            seen_a: none(),
+            seen_s: 0.0,
             peak: none(),
             free_speed: of(&|i| bodies[i].speed_m_per_s),
             time_s: 0.0,
@@ -202,13 +198,13 @@ impl Watch {
         outside.iter().any(|&o| o > 0.0)
     }
 
-    /// Closes the span of body `i` where its net force has changed its sign in a step; learns the
-    /// sign of a new one; opens those that no contact has announced: of couplings that pull, and
-    /// where a curve begins without force.
-    pub fn follow(&mut self, i: usize, stride: &Stride) {
+    /// Closes the span of body `i` where its net force has changed its sign since the last look;
+    /// learns the sign of a new one; opens those that no contact has announced: of couplings that
+    /// pull, and where a curve begins without force.
+    pub fn follow(&mut self, i: usize, end_s: f64, end_v: f64, end_a: f64) {
         let place = self.places.of(i);
-        let &Stride { start_s, end_s, end_v, start_a, end_a } = stride;
         let present = &self.present;
+        let (start_s, start_a) = (present.seen_s, present.seen_a[place]);
         if end_a == 0.0 || end_a >= present.least[place] && end_a <= present.most[place] {
             return;
         }
@@ -231,6 +227,14 @@ impl Watch {
             true => present.most[place] = f64::INFINITY,
             false => present.least[place] = f64::NEG_INFINITY,
         }
+    }
+
+    /// Ends a look at the accelerations by contact forces.
+    #[inline(always)]
+    pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
+        let n = self.places.known::<N>();
+        self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
+        self.present.seen_s = at_s;
     }
 
     /// Speeds of all bodies at an output, and accelerations by contact forces.

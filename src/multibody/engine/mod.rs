@@ -16,9 +16,12 @@ use super::bank::{At, Bank};
 use super::integrator::{Method, Record, Run, SimulationError};
 use super::rows::{Place, Places, Rows, behind, each};
 use super::train::{Chain, Tension};
-use super::watch::{Stride, Watch};
+use super::watch::Watch;
 use events::Missed;
 use outputs::Recorder;
+
+/// Between looks at the signs of the forces, which a line joins; longer steps have one each.
+const LOOK_S: f64 = 0.25e-3;
 
 /// Everything that changes from step to step.
 pub(super) struct Engine<'a> {
@@ -30,8 +33,8 @@ pub(super) struct Engine<'a> {
     a: Rows,
     /// At the start of the step.
     a_start: Rows,
-    /// Both without resistance, where there is some.
-    by_contacts: Option<[Rows; 2]>,
+    /// Without resistance, where there is some.
+    by_contacts: Option<Rows>,
     mass_kg: Rows,
     per_kg: Rows,
     push: Bank<'a>,
@@ -82,7 +85,7 @@ impl<'a> Engine<'a> {
             v: of(&|i| bodies[i].speed_m_per_s),
             a: of(&|_| 0.0),
             a_start: of(&|_| 0.0),
-            by_contacts: chain.has_resistance().then(|| [of(&|_| 0.0), of(&|_| 0.0)]),
+            by_contacts: chain.has_resistance().then(|| of(&|_| 0.0)),
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
             push: Bank::new(&places, &laws, 1.0),
@@ -234,8 +237,8 @@ impl<'a> Engine<'a> {
                 self.rates.resistance_n += resistance;
             }
             self.a[place] = (behind - net[place] - resistance) * self.per_kg[place];
-            if let Some([now, _]) = &mut self.by_contacts {
-                now[place] = (behind - net[place]) * self.per_kg[place];
+            if let Some(by_contacts) = &mut self.by_contacts {
+                by_contacts[place] = (behind - net[place]) * self.per_kg[place];
             }
             behind = net[place];
         }
@@ -335,43 +338,32 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Tells the watch where forces on bodies begin or change their sign in the step.
+    /// Tells the watch where forces on bodies have begun or changed their sign since the last
+    /// look.
     #[inline(always)]
-    fn follow<const N: usize>(&mut self, h: f64, method: Method) {
-        let a = self.by_contacts.as_ref().map_or(&self.a, |[now, _]| now);
+    fn look<const N: usize>(&mut self, ahead_s: f64) {
+        let a = self.by_contacts.as_ref().unwrap_or(&self.a);
         if self.watch.is_news::<N>(a) {
-            self.follow_bodies(h, ahead(method) * h);
+            self.follow_bodies(ahead_s);
         }
+        let a = self.by_contacts.as_ref().unwrap_or(&self.a);
+        self.watch.looked::<N>(a, self.end_s);
     }
 
     #[cold]
     #[inline(never)]
-    fn follow_bodies(&mut self, h: f64, ahead_s: f64) {
-        let (now, start) = match &self.by_contacts {
-            Some([now, start]) => (now, start),
-            None => (&self.a, &self.a_start),
-        };
+    fn follow_bodies(&mut self, ahead_s: f64) {
         for i in 0..self.chain.bodies().len() {
             let place = self.places.of(i);
-            self.watch.follow(
-                i,
-                &Stride {
-                    start_s: self.end_s - h,
-                    end_s: self.end_s,
-                    end_v: self.v[place] - ahead_s * self.a[place],
-                    start_a: start[place],
-                    end_a: now[place],
-                },
-            );
+            let v = self.v[place] - ahead_s * self.a[place];
+            let a = self.by_contacts.as_ref().unwrap_or(&self.a)[place];
+            self.watch.follow(i, self.end_s, v, a);
         }
     }
 
     #[inline(always)]
     fn next(&mut self) {
         std::mem::swap(&mut self.a, &mut self.a_start);
-        if let Some([now, start]) = &mut self.by_contacts {
-            std::mem::swap(now, start);
-        }
         self.push.next();
         if let Some(pull) = &mut self.pull {
             pull.next();
@@ -392,11 +384,12 @@ fn outputs<'a, const N: usize>(
 ) -> Result<(), SimulationError> {
     let h = engine.step_s;
     let ahead = ahead(method);
-    let mut done = 0;
+    let steps_per_look = (LOOK_S / h).max(1.0) as usize;
+    let (mut done, mut until_look) = (0, steps_per_look);
     for output in 1..=outputs {
         engine.kick::<N>(ahead * h);
         engine.on_wall(At::End, ahead * h);
-        for _ in 0..steps_per_output {
+        for step in 1..=steps_per_output {
             done += 1;
             engine.end_s = done as f64 * h;
             match method {
@@ -406,7 +399,11 @@ fn outputs<'a, const N: usize>(
             if !engine.missed.is_empty() {
                 engine.finish(h, method)?;
             }
-            engine.follow::<N>(h, method);
+            until_look -= 1;
+            if until_look == 0 || step == steps_per_output {
+                engine.look::<N>(ahead * h);
+                until_look = steps_per_look;
+            }
         }
         engine.kick::<N>(-ahead * h);
         engine.on_wall(At::End, -ahead * h);
