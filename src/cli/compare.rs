@@ -27,7 +27,8 @@ Rows: fe and fe_body are FE's own curves in the one-mass model, the floors for c
 for the body's motion; fdrm is the FE curve of one speed, nsdm the spring and damper fitted to that
 run; ddtcm the reference method's forest and spline; best the model that leaving speeds out chooses
 among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
-largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure.
+largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
+those under velocity and acceleration are taken at 10 kHz, as crumple rate takes them.
 With --train, a scenario whose curves are cases of a database runs with the curves of each method,
 and the vehicles' speeds are compared with FE's, which its [reference] names.")]
 pub struct Args {

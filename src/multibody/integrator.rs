@@ -131,7 +131,8 @@ pub struct InterfaceHistory {
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity.
     pub common_velocity_time_s: Option<f64>,
-    /// Speed of separation over speed of approach at the interface, once it has opened again.
+    /// Speed of separation over speed of approach at the interface, once it has opened again;
+    /// above 1 where neighbours drive the vehicles apart. `None` below 0.1 m/s of approach.
     pub restitution: Option<f64>,
 }
 
@@ -168,7 +169,7 @@ pub enum SimulationError {
     #[error("output_interval is {output_interval_s} s, longer than the duration of {duration_s} s")]
     Interval { output_interval_s: f64, duration_s: f64 },
     #[error(
-        "the run would take {steps:.0} steps of {step_s:e} s for {outputs:.0} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
+        "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
     )]
     TooLong { steps: f64, step_s: f64, outputs: f64, interface: String },
     #[error(
