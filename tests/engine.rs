@@ -245,6 +245,41 @@ fn no_chain_wins_energy() {
     }
 }
 
+/// Neighbours that press equally, on curves that hold one force, move by nothing but rounding from
+/// step to step, and over next to no way a work tells no force.
+#[test]
+fn chains_that_press_equally_win_no_energy() {
+    let mut random = Stream::seed_from_u64(5);
+    for k in 0..100 {
+        let bodies = random.gen_range(2..25_usize);
+        let wall = random.gen_bool(0.5);
+        let most_n = if random.gen_bool(0.5) { 1e6 } else { 1.5e6 };
+        let rise_m = random.gen_range(0.005..0.05);
+        let curve = Envelope::new(vec![0.0, rise_m, 1.0], vec![0.0, 1e6, most_n]).unwrap();
+        let unloading = if random.gen_bool(0.3) { Unloading::Elastic } else { memory() };
+        let law = || ForceLaw::new(curve.clone(), unloading, EnvelopeEnd::Hold);
+        let gap_m = [0.0, 0.02, 0.05][random.gen_range(0..3)];
+        let couples = random.gen_bool(0.4);
+        let moves = |i: usize| if wall || i < bodies / 2 { 8.0 } else { 0.0 };
+        let row = (0..bodies).map(|i| Body::new(format!("A{i}"), 20.0 * TONNES, moves(i)));
+        let interfaces = (1..bodies + usize::from(wall)).map(|i| {
+            let interface = Interface::new(format!("I{i}"), law(), gap_m);
+            if couples && i < bodies { interface.with_tension(law(), 0.0) } else { interface }
+        });
+        let chain = Chain::new(row.collect(), interfaces.collect()).unwrap();
+        for (method, step_s) in [
+            (Method::Verlet, 1e-5),
+            (Method::Verlet, 5e-5),
+            (Method::Verlet, 1.5e-4),
+            (Method::FourthOrder, 3.5e-4),
+        ] {
+            let settings = RunSettings::new(2.0, 3e-3).with_method(method).with_step(step_s);
+            let error = simulate(&chain, &settings).unwrap().ledger.max_energy_error;
+            assert!(error < 1e-5, "chain {k}, {method:?}, {step_s} s: energy {error:e}");
+        }
+    }
+}
+
 /// A 24 t body at 40/3 m/s against a wall.
 fn against_wall(interface: Interface) -> Chain {
     Chain::new(vec![Body::new("car", 24.0 * TONNES, 40.0 / 3.0)], vec![interface]).unwrap()
@@ -596,6 +631,60 @@ fn a_straight_branch_of_many_points_is_the_line() {
     }
 }
 
+/// A contact ends where its force does, whatever happens then: a curve that falls to zero, an
+/// elastic curve that goes back over a stretch without force, a damper that opens before its
+/// spring, neighbours that press with the same force.
+#[test]
+fn mean_decelerations_end_with_the_force() {
+    let curve = |d: &[f64], f: &[f64]| Envelope::new(d.to_vec(), f.to_vec()).unwrap();
+    let body = |name: &str, v: f64| Body::new(name, 20.0 * TONNES, v);
+    let wall = |speed: f64, interface: Interface| {
+        Chain::new(vec![body("A", speed)], vec![interface]).unwrap()
+    };
+    let law = |envelope, unloading, end| ForceLaw::new(envelope, unloading, end);
+    let elastic = |envelope| law(envelope, Unloading::Elastic, EnvelopeEnd::Slope);
+    let falls = curve(&[0.0, 0.1, 0.2, 0.3, 5.0], &[0.0, 1e6, 1e6, 0.0, 0.0]);
+    let late = curve(&[0.0, 0.1, 1.0], &[0.0, 0.0, 9e6]);
+    let spring = curve(&[0.0, 1.0], &[0.0, 5e6]);
+    let damper = Damping::constant(4e5).unwrap();
+    let fall = Interface::new("A|wall", law(falls, memory(), EnvelopeEnd::Hold), 0.0);
+    let damped = Interface::new("A|wall", elastic(spring), 0.0).with_damping(damper);
+    let plateau = || curve(&[0.0, 0.02, 1.0], &[0.0, 1e6, 1.5e6]);
+    let row: Vec<Body> = (0..20).map(|i| body(&format!("A{i}"), 8.0)).collect();
+    let between = (0..20)
+        .map(|i| Interface::new(format!("I{i}"), law(plateau(), memory(), EnvelopeEnd::Hold), 0.05))
+        .collect();
+    let chains = [
+        wall(10.0, fall),
+        wall(5.0, Interface::new("A|wall", elastic(late), 0.0)),
+        wall(5.0, damped),
+        Chain::new(row, between).unwrap(),
+    ];
+    for (k, chain) in chains.iter().enumerate() {
+        let fine = run(chain, &RunSettings::new(2.0, 5e-5).with_step(5e-5));
+        for method in [Method::Verlet, Method::FourthOrder, Method::Reference] {
+            if method == Method::FourthOrder && chain.has_rates() {
+                continue;
+            }
+            for duration_s in [2.0, 3.0] {
+                let coarse = run(chain, &RunSettings::new(duration_s, 5e-3).with_method(method));
+                for (i, body) in chain.bodies().iter().enumerate() {
+                    let (exact, length_s) = mean_of_histories(&fine, i, body.mass_kg);
+                    assert!(length_s < 1.9, "chain {k}: body {i} over {length_s} s");
+                    let found = coarse.bodies[i].mean_deceleration_m_per_s2;
+                    let error = (found / exact - 1.0).abs();
+                    // Between equal neighbours the force dies away without an end.
+                    let limit = if k == 3 { 0.04 } else { 0.01 };
+                    assert!(
+                        error < limit,
+                        "chain {k}, {method:?}: {found} for {exact} of body {i}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// A contact counts from where its force begins, whatever announces it: a curve that begins
 /// without force, a coupling, or brakes that act already.
 #[test]
@@ -637,23 +726,32 @@ fn mean_decelerations_begin_with_the_force() {
 }
 
 /// Mean deceleration by its definition from fine histories: over the first stretch of time in
-/// which the net force has one sign and reaches 1 kN and 0.5 % of its largest.
-fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> f64 {
-    let (a, v) = (&run.bodies[body].a_m_per_s2, &run.bodies[body].v_m_per_s);
+/// which the net force has one sign and exceeds 1 kN, but for at most 0.3 ms, and reaches 0.5 % of
+/// its largest; and how long that is, in s.
+fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> (f64, f64) {
+    let (a, v, times) = (&run.bodies[body].a_m_per_s2, &run.bodies[body].v_m_per_s, &run.time_s);
     let most = a.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
-    let mut begin = 0;
-    for end in 1..=a.len() {
-        if end < a.len() && a[end] * a[begin] > 0.0 {
-            continue;
+    let exceeds = |t: usize, sign: f64| a[t] * sign * mass_kg > 1e3;
+    let mut from = 0;
+    while let Some(first) = (from..a.len()).find(|&t| exceeds(t, a[t].signum())) {
+        let sign = a[first].signum();
+        let mut end = first;
+        while let Some(next) = (end + 1..a.len()).find(|&t| exceeds(t, sign)) {
+            let gap_ends = times[next] - times[end] > 0.3e-3;
+            if gap_ends || (end + 1..next).any(|t| a[t] == 0.0 || a[t] * sign * mass_kg < -1e3) {
+                break;
+            }
+            end = next;
         }
-        let peak = a[begin..end].iter().fold(0.0_f64, |m, a| m.max(a.abs()));
-        if peak > 0.0 && peak >= 0.005 * most && peak * mass_kg >= 1e3 {
-            let (begin, end) = (begin.saturating_sub(1), end.min(a.len() - 1));
-            return (v[begin] - v[end]) / (run.time_s[end] - run.time_s[begin]);
+        let (begin, end) = (first.saturating_sub(1), (end + 1).min(a.len() - 1));
+        let peak = a[begin..=end].iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        if peak >= 0.005 * most && end > begin {
+            let length_s = times[end] - times[begin];
+            return ((v[begin] - v[end]) / length_s, length_s);
         }
-        begin = end.min(a.len() - 1);
+        from = end.max(first + 1);
     }
-    0.0
+    (0.0, f64::INFINITY)
 }
 
 /// The summary has them whatever the interval between the outputs.
@@ -674,14 +772,21 @@ fn mean_decelerations_do_not_depend_on_the_outputs() {
         ] {
             let coarse = run(&chain, &RunSettings::new(0.24, output_s).with_method(method));
             for (i, body) in chain.bodies().iter().enumerate() {
-                let exact = mean_of_histories(&fine, i, body.mass_kg);
+                let (exact, length_s) = mean_of_histories(&fine, i, body.mass_kg);
                 let found = coarse.bodies[i].mean_deceleration_m_per_s2;
-                errors.push((found - exact).abs() / exact.abs().max(0.1));
+                let error = (found - exact).abs() / exact.abs().max(0.1);
+                // Ends fall between two looks.
+                let limit = 1e-2 + 0.4e-3 / length_s;
+                assert!(
+                    error < limit,
+                    "{method:?}, {output_s} s: {found} for {exact} over {length_s} s"
+                );
+                errors.push(error);
             }
         }
     }
     errors.sort_by(f64::total_cmp);
     let at = |share: f64| errors[(errors.len() as f64 * share) as usize];
     println!("mean decelerations, median, 9 of 10, 49 of 50: {:?}", [0.5, 0.9, 0.98].map(at));
-    assert!(at(0.5) < 1e-3 && at(0.9) < 1e-2 && at(0.98) < 3e-2);
+    assert!(at(0.5) < 1e-3 && at(0.9) < 5e-3 && at(0.98) < 2e-2);
 }

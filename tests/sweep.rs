@@ -121,6 +121,21 @@ fn a_grid_is_run_in_its_stated_order() {
     assert_eq!(values, expected);
 }
 
+/// A crush zone is joined to its body: no gap of its curve can be varied.
+#[test]
+fn crush_zones_have_no_gap() {
+    let folder = Folder::new("");
+    let split = SCENARIO.replace(
+        "{ name = \"A1\", mass = \"24t\" }",
+        "{ name = \"A1\", mass = \"24t\", front = { mass = \"1t\", curve = \"soft\" } }",
+    );
+    let plan = "[sweep]\nvary = [ { what = \"gap\", curve = \"soft\", values = [\"1mm\"] } ]\n";
+    folder.put("s.toml", &format!("{split}{plan}"));
+    let error = folder.fails(1, "sweep s.toml -q -o out.csv");
+    assert!(error.contains("joins a crush zone to its body, where there is no gap"), "{error}");
+    assert_eq!(folder.names(), Vec::<String>::new());
+}
+
 /// A train that comes against the other has a speed below 0.
 #[test]
 fn oncoming_trains_have_their_speeds() {

@@ -262,6 +262,8 @@ fn wrong_trains_are_explained() {
     t(&limits, one, "mean_deceleration_g = -1: expected more than 0");
     let limits = limits.replace("= -1.0", "= 5.0\ntrains = [\"Z\"]");
     t(&limits, one, "[limits] trains: there is no train \"Z\": the scenario has A");
+    let none = limits.replace("[\"Z\"]", "[]");
+    t(&none, one, "[limits] trains is empty");
     let gap = nose.replace("unloading", "gap = \"1mm\", unloading");
     let zone = "vehicles = [ { name = \"A1\", mass = \"9t\", front = { mass = \"2t\", curve = \"nose\" } } ]";
     t(&gap, zone, "front of vehicle \"A1\" is joined to the body without one");

@@ -46,6 +46,8 @@ struct Limits {
     standard: String,
     edition: String,
     mean_deceleration_limit_g: f64,
+    /// Trains that it is for; null for all.
+    trains: Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     over: Vec<String>,
     statement: String,
@@ -235,6 +237,7 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
         standard: limits.standard.clone(),
         edition: limits.edition.clone(),
         mean_deceleration_limit_g: limits.mean_deceleration_g,
+        trains: limits.trains.clone(),
         over: prepared
             .order
             .iter()
@@ -289,12 +292,16 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
     output::table(out, &["body", &speed, "mean deceleration", "over 120 ms"], &rows)?;
     if let Some(limits) = &summary.limits {
         let over = match limits.over.is_empty() {
-            true => "no body".into(),
+            true => "no vehicle".into(),
             false => limits.over.join(", "),
+        };
+        let of = match &limits.trains {
+            Some(trains) => format!(", of train {}", trains.join(", ")),
+            None => String::new(),
         };
         writeln!(
             out,
-            "over {} g ({}:{}): {over}\n{}",
+            "over {} g ({}:{}{of}): {over}\n{}",
             limits.mean_deceleration_limit_g, limits.standard, limits.edition, limits.statement
         )?;
     }

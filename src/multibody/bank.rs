@@ -127,8 +127,10 @@ pub(super) struct Move {
     pub loads: bool,
     /// From no contact to some, at this deflection.
     pub closed_m: Option<f64>,
-    /// From a stretch of the envelope without force to one with some, at this deflection.
-    pub presses_m: Option<f64>,
+    /// The force has begun, at this deflection.
+    pub pressed_m: Option<f64>,
+    /// The force has fallen to zero, at this deflection.
+    pub released_m: Option<f64>,
     /// The force has fallen to zero.
     pub opened: bool,
 }
@@ -352,11 +354,7 @@ impl<'a> Bank<'a> {
         let mut what = Move::default();
         let piece = match (contact.stage, top_m) {
             // The next piece of the envelope, as a rule.
-            (Stage::Loading, None) => {
-                let (lanes, lane) = (&self.lanes[place.row()], place.lane());
-                what.presses_m = lanes.is_idle(lane).then_some(lanes.to_m[lane]);
-                contact.load(law, deflection)
-            }
+            (Stage::Loading, None) => contact.load(law, deflection),
             _ => {
                 if let Some(top_m) = top_m {
                     contact.turn(law, top_m.max(self.deflection_m[At::Start as usize][place]));
@@ -369,13 +367,23 @@ impl<'a> Bank<'a> {
                 };
                 let (lanes, lane) = (&self.lanes[place.row()], place.lane());
                 let was_open = lanes.from_m[lane] == f64::NEG_INFINITY;
-                let had_force = !lanes.is_idle(lane);
                 let is_open = piece.from_m == f64::NEG_INFINITY;
-                what.opened = is_open && had_force;
+                what.opened = is_open && !was_open;
                 what.closed_m = (was_open && !is_open).then_some(lanes.to_m[lane]);
                 piece
             }
         };
+        let (lanes, lane) = (&self.lanes[place.row()], place.lane());
+        if lanes.is_idle(lane) != piece.is_idle() {
+            let goes_up = deflection > lanes.to_m[lane];
+            let left_m = if goes_up { lanes.to_m[lane] } else { lanes.from_m[lane] };
+            match piece.is_idle() {
+                false => what.pressed_m = Some(left_m),
+                // While loading the old piece begins at the deflection reached.
+                true if goes_up => what.released_m = Some(left_m),
+                true => what.released_m = Some(piece.to_m),
+            }
+        }
         let force = piece.at_zero_n + piece.slope_n_per_m * deflection;
         if at == At::End && force > contact.peak_n {
             contact.peak_n = force;

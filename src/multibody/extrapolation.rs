@@ -108,8 +108,8 @@ impl Motion<'_> {
         rates
     }
 
-    /// Accelerations of the bodies by the forces between them, and whether any acts.
-    fn by_contacts(&self, y: &[f64]) -> Vec<(f64, bool)> {
+    /// Accelerations of the bodies by the forces between them.
+    fn by_contacts(&self, y: &[f64]) -> Vec<f64> {
         let mut behind_n = 0.0;
         let of = |(i, body): (usize, &Body)| {
             let mut ahead_n = 0.0;
@@ -117,9 +117,9 @@ impl Motion<'_> {
                 let contact = self.contact(y, i);
                 ahead_n = contact.spring_n + contact.damper_n;
             }
-            let found = ((behind_n - ahead_n) / body.mass_kg, behind_n != 0.0 || ahead_n != 0.0);
+            let a = (behind_n - ahead_n) / body.mass_kg;
             behind_n = ahead_n;
-            found
+            a
         };
         self.chain.bodies().iter().enumerate().map(of).collect()
     }
@@ -230,7 +230,6 @@ pub(super) fn run(
     let mut watch = Watch::new(chain, &places);
     let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
     let mut interfaces_j = record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
-    let mut contacts = motion.by_contacts(&y);
     for output in 1..=outputs {
         let end_s = output as f64 * settings.output_interval_s;
         let mut time_s = (output - 1) as f64 * settings.output_interval_s;
@@ -244,20 +243,14 @@ pub(super) fn run(
                 // The secant's step; it is taken anew until it ends at the turn.
                 h = share * step;
             } else if error <= 1.0 {
-                let (start_s, before) = (time_s, std::mem::replace(&mut y, next));
+                y = next;
                 time_s = if last { end_s } else { time_s + step };
-                let start = std::mem::replace(&mut contacts, motion.by_contacts(&y));
-                for i in 0..n {
-                    let ((start_a, acted), (end_a, acts)) = (start[i], contacts[i]);
-                    let end_v = y[n + i];
-                    watch.follow(i, time_s, end_v, end_a);
-                    if acted && !acts {
-                        // As if the force had fallen evenly.
-                        let acted_s = 2.0 * (end_v - before[n + i]) / start_a;
-                        watch.body(i, false, start_s + acted_s.clamp(0.0, step), end_v);
-                    }
+                let contacts = motion.by_contacts(&y);
+                for (i, &a) in contacts.iter().enumerate() {
+                    watch.follow(i, time_s, (y[n + i], 0.0), a);
                 }
-                watch.looked::<0>(&Rows::of(&places, n, |i| contacts[i].0), time_s);
+                let rows = |of: &dyn Fn(usize) -> f64| Rows::of(&places, n, of);
+                watch.looked::<0>(&rows(&|i| y[n + i]), &rows(&|i| contacts[i]), time_s);
                 for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
                     if interface.law.is_beyond_end(contact.deflection_m) {
@@ -343,10 +336,9 @@ fn record(
             history.a_m_per_s2.push(rates[n + i]);
         }
     }
-    let contacts = motion.by_contacts(y);
     let places = Places::new(n);
     let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, n, value);
-    watch.output_bodies::<0>(&of(&|i| y[n + i]), &of(&|i| contacts[i].0), time_s);
+    watch.output_bodies::<0>(&of(&|i| y[n + i]), time_s);
     if histories {
         run.time_s.push(time_s);
     }

@@ -103,9 +103,9 @@ pub struct BodyHistory {
     pub v_m_per_s: Vec<f64>,
     pub a_m_per_s2: Vec<f64>,
     pub final_v_m_per_s: f64,
-    /// Mean of `−a` from the first instant the body's net contact force differs from zero
-    /// until the contact opens or the force changes its sign; contacts below 1 kN and 0.5 % of the
-    /// largest net force do not count.
+    /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
+    /// changes its sign. Up to 1 kN, longer than a look of 0.25 ms, it does not act; contacts that
+    /// stay below 0.5 % of the largest net force do not count.
     pub mean_deceleration_m_per_s2: f64,
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.

@@ -179,6 +179,11 @@ impl Piece {
         let known = Known { deflection_m: to_m, force_n: 0.0, work_j, sum_jm };
         Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0, known }
     }
+
+    /// Whether it has no force.
+    pub fn is_idle(&self) -> bool {
+        self.slope_n_per_m == 0.0 && self.at_zero_n == 0.0
+    }
 }
 
 impl ForceLaw {

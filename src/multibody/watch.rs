@@ -17,15 +17,16 @@ pub(super) struct Watch {
     present: Present,
 }
 
-/// What every step and output asks of all bodies.
+/// What looks and outputs ask of all bodies.
 struct Present {
     /// 1 for bodies that no force acts on, else 0.
     is_free: Rows,
-    /// Between these an acceleration is nothing new: 0 and ±∞ in a span of known sign, else both
-    /// 0.
+    /// Between these an acceleration is nothing new: too small ones of a free body, all of its
+    /// sign in a span of known sign; in a span that is still to be looked at, everything is new.
     least: Rows,
     most: Rows,
-    /// Accelerations by contacts at the last look.
+    /// Speeds, and accelerations by contacts, at the last look.
+    seen_v: Rows,
     seen_a: Rows,
     seen_s: f64,
     /// Largest magnitude of the acceleration known of the open span.
@@ -51,14 +52,19 @@ struct Extremes {
     separation: Option<f64>,
 }
 
-/// A stretch of time in which a body's net contact force differs from zero, with one sign.
+/// A stretch of time in which a body's net contact force has one sign.
 #[derive(Clone, Copy, Default)]
 struct Span {
     begin_s: f64,
     begin_v: f64,
+    /// Known once it is closed or fades.
     end_s: f64,
     end_v: f64,
-    /// Largest magnitude of the acceleration at outputs and ends.
+    /// 0 until it is looked at.
+    sign: f64,
+    /// The force was too small to count at the last look.
+    fades: bool,
+    /// Largest magnitude of the acceleration at the looks, and at least its mean.
     peak: f64,
 }
 
@@ -67,14 +73,21 @@ struct Phase {
     mass_kg: f64,
     open: Option<Span>,
     closed: Vec<Span>,
+    /// Largest peak so far.
+    most: f64,
 }
 
-/// Contacts of which the first that counts is among them.
+/// Contacts that counted when they ended, of which the first that does so at last is among them.
 const MOST_SPANS: usize = 64;
-/// A contact counts if its net force reaches this and this share of the body's largest, as in
-/// finding the contact of an FE run.
+/// A contact counts while its net force exceeds this, if it reaches this share of the body's
+/// largest, as in finding the contact of an FE run. Without it rounding would decide: where
+/// vehicles touch without closing, what runs ahead of a shock grows from it, and where neighbours
+/// come to press equally, the force dies away without an end. What is back at the next look has
+/// not ended.
 const LEAST_N: f64 = 1e3;
 const LEAST_SHARE: f64 = 0.005;
+/// Time between looks, if steps are not longer: a line joins the forces there.
+pub(super) const LOOK_S: f64 = 0.25e-3;
 /// No restitution of what meets more slowly, in m/s: it would be a ratio to nothing.
 const SLOWEST_APPROACH: f64 = 0.1;
 
@@ -85,8 +98,9 @@ impl Watch {
         let none = || of(&|_| 0.0);
         let present = Present {
             is_free: of(&|_| 1.0),
-            least: none(),
-            most: none(),
+            least: of(&|i| -LEAST_N / bodies[i].mass_kg),
+            most: of(&|i| LEAST_N / bodies[i].mass_kg),
+            seen_v: none(),
             seen_a: none(),
             seen_s: 0.0,
             peak: none(),
@@ -110,7 +124,7 @@ impl Watch {
     }
 
     /// The force of interface `k` has fallen to zero while it opened with this speed.
-    pub fn opened(&mut self, k: usize, separation: f64) {
+    pub fn released(&mut self, k: usize, separation: f64) {
         let seen = &mut self.interfaces[k];
         if separation > 0.0 {
             seen.separation = seen.separation.or(Some(separation));
@@ -160,21 +174,24 @@ impl Watch {
 
     fn open(&mut self, i: usize, place: Place, span: Span) {
         self.bodies[i].open = Some(span);
-        let present = &mut self.present;
-        (present.is_free[place], present.peak[place]) = (0.0, 0.0);
-        (present.least[place], present.most[place]) = (0.0, 0.0);
+        (self.present.is_free[place], self.present.peak[place]) = (0.0, 0.0);
+        self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
     }
 
     fn close_span(&mut self, i: usize, place: Place, end_s: f64, end_v: f64) {
-        let (phase, present) = (&mut self.bodies[i], &mut self.present);
-        present.is_free[place] = 1.0;
-        (present.least[place], present.most[place]) = (0.0, 0.0);
-        let peak = present.peak[place];
-        if let Some(span) = phase.open.take()
-            && phase.closed.len() < MOST_SPANS
-        {
-            phase.closed.push(Span { end_s, end_v, peak, ..span });
-        }
+        let Some(span) = self.free(i, place) else { return };
+        let mean = (span.begin_v - end_v).abs() / (end_s - span.begin_s);
+        let peak = self.present.peak[place].max(if mean.is_finite() { mean } else { 0.0 });
+        self.bodies[i].close(Span { end_s, end_v, peak, ..span });
+    }
+
+    /// From here on no force acts on the body; the span that was open.
+    fn free(&mut self, i: usize, place: Place) -> Option<Span> {
+        let phase = &mut self.bodies[i];
+        let (least, span) = (LEAST_N / phase.mass_kg, phase.open.take());
+        self.present.is_free[place] = 1.0;
+        self.bound(place, (-least, least));
+        span
     }
 
     pub fn output_interface(&mut self, k: usize, deflection_m: f64, force_n: f64, time_s: f64) {
@@ -198,56 +215,90 @@ impl Watch {
         outside.iter().any(|&o| o > 0.0)
     }
 
-    /// Closes the span of body `i` where its net force has changed its sign since the last look;
-    /// learns the sign of a new one; opens those that no contact has announced: of couplings that
-    /// pull, and where a curve begins without force.
-    pub fn follow(&mut self, i: usize, end_s: f64, end_v: f64, end_a: f64) {
+    /// Closes the span of body `i` if its net force has fallen to zero or changed its sign since
+    /// the last look; learns the sign of a new one; opens those that no contact has announced. The
+    /// speed given is `ahead_s` ahead, as that of the last look was.
+    pub fn follow(&mut self, i: usize, end_s: f64, (end_v, ahead_s): (f64, f64), end_a: f64) {
         let place = self.places.of(i);
         let present = &self.present;
         let (start_s, start_a) = (present.seen_s, present.seen_a[place]);
-        if end_a == 0.0 || end_a >= present.least[place] && end_a <= present.most[place] {
+        let start_v = present.seen_v[place] - ahead_s * start_a;
+        let end_v = end_v - ahead_s * end_a;
+        if end_a >= present.least[place] && end_a <= present.most[place] {
             return;
         }
-        if self.bodies[i].open.is_none() {
-            // As if the force had grown evenly since it began.
-            let begin_v = present.free_speed[place];
-            let since_s = 2.0 * (end_v - begin_v) / end_a;
-            let begin_s = end_s - since_s.clamp(0.0, end_s - start_s);
-            self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
-        } else if present.least[place] != present.most[place] {
-            let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
-            let (begin_s, begin_v) = (end_s - left_s, end_v - 0.5 * end_a * left_s);
-            self.present.peak[place] = present.peak[place].max(start_a.abs());
-            self.close_span(i, place, begin_s, begin_v);
-            self.open(i, place, Span { begin_s, begin_v, ..Span::default() });
+        // Forces that begin or end are taken to have done so evenly.
+        let evenly = |a: f64| (2.0 * (end_v - start_v) / a).clamp(0.0, end_s - start_s);
+        let least = LEAST_N / self.bodies[i].mass_kg;
+        let is_small = end_a.abs() <= least;
+        let mut begin = (end_s - evenly(end_a), present.free_speed[place]);
+        match self.bodies[i].open {
+            None => {}
+            Some(span) if span.sign == 0.0 => begin = (span.begin_s, span.begin_v),
+            Some(span) if is_small && !span.fades => {
+                let ends_s = if end_a == 0.0 { start_s + evenly(start_a) } else { end_s };
+                self.bodies[i].open = Some(Span { fades: true, end_s: ends_s, end_v, ..span });
+                return self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
+            }
+            Some(span) if !is_small && end_a * span.sign > 0.0 => {
+                self.bodies[i].open = Some(Span { fades: false, ..span });
+                return self.bound_sign(place, span.sign, least);
+            }
+            Some(span) if is_small && end_s - span.end_s < 0.5 * LOOK_S => return,
+            Some(span) if span.fades => self.close_span(i, place, span.end_s, span.end_v),
+            Some(_) => {
+                let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
+                begin = (end_s - left_s, end_v - 0.5 * end_a * left_s);
+                self.close_span(i, place, begin.0, begin.1);
+            }
         }
-        let present = &mut self.present;
-        present.peak[place] = end_a.abs();
-        match end_a > 0.0 {
-            true => present.most[place] = f64::INFINITY,
-            false => present.least[place] = f64::NEG_INFINITY,
+        if is_small {
+            self.free(i, place);
+            self.present.free_speed[place] = end_v;
+            return;
         }
+        let ((begin_s, begin_v), sign) = (begin, end_a.signum());
+        self.open(i, place, Span { begin_s, begin_v, sign, ..Span::default() });
+        self.bound_sign(place, sign, least);
     }
 
-    /// Ends a look at the accelerations by contact forces.
-    #[inline(always)]
-    pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
-        let n = self.places.known::<N>();
-        self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
-        self.present.seen_s = at_s;
+    /// An acceleration between these will be nothing new.
+    fn bound(&mut self, place: Place, (least, most): (f64, f64)) {
+        (self.present.least[place], self.present.most[place]) = (least, most);
     }
 
-    /// Speeds of all bodies at an output, and accelerations by contact forces.
+    fn bound_sign(&mut self, place: Place, sign: f64, least: f64) {
+        self.bound(
+            place,
+            match sign > 0.0 {
+                true => (least, f64::INFINITY),
+                false => (f64::NEG_INFINITY, -least),
+            },
+        );
+    }
+
+    /// Ends a look at speeds and accelerations by contact forces.
     #[inline(always)]
-    pub fn output_bodies<const N: usize>(&mut self, v: &Rows, a: &Rows, time_s: f64) {
+    pub fn looked<const N: usize>(&mut self, v: &Rows, a: &Rows, at_s: f64) {
         let n = self.places.known::<N>();
-        let (vs, accelerations) = (v.values(n), a.values(n));
-        let Present { is_free, peak, free_speed, .. } = &mut self.present;
-        let (is_free, peak) = (is_free.values(n), peak.values_mut(n));
-        let free_speed = free_speed.values_mut(n);
+        let Present { seen_v, seen_a, peak, seen_s, .. } = &mut self.present;
+        seen_v.values_mut(n).copy_from_slice(v.values(n));
+        seen_a.values_mut(n).copy_from_slice(a.values(n));
+        for (peak, a) in peak.values_mut(n).iter_mut().zip(a.values(n)) {
+            *peak = larger(*peak, each(|j| a[j].abs()));
+        }
+        *seen_s = at_s;
+    }
+
+    /// Speeds of all bodies at an output.
+    #[inline(always)]
+    pub fn output_bodies<const N: usize>(&mut self, v: &Rows, time_s: f64) {
+        let n = self.places.known::<N>();
+        let vs = v.values(n);
+        let Present { is_free, free_speed, .. } = &mut self.present;
+        let (is_free, free_speed) = (is_free.values(n), free_speed.values_mut(n));
         for c in 0..n {
-            let (v, a) = (vs[c], accelerations[c]);
-            peak[c] = larger(peak[c], each(|j| a[j].abs()));
+            let v = vs[c];
             free_speed[c] = each(|j| if is_free[c][j] > 0.0 { v[j] } else { free_speed[c][j] });
         }
         self.present.v.values_mut(n).copy_from_slice(vs);
@@ -258,7 +309,11 @@ impl Watch {
     pub fn close(mut self, run: &mut Run, record: Record, interval_s: f64) {
         for i in 0..self.bodies.len() {
             let place = self.places.of(i);
-            self.close_span(i, place, self.present.time_s, self.present.v[place]);
+            let mut end = (self.present.time_s, self.present.v[place]);
+            if let Some(span) = self.bodies[i].open.filter(|span| span.fades) {
+                end = (span.end_s, span.end_v);
+            }
+            self.close_span(i, place, end.0, end.1);
             run.bodies[i].final_v_m_per_s = self.present.v[place];
         }
         for (history, seen) in run.interfaces.iter_mut().zip(self.interfaces) {
@@ -286,15 +341,26 @@ impl Watch {
 }
 
 impl Phase {
+    /// Keeps a span that may count: those before it may be many that do not.
+    fn close(&mut self, span: Span) {
+        self.most = self.most.max(span.peak);
+        if self.counts(&span) && self.closed.len() < MOST_SPANS {
+            self.closed.push(span);
+        }
+    }
+
+    /// Whether a span counts beside the largest so far.
+    fn counts(&self, span: &Span) -> bool {
+        span.peak >= LEAST_SHARE * self.most
+            && span.peak * self.mass_kg >= LEAST_N
+            && span.end_s > span.begin_s
+    }
+
     /// Over the first contact that counts; 0 without one.
     fn mean_deceleration(&self) -> f64 {
-        let most = self.closed.iter().map(|s| s.peak).fold(0.0, f64::max);
-        let counts = |s: &&Span| {
-            s.peak >= LEAST_SHARE * most && s.peak * self.mass_kg >= LEAST_N && s.end_s > s.begin_s
-        };
         self.closed
             .iter()
-            .find(counts)
+            .find(|span| self.counts(span))
             .map_or(0.0, |s| (s.begin_v - s.end_v) / (s.end_s - s.begin_s))
     }
 }

@@ -7,8 +7,7 @@ use super::check::check;
 use super::layout::{Layout, Role, Slot, layout};
 use super::spring::{SpringError, spring};
 use super::{
-    InterfaceSpeed, LimitsTable, Prepared, Scenario, ScenarioError, Source, Sources, TrainTable,
-    Used, VehicleTable, local,
+    InterfaceSpeed, LimitsTable, Prepared, Scenario, ScenarioError, Source, Sources, Used, local,
 };
 use crate::multibody::{Chain, Damping, ForceLaw, Interface, Method, RunSettings, Tension};
 use crate::unit::SpeedKind;
@@ -102,21 +101,19 @@ pub(super) fn assemble_at(
     Ok(Prepared { chain, settings, order, used, limits, limited, warnings })
 }
 
-/// The bodies of the trains that limits hold for; `order` lists the bodies of all trains.
+/// The bodies of the vehicles that limits hold for; `order` lists those of all trains, each vehicle
+/// before its crush zones.
 fn limited(scenario: &Scenario, order: &[usize], limits: &LimitsTable) -> Vec<usize> {
-    let bodies_of = |train: &TrainTable| -> usize {
-        let zones =
-            |v: &VehicleTable| usize::from(v.front.is_some()) + usize::from(v.rear.is_some());
-        train.vehicles.iter().map(|v| 1 + zones(v)).sum()
-    };
-    let mut rest = order;
+    let mut bodies = order.iter();
     let mut limited = Vec::new();
     for train in &scenario.train {
-        let (own, others) = rest.split_at(bodies_of(train));
-        if limits.trains.as_ref().is_none_or(|trains| trains.contains(&train.name)) {
-            limited.extend(own);
+        let counts = limits.trains.as_ref().is_none_or(|trains| trains.contains(&train.name));
+        for vehicle in &train.vehicles {
+            limited.extend(bodies.next().filter(|_| counts));
+            for _zone in vehicle.front.iter().chain(&vehicle.rear) {
+                bodies.next();
+            }
         }
-        rest = others;
     }
     limited
 }

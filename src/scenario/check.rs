@@ -31,7 +31,11 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
     {
         return Err(format!("two trains are named \"{}\": give them different names", first.name));
     }
-    for name in scenario.limits.iter().flat_map(|l| l.trains.iter().flatten()) {
+    let trains = scenario.limits.as_ref().and_then(|limits| limits.trains.as_ref());
+    if trains.is_some_and(Vec::is_empty) {
+        return Err("[limits] trains is empty: name one, or leave it away for all".into());
+    }
+    for name in trains.into_iter().flatten() {
         if !scenario.train.iter().any(|train| train.name == *name) {
             let known: Vec<&str> = scenario.train.iter().map(|t| t.name.as_str()).collect();
             return Err(format!(
@@ -72,7 +76,11 @@ pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
             for (zone, end) in [(&vehicle.front, "front"), (&vehicle.rear, "rear")] {
                 let Some(zone) = zone else { continue };
                 take(format!("{name} {end}"))?;
-                if scenario.curves.get(&zone.curve).is_some_and(|c| c.gap.is_some()) {
+                if scenario
+                    .curves
+                    .get(&zone.curve)
+                    .is_some_and(|c| c.gap.is_some_and(|gap| gap.0 > 0.0))
+                {
                     return Err(format!(
                         "curve \"{}\" has a gap, but {end} of vehicle \"{name}\" is joined to the body without one: give it a curve without gap",
                         zone.curve

@@ -45,7 +45,8 @@ pub struct LimitsTable {
     pub edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
     pub mean_deceleration_g: f64,
-    /// Trains whose vehicles are held against it, by name; all if absent.
+    /// Trains whose vehicles (without crush zones that are masses of their own) are held against
+    /// it, by name; all if absent.
     pub trains: Option<Vec<String>>,
 }
 

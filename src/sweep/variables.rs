@@ -85,6 +85,12 @@ impl Binder<'_> {
             What::Gap => match (&vary.curve, vary.interface.as_deref()) {
                 (Some(curve), None) => {
                     self.check_curve(curve)?;
+                    let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
+                    if vehicles.any(|v| v.front.iter().chain(&v.rear).any(|z| z.curve == *curve)) {
+                        return Err(format!(
+                            "curve \"{curve}\" joins a crush zone to its body, where there is no gap"
+                        ));
+                    }
                     if vary.factor && self.scenario.curves[curve].gap.is_none() {
                         return Err(format!(
                             "curve \"{curve}\" has no gap that a factor could change"

@@ -5,6 +5,10 @@ use super::super::integrator::{Method, SimulationError};
 use super::super::rows::Place;
 use super::{Engine, ahead};
 
+/// Rounding of a sum of works, and the share of a force from which on it counts as noise.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+const NOISE: f64 = 1e-5;
+
 /// An interface that has left its piece within the step.
 pub(super) struct Missed {
     pulls: bool,
@@ -77,7 +81,8 @@ impl<'a> Engine<'a> {
         let seen = &mut self.missed[known].what;
         seen.loads |= what.loads;
         seen.closed_m = seen.closed_m.or(what.closed_m);
-        seen.presses_m = seen.presses_m.or(what.presses_m);
+        seen.pressed_m = seen.pressed_m.or(what.pressed_m);
+        seen.released_m = seen.released_m.or(what.released_m);
         seen.opened |= what.opened;
     }
 
@@ -116,7 +121,9 @@ impl<'a> Engine<'a> {
         for m in &missed {
             self.check_end(m)?;
             let (impulse, moment) = match m.turn {
-                Some(turn) if !(m.what.loads || m.what.opened) => turn.missed(h, method),
+                Some(turn) if !(m.what.loads || m.what.released_m.is_some()) => {
+                    turn.missed(h, method)
+                }
                 Some(_) => (0.0, 0.0),
                 None => self.missed_along(m, h, method),
             };
@@ -161,25 +168,21 @@ impl<'a> Engine<'a> {
             let closing = self.closing(k) - behind * rate;
             let bank = self.bank(m.pulls);
             let (start, end) = (bank.deflection_m(At::Start, k), bank.deflection_m(At::End, k));
-            let opens_at_m = bank.opens_at_m(k);
             let end_s = self.end_s;
             let crossing = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
-            if m.what.loads && start <= 0.0 {
-                if !m.pulls {
-                    // What the contact has not yet braked.
-                    let before = closing - h * rate * end / (end - start);
-                    self.watch.contact(k, before.max(closing));
-                }
-                self.watch_sides(k, crossing(0.0), behind);
+            if m.what.loads && start <= 0.0 && !m.pulls {
+                // What the contact has not yet braked.
+                let before = closing - h * rate * end / (end - start);
+                self.watch.contact(k, before.max(closing));
             }
-            if let Some(at_m) = m.what.presses_m {
+            if let Some(at_m) = m.what.pressed_m {
                 self.watch_sides(k, crossing(at_m), behind);
             }
-            if m.what.opened {
+            if let Some(at_m) = m.what.released_m {
                 if !m.pulls {
-                    self.watch.opened(k, -closing);
+                    self.watch.released(k, -closing);
                 }
-                self.watch_sides(k, crossing(opens_at_m), behind);
+                self.watch_sides(k, crossing(at_m), behind);
             }
         }
     }
@@ -207,6 +210,12 @@ impl<'a> Engine<'a> {
         // The same from the law, at constant speed.
         let (work_j, sum_jm) = bank.work(At::End, place);
         let mean = (work_j - m.work_j) / moved;
+        // Over next to no way the difference of two works is nothing but their rounding.
+        let scale = mean.abs().max(first.abs()).max(last.abs());
+        let noise = ROUNDING * (work_j.abs() + m.work_j.abs()) / moved.abs();
+        if noise > NOISE * scale {
+            return (0.0, 0.0);
+        }
         let ahead = (sum_jm - m.sum_jm - m.work_j * moved) / (moved * moved);
         // What the speed's change adds to the mean: the path leaves the straight one by
         // `bend τ(τ − 1)`, whose product with the law's slope is integrated by parts. Not near a
@@ -214,7 +223,9 @@ impl<'a> Engine<'a> {
         let sign = if m.pulls { -1.0 } else { 1.0 };
         let rates = self.between(&self.a_start, m.k) + self.between(&self.a, m.k);
         let bend = 0.25 * h * h * sign * rates;
-        if bend.abs() > 0.5 * moved.abs() {
+        let sums = sum_jm.abs() + m.sum_jm.abs() + (m.work_j * moved).abs();
+        let noise = ROUNDING * sums / (moved * moved) * (bend.abs() + 1e-3 * moved.abs());
+        if bend.abs() > 0.5 * moved.abs() || noise > NOISE * scale * moved.abs() {
             return (h * (mean - by_rule), 0.0);
         }
         let mean = mean + bend / moved * (2.0 * ahead - mean);

@@ -16,12 +16,9 @@ use super::bank::{At, Bank};
 use super::integrator::{Method, Record, Run, SimulationError};
 use super::rows::{Place, Places, Rows, behind, each};
 use super::train::{Chain, Tension};
-use super::watch::Watch;
+use super::watch::{LOOK_S, Watch};
 use events::Missed;
 use outputs::Recorder;
-
-/// Between looks at the signs of the forces, which a line joins; longer steps have one each.
-const LOOK_S: f64 = 0.25e-3;
 
 /// Everything that changes from step to step.
 pub(super) struct Engine<'a> {
@@ -347,7 +344,7 @@ impl<'a> Engine<'a> {
             self.follow_bodies(ahead_s);
         }
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
-        self.watch.looked::<N>(a, self.end_s);
+        self.watch.looked::<N>(&self.v, a, self.end_s);
     }
 
     #[cold]
@@ -355,9 +352,8 @@ impl<'a> Engine<'a> {
     fn follow_bodies(&mut self, ahead_s: f64) {
         for i in 0..self.chain.bodies().len() {
             let place = self.places.of(i);
-            let v = self.v[place] - ahead_s * self.a[place];
             let a = self.by_contacts.as_ref().unwrap_or(&self.a)[place];
-            self.watch.follow(i, self.end_s, v, a);
+            self.watch.follow(i, self.end_s, (self.v[place], ahead_s), a);
         }
     }
 

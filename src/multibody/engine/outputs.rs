@@ -134,8 +134,7 @@ impl Engine<'_> {
             momentum: momentum.iter().sum(),
             impulse: self.wall_impulse + self.rates.impulse,
         });
-        let a = self.by_contacts.as_ref().unwrap_or(&self.a);
-        self.watch.output_bodies::<N>(&self.v, a, time_s);
+        self.watch.output_bodies::<N>(&self.v, time_s);
         let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
         recorder.recent.keep(0, n, |c| v[c]);
         if recorder.record == Record::Histories {
