@@ -726,32 +726,31 @@ fn mean_decelerations_begin_with_the_force() {
 }
 
 /// Mean deceleration by its definition from fine histories: over the first stretch of time in
-/// which the net force has one sign and exceeds 1 kN, but for at most 0.3 ms, and reaches 0.5 % of
-/// its largest; and how long that is, in s.
+/// which the net force has one sign and exceeds 1 kN, but for at most 0.3 ms, and changes the speed
+/// by 0.5 % of the largest change; and how long that is, in s.
 fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> (f64, f64) {
     let (a, v, times) = (&run.bodies[body].a_m_per_s2, &run.bodies[body].v_m_per_s, &run.time_s);
-    let most = a.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
     let exceeds = |t: usize, sign: f64| a[t] * sign * mass_kg > 1e3;
-    let mut from = 0;
+    let (mut from, mut stretches) = (0, Vec::new());
     while let Some(first) = (from..a.len()).find(|&t| exceeds(t, a[t].signum())) {
         let sign = a[first].signum();
         let mut end = first;
         while let Some(next) = (end + 1..a.len()).find(|&t| exceeds(t, sign)) {
-            let gap_ends = times[next] - times[end] > 0.3e-3;
-            if gap_ends || (end + 1..next).any(|t| a[t] == 0.0 || a[t] * sign * mass_kg < -1e3) {
+            let has_ended = times[next] - times[end] > 0.3e-3;
+            if has_ended || (end + 1..next).any(|t| a[t] == 0.0 || a[t] * sign * mass_kg < -1e3) {
                 break;
             }
             end = next;
         }
         let (begin, end) = (first.saturating_sub(1), (end + 1).min(a.len() - 1));
-        let peak = a[begin..=end].iter().fold(0.0_f64, |m, a| m.max(a.abs()));
-        if peak >= 0.005 * most && end > begin {
-            let length_s = times[end] - times[begin];
-            return ((v[begin] - v[end]) / length_s, length_s);
+        if end > begin {
+            stretches.push((v[begin] - v[end], times[end] - times[begin]));
         }
         from = end.max(first + 1);
     }
-    (0.0, f64::INFINITY)
+    let most = stretches.iter().map(|s| s.0.abs()).fold(0.0, f64::max);
+    let first = stretches.into_iter().find(|s| s.0.abs() >= 0.005 * most);
+    first.map_or((0.0, f64::INFINITY), |(change, length_s)| (change / length_s, length_s))
 }
 
 /// The summary has them whatever the interval between the outputs.

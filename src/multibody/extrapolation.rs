@@ -247,10 +247,9 @@ pub(super) fn run(
                 time_s = if last { end_s } else { time_s + step };
                 let contacts = motion.by_contacts(&y);
                 for (i, &a) in contacts.iter().enumerate() {
-                    watch.follow(i, time_s, (y[n + i], 0.0), a);
+                    watch.follow(i, time_s, y[n + i], a);
                 }
-                let rows = |of: &dyn Fn(usize) -> f64| Rows::of(&places, n, of);
-                watch.looked::<0>(&rows(&|i| y[n + i]), &rows(&|i| contacts[i]), time_s);
+                watch.looked::<0>(&Rows::of(&places, n, |i| contacts[i]), time_s);
                 for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
                     if interface.law.is_beyond_end(contact.deflection_m) {

@@ -105,7 +105,7 @@ pub struct BodyHistory {
     pub final_v_m_per_s: f64,
     /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
     /// changes its sign. Up to 1 kN, longer than a look of 0.25 ms, it does not act; contacts that
-    /// stay below 0.5 % of the largest net force do not count.
+    /// change the speed by less than 0.5 % of the largest change do not count.
     pub mean_deceleration_m_per_s2: f64,
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.

@@ -25,12 +25,9 @@ struct Present {
     /// sign in a span of known sign; in a span that is still to be looked at, everything is new.
     least: Rows,
     most: Rows,
-    /// Speeds, and accelerations by contacts, at the last look.
-    seen_v: Rows,
+    /// Accelerations by contacts at the last look.
     seen_a: Rows,
     seen_s: f64,
-    /// Largest magnitude of the acceleration known of the open span.
-    peak: Rows,
     /// Speed before the contact.
     free_speed: Rows,
     /// Speeds at the last output.
@@ -64,8 +61,6 @@ struct Span {
     sign: f64,
     /// The force was too small to count at the last look.
     fades: bool,
-    /// Largest magnitude of the acceleration at the looks, and at least its mean.
-    peak: f64,
 }
 
 #[derive(Clone, Default)]
@@ -73,17 +68,17 @@ struct Phase {
     mass_kg: f64,
     open: Option<Span>,
     closed: Vec<Span>,
-    /// Largest peak so far.
+    /// Largest change of speed so far.
     most: f64,
 }
 
 /// Contacts that counted when they ended, of which the first that does so at last is among them.
 const MOST_SPANS: usize = 64;
-/// A contact counts while its net force exceeds this, if it reaches this share of the body's
-/// largest, as in finding the contact of an FE run. Without it rounding would decide: where
-/// vehicles touch without closing, what runs ahead of a shock grows from it, and where neighbours
-/// come to press equally, the force dies away without an end. What is back at the next look has
-/// not ended.
+/// A contact counts while its net force exceeds this, as in finding the contact of an FE run, if it
+/// changes the body's speed by this share of the largest change. Without it rounding would decide:
+/// where vehicles touch without closing, what runs ahead of a shock grows from it, and where
+/// neighbours come to press equally, the force dies away without an end. What is back at the next
+/// look has not ended.
 const LEAST_N: f64 = 1e3;
 const LEAST_SHARE: f64 = 0.005;
 /// Time between looks, if steps are not longer: a line joins the forces there.
@@ -100,10 +95,8 @@ impl Watch {
             is_free: of(&|_| 1.0),
             least: of(&|i| -LEAST_N / bodies[i].mass_kg),
             most: of(&|i| LEAST_N / bodies[i].mass_kg),
-            seen_v: none(),
             seen_a: none(),
             seen_s: 0.0,
-            peak: none(),
             free_speed: of(&|i| bodies[i].speed_m_per_s),
             time_s: 0.0,
             v: none(),
@@ -174,15 +167,13 @@ impl Watch {
 
     fn open(&mut self, i: usize, place: Place, span: Span) {
         self.bodies[i].open = Some(span);
-        (self.present.is_free[place], self.present.peak[place]) = (0.0, 0.0);
+        self.present.is_free[place] = 0.0;
         self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
     }
 
     fn close_span(&mut self, i: usize, place: Place, end_s: f64, end_v: f64) {
         let Some(span) = self.free(i, place) else { return };
-        let mean = (span.begin_v - end_v).abs() / (end_s - span.begin_s);
-        let peak = self.present.peak[place].max(if mean.is_finite() { mean } else { 0.0 });
-        self.bodies[i].close(Span { end_s, end_v, peak, ..span });
+        self.bodies[i].close(Span { end_s, end_v, ..span });
     }
 
     /// From here on no force acts on the body; the span that was open.
@@ -216,27 +207,29 @@ impl Watch {
     }
 
     /// Closes the span of body `i` if its net force has fallen to zero or changed its sign since
-    /// the last look; learns the sign of a new one; opens those that no contact has announced. The
-    /// speed given is `ahead_s` ahead, as that of the last look was.
-    pub fn follow(&mut self, i: usize, end_s: f64, (end_v, ahead_s): (f64, f64), end_a: f64) {
+    /// the last look; learns the sign of a new one; opens those that no contact has announced.
+    pub fn follow(&mut self, i: usize, end_s: f64, end_v: f64, end_a: f64) {
         let place = self.places.of(i);
         let present = &self.present;
         let (start_s, start_a) = (present.seen_s, present.seen_a[place]);
-        let start_v = present.seen_v[place] - ahead_s * start_a;
-        let end_v = end_v - ahead_s * end_a;
         if end_a >= present.least[place] && end_a <= present.most[place] {
             return;
         }
-        // Forces that begin or end are taken to have done so evenly.
-        let evenly = |a: f64| (2.0 * (end_v - start_v) / a).clamp(0.0, end_s - start_s);
         let least = LEAST_N / self.bodies[i].mass_kg;
         let is_small = end_a.abs() <= least;
-        let mut begin = (end_s - evenly(end_a), present.free_speed[place]);
+        // As if the force had grown evenly since it began.
+        let since_s = 2.0 * (end_v - present.free_speed[place]) / end_a;
+        let begin_s = end_s - since_s.clamp(0.0, end_s - start_s);
+        let mut begin = (begin_s, present.free_speed[place]);
         match self.bodies[i].open {
             None => {}
             Some(span) if span.sign == 0.0 => begin = (span.begin_s, span.begin_v),
+            Some(_) if end_a == 0.0 => {
+                self.close_span(i, place, 0.5 * (start_s + end_s), end_v);
+            }
             Some(span) if is_small && !span.fades => {
-                let ends_s = if end_a == 0.0 { start_s + evenly(start_a) } else { end_s };
+                // Somewhere in between.
+                let ends_s = 0.5 * (start_s + end_s);
                 self.bodies[i].open = Some(Span { fades: true, end_s: ends_s, end_v, ..span });
                 return self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
             }
@@ -244,7 +237,7 @@ impl Watch {
                 self.bodies[i].open = Some(Span { fades: false, ..span });
                 return self.bound_sign(place, span.sign, least);
             }
-            Some(span) if is_small && end_s - span.end_s < 0.5 * LOOK_S => return,
+            Some(span) if is_small && end_s - span.end_s < LOOK_S => return,
             Some(span) if span.fades => self.close_span(i, place, span.end_s, span.end_v),
             Some(_) => {
                 let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
@@ -277,17 +270,12 @@ impl Watch {
         );
     }
 
-    /// Ends a look at speeds and accelerations by contact forces.
+    /// Ends a look at accelerations by contact forces.
     #[inline(always)]
-    pub fn looked<const N: usize>(&mut self, v: &Rows, a: &Rows, at_s: f64) {
+    pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
         let n = self.places.known::<N>();
-        let Present { seen_v, seen_a, peak, seen_s, .. } = &mut self.present;
-        seen_v.values_mut(n).copy_from_slice(v.values(n));
-        seen_a.values_mut(n).copy_from_slice(a.values(n));
-        for (peak, a) in peak.values_mut(n).iter_mut().zip(a.values(n)) {
-            *peak = larger(*peak, each(|j| a[j].abs()));
-        }
-        *seen_s = at_s;
+        self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
+        self.present.seen_s = at_s;
     }
 
     /// Speeds of all bodies at an output.
@@ -340,10 +328,17 @@ impl Watch {
     }
 }
 
+impl Span {
+    /// Magnitude of the change of speed.
+    fn change(&self) -> f64 {
+        (self.begin_v - self.end_v).abs()
+    }
+}
+
 impl Phase {
     /// Keeps a span that may count: those before it may be many that do not.
     fn close(&mut self, span: Span) {
-        self.most = self.most.max(span.peak);
+        self.most = self.most.max(span.change());
         if self.counts(&span) && self.closed.len() < MOST_SPANS {
             self.closed.push(span);
         }
@@ -351,9 +346,7 @@ impl Phase {
 
     /// Whether a span counts beside the largest so far.
     fn counts(&self, span: &Span) -> bool {
-        span.peak >= LEAST_SHARE * self.most
-            && span.peak * self.mass_kg >= LEAST_N
-            && span.end_s > span.begin_s
+        span.change() >= LEAST_SHARE * self.most && span.end_s > span.begin_s
     }
 
     /// Over the first contact that counts; 0 without one.

@@ -344,7 +344,7 @@ impl<'a> Engine<'a> {
             self.follow_bodies(ahead_s);
         }
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
-        self.watch.looked::<N>(&self.v, a, self.end_s);
+        self.watch.looked::<N>(a, self.end_s);
     }
 
     #[cold]
@@ -353,7 +353,8 @@ impl<'a> Engine<'a> {
         for i in 0..self.chain.bodies().len() {
             let place = self.places.of(i);
             let a = self.by_contacts.as_ref().unwrap_or(&self.a)[place];
-            self.watch.follow(i, self.end_s, (self.v[place], ahead_s), a);
+            let v = self.v[place] - ahead_s * self.a[place];
+            self.watch.follow(i, self.end_s, v, a);
         }
     }
 
