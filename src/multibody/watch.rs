@@ -206,8 +206,8 @@ impl Watch {
         outside.iter().any(|&o| o > 0.0)
     }
 
-    /// Closes the span of body `i` if its net force has fallen to zero or changed its sign since
-    /// the last look; learns the sign of a new one; opens those that no contact has announced.
+    /// Closes the span of body `i` if its net force has ended or changed its sign since the last
+    /// look; learns the sign of a new one; opens those that no contact has announced.
     pub fn follow(&mut self, i: usize, end_s: f64, end_v: f64, end_a: f64) {
         let place = self.places.of(i);
         let present = &self.present;
@@ -238,7 +238,10 @@ impl Watch {
                 return self.bound_sign(place, span.sign, least);
             }
             Some(span) if is_small && end_s - span.end_s < LOOK_S => return,
-            Some(span) if span.fades => self.close_span(i, place, span.end_s, span.end_v),
+            Some(span) if span.fades => {
+                begin = (span.end_s, span.end_v);
+                self.close_span(i, place, span.end_s, span.end_v);
+            }
             Some(_) => {
                 let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
                 begin = (end_s - left_s, end_v - 0.5 * end_a * left_s);
