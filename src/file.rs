@@ -1,5 +1,6 @@
 //! Writing files so that a reader sees the old content or the new, never half of it.
 
+use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -51,6 +52,8 @@ pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
 /// Gives back what the function gives; nothing is replaced if that is `None`.
 ///
 /// The content is not forced to the disk: it is derived from a file that is still there.
+/// What a killed process left half-written is removed by the next that writes to `path`, for
+/// which the temporary file has one name: the caller keeps other writers of `path` away.
 ///
 /// # Errors
 /// [`WriteError`] names the path; nothing half-written stays behind.
@@ -59,7 +62,7 @@ pub fn write_at<T>(
     fill: impl FnOnce(&File) -> io::Result<Option<T>>,
 ) -> Result<Option<T>, WriteError> {
     let write = || -> io::Result<Option<T>> {
-        let (temporary, target) = temporary(path)?;
+        let (temporary, target) = temporary(path, Naming::ByTarget)?;
         let done = fill(temporary.as_file())?;
         if done.is_some() {
             temporary.persist(target).map_err(|e| e.error)?;
@@ -82,14 +85,25 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathB
         device.flush()?;
         return Ok(None);
     }
-    let (mut temporary, target) = temporary(path)?;
+    let (mut temporary, target) = temporary(path, Naming::Random)?;
     temporary.write_all(bytes)?;
     temporary.as_file().sync_all()?;
     Ok(Some((temporary, target)))
 }
 
+/// End of the names of temporary files.
+const SUFFIX: &str = ".part";
+
+/// How a temporary file is named.
+#[derive(Clone, Copy)]
+enum Naming {
+    Random,
+    /// A file of that name was left by a process that was killed.
+    ByTarget,
+}
+
 /// An empty temporary file beside the target of `path`, and that target.
-fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
+fn temporary(path: &Path, naming: Naming) -> io::Result<(NamedTempFile, PathBuf)> {
     let existing = match fs::metadata(path) {
         Ok(meta) if meta.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Ok(meta) if !meta.is_file() => return Err(io::ErrorKind::Unsupported.into()),
@@ -105,8 +119,21 @@ fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    let mut prefix = OsString::from(".crumple-");
+    if let Naming::ByTarget = naming {
+        prefix.push(target.file_name().unwrap_or_default());
+        let mut left = prefix.clone();
+        left.push(SUFFIX);
+        match fs::remove_file(folder.join(left)) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+    }
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".crumple-").suffix(".part");
+    builder.prefix(&prefix).suffix(SUFFIX);
+    if let Naming::ByTarget = naming {
+        builder.rand_bytes(0);
+    }
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

@@ -530,6 +530,35 @@ fn a_killed_run_goes_on_without_loss() {
     }
 }
 
+/// A kill while rows that are all there are put into their last form.
+#[test]
+fn what_a_kill_left_of_the_last_form_is_cleared() {
+    let folder = Folder::new(GRID);
+    for shard in ["1", "2"] {
+        folder.ok(&format!("sweep s.toml -q --shard {shard}/2 -o p{shard}.csv"));
+    }
+    let before = folder.names();
+    for (name, command) in [
+        ("out.h5", "sweep s.toml -q -o out.h5"),
+        ("all.h5", "sweep merge -q -o all.h5 p1.csv p2.csv"),
+        ("all.csv", "sweep merge -q -o all.csv p1.csv p2.csv"),
+    ] {
+        folder.ok(command);
+        let whole = folder.read(name);
+        fs::remove_file(folder.path().join(name)).unwrap();
+        folder.put(&format!(".crumple-{name}.part"), "half");
+        folder.ok(command);
+        assert!(folder.read(name) == whole, "{name}");
+        if command.starts_with("sweep s.toml") {
+            folder.put(&format!("{name}.part"), "rows");
+            folder.ok(command);
+            assert!(folder.read(name) == whole, "{name}");
+        }
+        fs::remove_file(folder.path().join(name)).unwrap();
+        assert_eq!(folder.names(), before, "{name}");
+    }
+}
+
 /// What a kill or a lost disk can leave at the end of the file under work.
 #[test]
 fn a_torn_end_is_cut() {

@@ -71,6 +71,8 @@ pub fn write(
         }
     } else if output.exists() {
         complete(output, &head, &mut tally)?;
+        // Left if a kill came just before its removal; it holds nothing more.
+        let _ = fs::remove_file(&part);
         tally.resumed = tally.done;
         return Ok(tally.close());
     }

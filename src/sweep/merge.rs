@@ -8,6 +8,7 @@ use super::draft::{Tally, each_line, is_hdf5};
 use super::hdf5::{self, Shelf};
 use super::row::Head;
 use super::{Report, Shard, SweepError};
+use crate::database::WriterLock;
 use crate::file::{WriteError, write_at};
 
 /// First bytes of an HDF5 file.
@@ -18,8 +19,9 @@ const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 ///
 /// # Errors
 /// [`SweepError::Merge`] names what is missing, twice or foreign; [`SweepError::Damaged`] the
-/// first row that is not there. The output is then unchanged.
+/// first row that is not there; [`SweepError::Lock`] another writer. The output is then unchanged.
 pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
+    let _lock = WriterLock::take(output)?;
     let mut tables = Vec::new();
     let mut shelves = Vec::new();
     for path in inputs {
