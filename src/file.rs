@@ -91,14 +91,11 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathB
     Ok(Some((temporary, target)))
 }
 
-/// End of the names of temporary files.
-const SUFFIX: &str = ".part";
-
 /// How a temporary file is named.
 #[derive(Clone, Copy)]
 enum Naming {
     Random,
-    /// A file of that name was left by a process that was killed.
+    /// What has that name already was left by a process that was killed.
     ByTarget,
 }
 
@@ -119,21 +116,19 @@ fn temporary(path: &Path, naming: Naming) -> io::Result<(NamedTempFile, PathBuf)
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let mut prefix = OsString::from(".crumple-");
-    if let Naming::ByTarget = naming {
-        prefix.push(target.file_name().unwrap_or_default());
-        let mut left = prefix.clone();
-        left.push(SUFFIX);
-        match fs::remove_file(folder.join(left)) {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-            _ => {}
-        }
-    }
+    let mut name = OsString::from(".crumple-");
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(SUFFIX);
-    if let Naming::ByTarget = naming {
-        builder.rand_bytes(0);
-    }
+    match naming {
+        Naming::Random => builder.prefix(&name).suffix(".part"),
+        Naming::ByTarget => {
+            name.push(target.file_name().unwrap_or_default());
+            name.push(".part");
+            match fs::remove_file(folder.join(&name)) {
+                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+                _ => builder.prefix(&name).rand_bytes(0),
+            }
+        }
+    };
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
