@@ -232,6 +232,8 @@ const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl UnitSystem {
     pub const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
+    /// Systems that crash models are written in.
+    pub const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
 
     /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
     pub fn parse(text: &str) -> Result<Self, UnitError> {
@@ -359,6 +361,14 @@ text_quantity!(
 text_quantity!(
     /// A length in m, zero or above, written like `"30mm"`.
     LengthText, |t: &str| LENGTH.parse_not_negative(t), "^[0-9.eE+-]+ *(mm|cm|m)$"
+);
+text_quantity!(
+    /// A length in m, of either sign, written like `"-30mm"`.
+    SignedLengthText, |t: &str| LENGTH.parse(t), "^-?[0-9.eE+-]+ *(mm|cm|m)$"
+);
+text_quantity!(
+    /// A time in s, zero or above, written like `"35ms"`.
+    InstantText, |t: &str| TIME.parse_not_negative(t), "^[0-9.eE+-]+ *(us|ms|s)$"
 );
 text_quantity!(
     /// A time in s, above zero, written like `"0.75ms"`.

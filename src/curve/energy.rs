@@ -1,14 +1,258 @@
-//! Energy audit: work of the loading branch against the kinetic energy it stopped.
+//! Energy audit, and the refusal of runs whose energy or impulse cannot be.
 
 use super::loading::loading_end;
 use super::{Curve, EnergyAudit, Masses};
-use crate::unit::Speed;
+use crate::unit::{Speed, UnitSystem, km_per_h};
 
 /// `W = ∫F dd` up to the largest deflection by the trapezoidal rule over the samples,
 /// and `E`, the kinetic energy of the impact.
 pub fn audit(curve: &Curve, masses: Masses, speed: Speed) -> EnergyAudit {
-    let (d, f) = (curve.deflection_m(), curve.force_n());
-    let work_j =
-        (1..=loading_end(curve)).map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1])).sum();
+    let work_j = work_to_end(curve);
     EnergyAudit { work_j, kinetic_j: masses.kinetic_energy_j(speed) }
+}
+
+fn work_to_end(curve: &Curve) -> f64 {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    (1..=loading_end(curve)).map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1])).sum()
+}
+
+/// Energy or impulse outside these shares of what the impact asks for is an error of the input.
+const POSSIBLE: (f64, f64) = (0.67, 1.5);
+/// Impulse that differs from the change of momentum by more than this deserves a warning.
+pub const IMPULSE_TOLERANCE: f64 = 0.05;
+/// No vehicle is faster, in m/s, is crushed by more, in m, or in less time, in s.
+const FASTEST_M_PER_S: f64 = 340.0;
+const LONGEST_CRUSH_M: f64 = 100.0;
+const SHORTEST_LOADING_S: f64 = 0.5e-3;
+/// A crush, in m, and a time to it, in s, as they are usual in crashes: to tell units by.
+const USUAL_CRUSH_M: (f64, f64) = (2e-3, 20.0);
+const USUAL_LOADING_S: (f64, f64) = (2e-3, 3.0);
+/// Two speeds, or a speed's square and an energy, that agree this well have one cause.
+const ALIKE: f64 = 0.1;
+/// A factor of a power of ten, or of two, is one within this factor.
+const NEAR_TEN: f64 = 1.6;
+const NEAR_TWO: f64 = 1.2;
+
+/// What a run's record says of its energy and momentum.
+#[derive(Clone, Copy, Debug)]
+pub struct Claim<'a> {
+    pub curve: &'a Curve,
+    pub masses: Masses,
+    pub speed: Speed,
+    /// Closing speeds at the curve's states, where the file records velocities.
+    pub closing_m_per_s: Option<&'a [f64]>,
+    /// The recorded impact speed, likewise.
+    pub recorded_m_per_s: Option<f64>,
+    pub units: UnitSystem,
+    /// Mass times acceleration: scales with lengths and times only.
+    pub is_body_force: bool,
+    /// Names and speeds of the study's other runs.
+    pub others: &'a [(String, f64)],
+}
+
+/// What the record gives in ratio to what the impact asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Work of the loading branch over the kinetic energy that it stopped.
+    pub work: Option<f64>,
+    /// Impulse of the loading branch over the change of momentum.
+    pub impulse: Option<f64>,
+}
+
+/// Why a run cannot be what the manifest says.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "{found}: such an impact cannot be; {cause}. Correct the manifest, or take the run as it is with accept_energy = true"
+)]
+pub struct Impossible {
+    found: String,
+    cause: String,
+}
+
+impl Impossible {
+    /// What was found, without its cause.
+    pub fn found(&self) -> &str {
+        &self.found
+    }
+}
+
+impl Claim<'_> {
+    /// Work and impulse against the impact's, over the loading branch. A record that ends
+    /// while loading is held against the speed that it has reached; without recorded speeds
+    /// there is nothing to hold it against.
+    pub fn balance(&self) -> Balance {
+        let end = loading_end(self.curve);
+        let mass = self.masses.effective_kg();
+        let truncated = end + 1 == self.curve.time_s().len();
+        let v = self.speed.m_per_s;
+        let lost_j = match (truncated, self.closing_m_per_s) {
+            (false, _) => Some(0.5 * mass * v * v),
+            (true, Some(closing)) => Some(0.5 * mass * (v * v - closing[end] * closing[end])),
+            (true, None) => None,
+        };
+        let (t, f) = (self.curve.time_s(), self.curve.force_n());
+        let impulse_ns: f64 = (1..=end).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1])).sum();
+        let lost_ns = self.closing_m_per_s.zip(self.recorded_m_per_s);
+        let lost_ns = lost_ns.map(|(closing, first)| mass * (first - closing[end]));
+        // Next to nothing may be off by any factor: a record cut right after contact.
+        let ratio = |is: f64, lost: f64, whole: f64| (lost > 0.1 * whole).then(|| is / lost);
+        let recorded = self.recorded_m_per_s.unwrap_or(v);
+        Balance {
+            work: lost_j.and_then(|j| ratio(work_to_end(self.curve), j, 0.5 * mass * v * v)),
+            impulse: lost_ns.and_then(|j| ratio(impulse_ns, j, mass * recorded)),
+        }
+    }
+
+    /// Refuses what no crash can be, with the likely cause.
+    ///
+    /// # Errors
+    /// [`Impossible`] if work or impulse lie outside 0.67 to 1.5 of what the impact asks for, or
+    /// speed or crush are those of no vehicle (domain: units, masses, speeds of another run).
+    pub fn check(&self) -> Result<Balance, Impossible> {
+        let balance = self.balance();
+        let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);
+        let fits = |ratio: Option<f64>| ratio.is_none_or(possible);
+        let end = loading_end(self.curve);
+        let (crush_m, loading_s) = (self.curve.deflection_m()[end], self.curve.time_s()[end]);
+        let beyond = self.speed.m_per_s > FASTEST_M_PER_S
+            || crush_m > LONGEST_CRUSH_M
+            || loading_s < SHORTEST_LOADING_S && end + 1 < self.curve.time_s().len();
+        if fits(balance.work) && fits(balance.impulse) && !beyond {
+            return Ok(balance);
+        }
+        let mut found = Vec::new();
+        if beyond {
+            found.push(format!(
+                "the largest crush is {} m after {} ms",
+                significant(crush_m),
+                significant(loading_s * 1e3)
+            ));
+        }
+        if let Some(work) = balance.work {
+            found.push(format!(
+                "the curve takes up {} times the kinetic energy of {} at {}",
+                significant(work),
+                self.shown_mass(),
+                self.speed
+            ));
+        }
+        if let Some(impulse) = balance.impulse.filter(|&i| !possible(i)) {
+            found.push(format!(
+                "the force's impulse is {} times the change of momentum",
+                significant(impulse)
+            ));
+        }
+        Err(Impossible { found: found.join(", "), cause: self.cause(balance) })
+    }
+
+    fn shown_mass(&self) -> String {
+        let tonnes = |kg: f64| format!("{} t", significant(kg / 1e3));
+        match self.masses.other_kg {
+            Some(other) => format!("{} on {}", tonnes(self.masses.body_kg), tonnes(other)),
+            None => tonnes(self.masses.body_kg),
+        }
+    }
+
+    /// The likely cause, in words that say what to look at.
+    fn cause(&self, balance: Balance) -> String {
+        let used = self.speed.m_per_s;
+        let work = balance.work.unwrap_or(1.0);
+        let near = |a: f64, b: f64, factor: f64| a > 0.0 && (a / b).ln().abs() < factor.ln();
+        let same = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
+        if let Some(units) = self.fitting_units(balance) {
+            return format!("likely the units: read as \"{units}\" it would fit");
+        }
+        let ratios = [balance.work, balance.impulse].into_iter().flatten();
+        let beyond = ratios.clone().any(|r| !(0.05..=20.0).contains(&r));
+        let tens = |r: f64| near(r, 10_f64.powi(3 * (r.log10() / 3.0).round() as i32), NEAR_TEN);
+        if ratios.clone().filter(|r| !same(*r, 1.0)).all(tens) && beyond {
+            return "likely the units of the solver's files are others than the study says".into();
+        }
+        let recorded = self.recorded_m_per_s.filter(|&r| !same(r, used));
+        if let Some(recorded) = recorded
+            && same(work, (recorded / used).powi(2))
+        {
+            let other = self.named_other(recorded);
+            return format!("likely the speed: the record's is {}{other}", km_per_h(recorded));
+        }
+        let others =
+            self.others.iter().find(|(_, v)| !same(*v, used) && same(work, (v / used).powi(2)));
+        if self.recorded_m_per_s.is_none()
+            && let Some((name, speed)) = others
+        {
+            return format!("likely speed, deck or files of the run {name} ({})", km_per_h(*speed));
+        }
+        let mass = balance
+            .impulse
+            .map(|i| {
+                format!(
+                    " (impulse and speeds ask for {} t)",
+                    significant(i * self.masses.body_kg / 1e3)
+                )
+            })
+            .unwrap_or_default();
+        match work {
+            w if near(w, 2.0, NEAR_TWO) || near(w, 0.5, NEAR_TWO) => format!(
+                "likely the mass{mass}, half a model taken for a whole one (half_model), or the force of one side only"
+            ),
+            w if near(w, 4.0, NEAR_TWO) || near(w, 0.25, NEAR_TWO) => format!(
+                "likely the speed of one body taken for the closing speed of two (half_model), or the mass{mass}"
+            ),
+            _ => {
+                format!("look at units, speed and mass{mass}, and at node and force of the recipe")
+            }
+        }
+    }
+
+    /// The run of that speed, for a message.
+    fn named_other(&self, speed: f64) -> String {
+        let found = self.others.iter().find(|(_, v)| (v / speed - 1.0).abs() < 0.02);
+        found.map_or(String::new(), |(name, _)| format!(", that of the run {name}"))
+    }
+
+    /// A unit system that would make work, impulse and speed fit, if the declared one does not.
+    fn fitting_units(&self, balance: Balance) -> Option<&'static str> {
+        let end = loading_end(self.curve);
+        let (crush_m, loading_s) = (self.curve.deflection_m()[end], self.curve.time_s()[end]);
+        let scale = |units: &UnitSystem| {
+            let speed = units.speed() / self.units.speed();
+            let force = match self.is_body_force {
+                true => units.acceleration() / self.units.acceleration(),
+                false => units.force() / self.units.force(),
+            };
+            let length = units.length_m / self.units.length_m;
+            (speed, force * length, length, units.time_s / self.units.time_s)
+        };
+        let fits = |r: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&r);
+        // Where the speed came from the record, it has the record's units as well.
+        let taken = self.recorded_m_per_s == Some(self.speed.m_per_s);
+        UnitSystem::USUAL.into_iter().find_map(|name| {
+            let units = UnitSystem::parse(name).ok()?;
+            if units == self.units {
+                return None;
+            }
+            let (speed, work, length, time) = scale(&units);
+            let impulse = work / length * time;
+            let energy = if taken { speed * speed } else { 1.0 };
+            let v = self.speed.m_per_s * if taken { speed } else { 1.0 };
+            let recorded_fits =
+                taken || self.recorded_m_per_s.is_none_or(|r| fits(r * speed / self.speed.m_per_s));
+            let all = balance.work.is_none_or(|w| fits(w * work / energy))
+                && balance.impulse.is_none_or(|i| fits(i * impulse / speed))
+                && recorded_fits
+                && (0.01..=FASTEST_M_PER_S).contains(&v)
+                && (USUAL_CRUSH_M.0..=USUAL_CRUSH_M.1).contains(&(crush_m * length))
+                && (USUAL_LOADING_S.0..=USUAL_LOADING_S.1).contains(&(loading_s * time));
+            all.then_some(name)
+        })
+    }
+}
+
+/// Four significant digits, for messages.
+fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
+    format!("{value:.digits$}")
 }

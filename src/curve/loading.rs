@@ -20,7 +20,8 @@ pub fn loading_end(curve: &Curve) -> usize {
     (1..deflection.len()).fold(0, |best, i| if deflection[i] > deflection[best] { i } else { best })
 }
 
-/// The samples up to the largest deflection whose deflection advances, begun at 0.
+/// The samples up to the largest deflection whose deflection advances, begun at 0. A record
+/// that begins with a deflection (an offset) rises to it in a straight line.
 ///
 /// # Errors
 /// [`EnvelopeError`] if fewer than two samples remain.
@@ -29,7 +30,10 @@ pub fn loading_branch(curve: &Curve) -> Result<Loading, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let advance = MIN_ADVANCE * d[end];
     // The force at contact is the one of the first sample, whose deflection is 0.
-    let (mut deflection_m, mut force_n) = (vec![0.0], vec![f[0]]);
+    let (mut deflection_m, mut force_n) = match d[0] > advance {
+        false => (vec![0.0], vec![f[0]]),
+        true => (vec![0.0, d[0]], vec![0.0, f[0]]),
+    };
     let mut dropped = 0;
     for i in 1..=end {
         if d[i] > deflection_m[deflection_m.len() - 1] + advance {

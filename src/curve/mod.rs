@@ -4,6 +4,7 @@
 
 pub mod body;
 pub mod cfc;
+pub mod contact;
 pub mod energy;
 pub mod envelope;
 pub mod extract;

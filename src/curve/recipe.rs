@@ -11,10 +11,21 @@ use crate::history::Side;
 pub struct Recipe {
     pub deflection: DeflectionSource,
     pub force: ForceSource,
+    /// Contact force that tells when contact begins, beside a body force: a body slows down
+    /// some milliseconds after the first touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ForceSource>,
     #[serde(default)]
     pub filter: Filter,
     #[serde(default)]
     pub sampling: Sampling,
+}
+
+impl Recipe {
+    /// Whether the force is mass times acceleration of a body.
+    pub fn force_is_body(&self) -> bool {
+        matches!(self.force, ForceSource::Body { .. })
+    }
 }
 
 /// Displacement of one node, or the difference of two.

@@ -9,19 +9,23 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::curve::extract::{DeclaredSpeed, ExtractError, Measured, MeasuredForce, Setup, extract};
+use crate::curve::extract::{
+    DeckSpeed, ExtractError, Measured, MeasuredForce, Setup, Stated, StatedContact, extract,
+};
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
 use crate::curve::{Case, ForceKind, Masses, Parameter, Source};
-use crate::history::{EntityId, Side};
+use crate::history::{EntityId, History, Side};
 use crate::manifest::{self, ManifestError};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
-use crate::unit::{ImpactSpeedText, MassText, SpeedKind, UnitSystem, km_per_h};
+use crate::unit::{
+    ImpactSpeedText, InstantText, LengthText, MassText, SignedLengthText, SpeedKind, UnitSystem,
+};
 use located::{Located, compare_twin, hashed_family, locate_file, shown_name};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
-const EXTRACTION_VERSION: u32 = 2;
+const EXTRACTION_VERSION: u32 = 3;
 
 /// A study manifest as written (TOML).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -49,6 +53,10 @@ pub struct Head {
     /// deflection are twice the run's.
     #[serde(default)]
     pub half_model: bool,
+    /// Take runs whose energy or impulse cannot be an impact's (0.67 to 1.5 of what mass and
+    /// speed ask for).
+    #[serde(default)]
+    pub accept_energy: bool,
 }
 
 /// What hits what.
@@ -78,10 +86,43 @@ pub struct RunEntry {
     pub mass: MassText,
     /// Mass of the other body, if the bodies of a pair differ.
     pub other_mass: Option<MassText>,
+    /// Solver's time at which contact begins; found in the force if absent.
+    pub contact_time: Option<InstantText>,
+    /// Contact begins when the bodies have moved this far towards each other from the first
+    /// state: the clear distance between their surfaces (between mid-surfaces of shells less
+    /// half of each thickness).
+    pub gap: Option<LengthText>,
+    /// Deflection at contact: above 0 for a record that begins crushed, below 0 for slack that
+    /// is no crush.
+    pub offset: Option<SignedLengthText>,
+    /// Solver's time behind which the record is not used.
+    pub truncate: Option<InstantText>,
+    /// 1 or -1: the factor that makes the file's force positive in compression; found from its
+    /// impulse if absent.
+    pub sign: Option<Sign>,
+    /// As in [study], for this run.
+    pub accept_energy: Option<bool>,
     /// Further parameters of the case, the same names in every run: numbers whose names carry
     /// their units (`angle_deg = 10`), or categories (`obstacle = "pole"`).
     #[serde(default)]
     pub parameters: BTreeMap<String, Parameter>,
+}
+
+/// A factor of 1 or −1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(try_from = "i64")]
+#[schemars(with = "i64", extend("enum" = [1, -1]))]
+pub struct Sign(i64);
+
+impl TryFrom<i64> for Sign {
+    type Error = String;
+
+    fn try_from(sign: i64) -> Result<Self, String> {
+        match sign {
+            1 | -1 => Ok(Self(sign)),
+            _ => Err(format!("sign = {sign}: expected 1 or -1")),
+        }
+    }
 }
 
 /// A manifest that makes sense, and where it stands.
@@ -170,9 +211,16 @@ fn check(manifest: &Manifest) -> Result<(), String> {
     if manifest.run.is_empty() {
         return Err("there is no [[run]]".into());
     }
+    check_contact(&manifest.recipe)?;
     let mut names = HashSet::new();
     for run in &manifest.run {
         check_parameters(run)?;
+        if run.contact_time.is_some() && run.gap.is_some() {
+            return Err(format!(
+                "run \"{}\": contact_time and gap both say when contact begins: keep one of them",
+                run.path
+            ));
+        }
         if run.path.trim().is_empty() {
             return Err("a [[run]] has an empty path".into());
         }
@@ -193,6 +241,18 @@ fn check(manifest: &Manifest) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+fn check_contact(recipe: &Recipe) -> Result<(), String> {
+    match (&recipe.contact, &recipe.force) {
+        (Some(ForceSource::Body { .. }), _) => Err(
+            "recipe.contact must be a contact force (id = … of a wall or contact): a body slows down after the first touch".into(),
+        ),
+        (Some(_), ForceSource::Contact { .. }) => Err(
+            "recipe.contact is for a body force: contact is found in recipe.force itself".into(),
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// Names that the models use themselves.
@@ -261,8 +321,10 @@ impl Study {
         }
         let recipe = &self.manifest.recipe;
         let mut names = vec![recipe.deflection.file.as_str()];
-        if !names.contains(&force_file(&recipe.force)) {
-            names.push(force_file(&recipe.force));
+        for force in [Some(&recipe.force), recipe.contact.as_ref()].into_iter().flatten() {
+            if !names.contains(&force_file(force)) {
+                names.push(force_file(force));
+            }
         }
         let files = names
             .into_iter()
@@ -320,6 +382,12 @@ impl Study {
                 "mass_kg": entry.mass.0,
                 "other_mass_kg": entry.other_mass.map(|m| m.0),
                 "parameters": entry.parameters,
+                "contact_time_s": entry.contact_time.map(|t| t.0),
+                "gap_m": entry.gap.map(|g| g.0),
+                "offset_m": entry.offset.map(|o| o.0),
+                "truncate_s": entry.truncate.map(|t| t.0),
+                "sign": entry.sign.map(|s| s.0),
+                "accept_energy": self.accepts_energy(entry),
             },
         })
         .to_string()
@@ -329,6 +397,22 @@ impl Study {
         match self.manifest.study.kind {
             StudyKind::Wall => SpeedKind::Wall,
             StudyKind::Pair => SpeedKind::Closing,
+        }
+    }
+
+    fn accepts_energy(&self, entry: &RunEntry) -> bool {
+        entry.accept_energy.unwrap_or(self.manifest.study.accept_energy)
+    }
+
+    /// What the run's entry states of its record.
+    fn stated(&self, entry: &RunEntry) -> Stated {
+        let time = entry.contact_time.map(|t| StatedContact::Time { s: t.0 });
+        Stated {
+            contact: time.or(entry.gap.map(|g| StatedContact::Gap { m: g.0 })),
+            offset_m: entry.offset.map_or(0.0, |o| o.0),
+            truncate_s: entry.truncate.map(|t| t.0),
+            force_sign: entry.sign.map(|s| s.0 as f64),
+            accept_energy: self.accepts_energy(entry),
         }
     }
 
@@ -355,13 +439,6 @@ impl LocatedRun<'_> {
         let mut warnings = Vec::new();
         let deck = self.deck.as_ref();
         let units = self.units(deck, &mut notes, &mut warnings)?;
-        let declared_speed = self.speed(deck, units, &mut notes, &mut warnings);
-        let is_used = head.units.is_none() || declared_speed.is_some_and(|s| s.by == "deck");
-        if let Some((located, deck)) = deck.filter(|_| is_used) {
-            // What could not be read of it may have changed what was taken from it.
-            let name = shown_name(&located.path);
-            warnings.extend(deck.problems.iter().map(|p| format!("deck {name}: {p}")));
-        }
         let motion_file = self.file(&recipe.deflection.file);
         let motion = read_motion(motion_file, &recipe.deflection)?;
         let force_file = self.file(force_file(&recipe.force));
@@ -370,13 +447,6 @@ impl LocatedRun<'_> {
             file.history(Some(EntityId::new(node)), component).cloned()
         };
         let DeflectionSource { node, minus_node, component, .. } = recipe.deflection;
-        let lacking =
-            |path: &Path, component: &str, file: &SolverFile| ReadError::NoSuchComponent {
-                path: path.into(),
-                format: file.section.clone(),
-                component: component.into(),
-                known: file.components.join(", "),
-            };
         let displacement = at(&motion, node, component.name())
             .ok_or_else(|| lacking(&motion_file.path, component.name(), &motion))?;
         let minus_displacement = minus_node.and_then(|n| at(&motion, n, component.name()));
@@ -392,8 +462,10 @@ impl LocatedRun<'_> {
         };
         let force_history = force_history
             .ok_or_else(|| lacking(&force_file.path, force_component(&recipe.force), &force))?;
+        let contact = recipe.contact.as_ref().map(|source| self.contact(source)).transpose()?;
         let measured = Measured {
             units,
+            contact: contact.as_ref().map(|c| &c.history),
             displacement: &displacement,
             minus_displacement: minus_displacement.as_ref(),
             velocity: velocity.as_ref(),
@@ -404,17 +476,33 @@ impl LocatedRun<'_> {
             },
         };
         let masses = study.masses(self.entry);
+        let others: Vec<(String, f64)> = study
+            .runs()
+            .iter()
+            .filter(|run| run.case_name() != self.entry.case_name())
+            .filter_map(|run| Some((run.case_name(), run.speed?.0)))
+            .collect();
         let setup = Setup {
             recipe,
             kind: study.speed_kind(),
             half_model: head.half_model,
             masses,
-            declared_speed,
+            manifest_speed_m_per_s: self.entry.speed.map(|s| s.0),
+            deck_speed: self.deck_speed(deck, units),
+            stated: study.stated(self.entry),
+            others: &others,
         };
         let extracted = extract(&measured, &setup).map_err(|source| {
             let file = if source.is_of_force() { force_file } else { motion_file };
             RunError::Extract { path: file.path.clone(), source }
         })?;
+        if let Some((located, deck)) =
+            deck.filter(|_| head.units.is_none() || extracted.speed_is_decks)
+        {
+            // What could not be read of it may have changed what was taken from it.
+            let name = shown_name(&located.path);
+            warnings.extend(deck.problems.iter().map(|p| format!("deck {name}: {p}")));
+        }
         notes.extend(extracted.notes);
         warnings.extend(extracted.warnings);
         if let ForceSource::Contact { id, side: None, .. } = recipe.force
@@ -429,10 +517,13 @@ impl LocatedRun<'_> {
         if self.files.len() > 1 {
             compare_twin(force_file, &force, &mut notes, &mut warnings);
         }
-        let read: Vec<(&Located, &SolverFile)> = match self.files.len() {
-            1 => vec![(motion_file, &motion)],
-            _ => vec![(motion_file, &motion), (force_file, &force)],
-        };
+        let mut read: Vec<(&Located, &SolverFile)> = vec![(motion_file, &motion)];
+        let forces = [(force_file, &force)].into_iter();
+        for (located, file) in forces.chain(contact.iter().map(|c| (c.located, &c.file))) {
+            if read.iter().all(|(known, _)| known.file != located.file) {
+                read.push((located, file));
+            }
+        }
         for (located, file) in &read {
             notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
             warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
@@ -462,6 +553,21 @@ impl LocatedRun<'_> {
             notes,
             warnings,
         })
+    }
+
+    /// The contact force beside a body force.
+    fn contact(&self, source: &ForceSource) -> Result<ContactForce<'_>, RunError> {
+        let located = self.file(force_file(source));
+        let file = read_force(located, source)?;
+        let history = match source {
+            ForceSource::Contact { id, side, component, .. } => {
+                contact_history(&file, *id, *side, component)
+            }
+            ForceSource::Body { .. } => None,
+        };
+        let history =
+            history.ok_or_else(|| lacking(&located.path, force_component(source), &file))?;
+        Ok(ContactForce { located, file, history })
     }
 
     /// `engine_wall_time_s` of the case.json in the run's folder, if there is one.
@@ -512,39 +618,15 @@ impl LocatedRun<'_> {
         }
     }
 
-    /// The manifest's speed, or the deck's; for half a model the closing speed.
-    fn speed(
-        &self,
-        deck: Option<&(Located, Deck)>,
-        units: UnitSystem,
-        notes: &mut Vec<String>,
-        warnings: &mut Vec<String>,
-    ) -> Option<DeclaredSpeed> {
+    /// The deck's speed; for half a model the closing speed.
+    fn deck_speed(&self, deck: Option<&(Located, Deck)>, units: UnitSystem) -> Option<DeckSpeed> {
         let bodies = if self.study.manifest.study.half_model { 2.0 } else { 1.0 };
-        let of_deck = deck.and_then(|(located, deck)| {
-            let found = deck.impact_speed()?;
-            Some((shown_name(&located.path), found.at.line, bodies * found.speed * units.speed()))
-        });
-        match (self.entry.speed, of_deck) {
-            (Some(declared), of_deck) => {
-                if let Some((name, _, speed)) = of_deck
-                    && (speed - declared.0).abs() > SAME_SPEED * declared.0
-                {
-                    warnings.push(format!(
-                        "speed: the manifest says {}, the deck {name} {}; the manifest's is used",
-                        km_per_h(declared.0),
-                        km_per_h(speed)
-                    ));
-                }
-                Some(DeclaredSpeed { m_per_s: declared.0, by: "manifest" })
-            }
-            (None, Some((name, line, m_per_s))) => {
-                let shown = km_per_h(m_per_s);
-                notes.push(format!("speed: {shown} taken from the deck {name}, line {line}"));
-                Some(DeclaredSpeed { m_per_s, by: "deck" })
-            }
-            (None, None) => None,
-        }
+        let (located, deck) = deck?;
+        let found = deck.impact_speed()?;
+        Some(DeckSpeed {
+            m_per_s: bodies * found.speed * units.speed(),
+            place: format!("{}, line {}", shown_name(&located.path), found.at.line),
+        })
     }
 
     fn deck_source(&self, located: &Located, deck: &Deck) -> Source {
@@ -591,6 +673,22 @@ impl LocatedRun<'_> {
     }
 }
 
+/// The force that tells when contact begins, and where it was read.
+struct ContactForce<'a> {
+    located: &'a Located,
+    file: SolverFile,
+    history: History,
+}
+
+fn lacking(path: &Path, component: &str, file: &SolverFile) -> ReadError {
+    ReadError::NoSuchComponent {
+        path: path.into(),
+        format: file.section.clone(),
+        component: component.into(),
+        known: file.components.join(", "),
+    }
+}
+
 fn force_file(force: &ForceSource) -> &str {
     match force {
         ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
@@ -602,9 +700,6 @@ fn force_component(force: &ForceSource) -> &str {
         ForceSource::Contact { component, .. } | ForceSource::Body { component, .. } => component,
     }
 }
-
-/// Declared speeds may differ by this share before a warning is due.
-const SAME_SPEED: f64 = 0.01;
 
 /// Displacements and, where the file has them, velocities of the recipe's nodes.
 fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {
@@ -648,7 +743,7 @@ fn contact_history(
     id: i64,
     side: Option<Side>,
     component: &str,
-) -> Option<crate::history::History> {
+) -> Option<History> {
     let bare = file.history(Some(EntityId::new(id)), component);
     let of_side = |side| file.history(Some(EntityId { id, side: Some(side) }), component);
     match side {

@@ -1,0 +1,193 @@
+//! Contact: when it begins in a record, and what of the record is not it.
+
+/// A contact force is above the larger of these two.
+const FORCE_N: f64 = 1e3;
+const SHARE_OF_LARGEST: f64 = 0.005;
+/// Spells of force closer than this belong together: a nose plate may bounce.
+const PAUSE_S: f64 = 0.010;
+/// A first piece of the contact with less than this share of its impulse may be noise.
+const SMALL_SHARE: f64 = 1e-3;
+/// Spells before the contact that are named one by one.
+const NAMED: usize = 3;
+
+/// The force above which a record is in contact: 1 kN, or 0.5 % of its largest force.
+pub fn threshold_n(force_n: &[f64]) -> f64 {
+    FORCE_N.max(SHARE_OF_LARGEST * force_n.iter().copied().fold(0.0, f64::max))
+}
+
+/// When contact begins, found from a force that is positive in compression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Onset {
+    /// Where the force crosses the threshold, in s, between two states.
+    pub time_s: f64,
+    /// Length of the output interval that holds the crossing, in s; `None` if the record
+    /// begins in contact.
+    pub interval_s: Option<f64>,
+    /// What the user should look at: spells before the contact, and a doubtful beginning.
+    pub warnings: Vec<String>,
+}
+
+/// States whose force is above the threshold, without a pause of [`PAUSE_S`] or longer.
+#[derive(Clone, Copy)]
+struct Spell {
+    first: usize,
+    last: usize,
+    states: usize,
+    impulse_ns: f64,
+    largest_n: f64,
+}
+
+/// The onset of the spell that holds most of the impulse; `None` if the force never exceeds the
+/// threshold.
+///
+/// `time_s`: increasing, in s; `force_n`: as many values, in N, not filtered (a filter without
+/// phase shift begins ahead of the contact).
+pub fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option<Onset> {
+    let pieces = spells(time_s, force_n, threshold_n, 0.0);
+    let spells = spells(time_s, force_n, threshold_n, PAUSE_S);
+    let main = spells
+        .iter()
+        .enumerate()
+        .reduce(|a, b| if b.1.impulse_ns > a.1.impulse_ns { b } else { a })
+        .map(|(k, _)| k)?;
+    let total_ns: f64 = spells.iter().map(|s| s.impulse_ns).sum();
+    let contact = spells[main];
+    let (crossing_s, interval_s) = match contact.first {
+        0 => (time_s[0], None),
+        i => {
+            let share = (threshold_n - force_n[i - 1]) / (force_n[i] - force_n[i - 1]);
+            let interval = time_s[i] - time_s[i - 1];
+            (time_s[i - 1] + share.clamp(0.0, 1.0) * interval, Some(interval))
+        }
+    };
+    let mut warnings: Vec<String> = spells[..main]
+        .iter()
+        .take(NAMED)
+        .map(|spell| {
+            format!(
+                "contact: not the {} at {}, with {} of the impulse; contact begins at {} (contact_time = \"…ms\" in the run says otherwise)",
+                spell.shown(),
+                milliseconds(time_s[spell.first]),
+                percent(spell.impulse_ns / total_ns),
+                milliseconds(crossing_s)
+            )
+        })
+        .collect();
+    if main > NAMED {
+        warnings.push(format!("contact: {} more spells of force lie before it", main - NAMED));
+    }
+    let first = pieces.iter().find(|p| p.first == contact.first);
+    let second = pieces.iter().find(|p| p.first > contact.first && p.first <= contact.last);
+    if let (Some(first), Some(second)) = (first, second)
+        && first.impulse_ns < SMALL_SHARE * contact.impulse_ns
+    {
+        warnings.push(format!(
+            "contact: it begins at {} with the {}, {} of the impulse, and goes on at {}: if that is noise, say contact_time = \"…ms\" in the run",
+            milliseconds(crossing_s),
+            first.shown(),
+            percent(first.impulse_ns / contact.impulse_ns),
+            milliseconds(time_s[second.first])
+        ));
+    }
+    Some(Onset { time_s: crossing_s, interval_s, warnings })
+}
+
+/// Spells of states above the threshold; those less than `pause_s` apart are one.
+fn spells(time_s: &[f64], force_n: &[f64], threshold_n: f64, pause_s: f64) -> Vec<Spell> {
+    let mut spells: Vec<Spell> = Vec::new();
+    let last = time_s.len() - 1;
+    for i in (0..=last).filter(|&i| force_n[i] > threshold_n) {
+        let width_s = 0.5 * (time_s[(i + 1).min(last)] - time_s[i.saturating_sub(1)]);
+        let impulse_ns = force_n[i] * width_s;
+        match spells.last_mut() {
+            Some(spell) if spell.last + 1 == i || time_s[i] - time_s[spell.last] < pause_s => {
+                spell.last = i;
+                spell.states += 1;
+                spell.impulse_ns += impulse_ns;
+                spell.largest_n = spell.largest_n.max(force_n[i]);
+            }
+            _ => spells.push(Spell {
+                first: i,
+                last: i,
+                states: 1,
+                impulse_ns,
+                largest_n: force_n[i],
+            }),
+        }
+    }
+    spells
+}
+
+impl Spell {
+    fn shown(&self) -> String {
+        let states = if self.states == 1 { "state" } else { "states" };
+        format!("force of up to {:.3} kN over {} {states}", self.largest_n / 1e3, self.states)
+    }
+}
+
+/// A time for messages: `12.345 ms`.
+pub(super) fn milliseconds(time_s: f64) -> String {
+    format!("{} ms", (time_s * 1e6).round() / 1e3)
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1 ms apart, 1 MN from 50 ms to 150 ms.
+    fn record() -> (Vec<f64>, Vec<f64>) {
+        let time_s: Vec<f64> = (0..200).map(|i| f64::from(i) * 1e-3).collect();
+        let force_n = (0..200).map(|i| if (50..150).contains(&i) { 1e6 } else { 0.0 }).collect();
+        (time_s, force_n)
+    }
+
+    fn of((time_s, force_n): &(Vec<f64>, Vec<f64>)) -> Onset {
+        onset(time_s, force_n, threshold_n(force_n)).unwrap()
+    }
+
+    #[test]
+    fn the_crossing_lies_between_two_states() {
+        let found = of(&record());
+        // The threshold, 5 kN, is 0.5 % of the way from 0 to 1 MN.
+        assert!((found.time_s - 49.005e-3).abs() < 1e-12, "{}", found.time_s);
+        assert!((found.interval_s.unwrap() - 1e-3).abs() < 1e-12);
+        assert_eq!(found.warnings, [""; 0]);
+    }
+
+    #[test]
+    fn a_noisy_state_long_before_is_named_and_is_no_contact() {
+        let mut noisy = record();
+        noisy.1[15] = 2e4;
+        let found = of(&noisy);
+        assert_eq!(found.time_s, of(&record()).time_s);
+        assert_eq!(
+            found.warnings,
+            [
+                "contact: not the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact begins at 49.005 ms (contact_time = \"…ms\" in the run says otherwise)"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_bounce_belongs_to_the_contact() {
+        let mut bounced = record();
+        bounced.1[42] = 5e5;
+        let found = of(&bounced);
+        assert!((found.time_s - 41.01e-3).abs() < 1e-12, "{}", found.time_s);
+        assert_eq!(found.warnings, [""; 0], "half a per cent of the impulse is a nose plate");
+        bounced.1[42] = 2e4;
+        assert!(of(&bounced).warnings[0].contains("if that is noise"), "{:?}", of(&bounced));
+    }
+
+    #[test]
+    fn a_record_may_begin_in_contact() {
+        let (time_s, force_n) = record();
+        let found = onset(&time_s[60..], &force_n[60..], 1e3).unwrap();
+        assert_eq!((found.time_s, found.interval_s), (0.06, None));
+        assert_eq!(onset(&time_s, &vec![0.0; 200], 1e3), None);
+    }
+}
