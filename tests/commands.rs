@@ -150,7 +150,7 @@ fn speed_is_taken_from_the_first_state_and_said() {
         let speed = case["speed_m_per_s"].as_f64().unwrap();
         assert!((speed * 3.6 - first_speed).abs() < 1e-4, "{group}: {speed} m/s");
         let notes = case["notes"].to_string();
-        assert!(notes.contains("taken from the first state"), "{notes}");
+        assert!(notes.contains("25 km/h taken from the record"), "{notes}");
     }
 }
 
@@ -166,7 +166,7 @@ fn a_wrong_speed_in_the_manifest_is_noticed() {
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(
-        error.contains("36kmh: speed: the manifest says 38 km/h, the first state moves at 36 km/h"),
+        error.contains("36kmh: speed: the record says 36 km/h, the manifest's 38 km/h is used"),
         "{error}"
     );
 }
