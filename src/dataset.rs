@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::curve::body::{BodyMotion, body_motion};
 use crate::curve::loading::loading_branch;
 use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
-use crate::unit::{SpeedKind, km_per_h};
+use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
 /// One case as models see it.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +59,8 @@ pub struct TrainingSet {
     pub force_kind: ForceKind,
     /// Masses of the first case.
     pub masses: Masses,
+    /// Units of the solver's files, if all cases come from one system.
+    pub units: Option<UnitSystem>,
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
     pub cases: Vec<TrainingCase>,
@@ -304,6 +306,7 @@ impl TrainingSet {
             speed_kind: first.speed.kind,
             force_kind: first.force_kind,
             masses: cases.iter().find(|c| c.name == training[0].name).unwrap_or(&first).masses,
+            units: first.units().filter(|u| cases.iter().all(|c| c.units() == Some(*u))),
             features,
             cases: training,
         })

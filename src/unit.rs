@@ -29,6 +29,11 @@ impl SpeedKind {
             Self::Closing => "closing",
         }
     }
+
+    /// The kind of that name.
+    pub fn parse(name: &str) -> Option<Self> {
+        [Self::Wall, Self::Closing].into_iter().find(|kind| kind.name() == name)
+    }
 }
 
 /// An impact speed in m/s together with what it is measured against.
@@ -160,6 +165,12 @@ impl Dimension {
         Ok(si)
     }
 
+    /// The unit of that size in SI, if one has it.
+    pub fn name_of(&self, size: f64) -> Option<&'static str> {
+        let same = |unit: f64| (unit / size - 1.0).abs() < 1e-9;
+        self.units.iter().find(|(_, unit)| same(*unit)).map(|&(name, _)| name)
+    }
+
     /// SI value of one `unit`, or `None` when the unit is not one of this quantity's.
     pub fn size_of(&self, unit: &str) -> Option<f64> {
         self.units.iter().find(|(name, _)| *name == unit).map(|&(_, size)| size)
@@ -219,7 +230,7 @@ fn continues_number(text: &str, i: usize, c: char) -> bool {
 }
 
 /// The units in which a solver's files are written; factors turn a file's value into SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitSystem {
     pub length_m: f64,
     pub mass_kg: f64,
@@ -285,6 +296,36 @@ fn size_in(table: &[(&str, f64)], unit: &str) -> Option<f64> {
 fn names(table: &[(&str, f64)]) -> String {
     let names: Vec<_> = table.iter().map(|(n, _)| *n).collect();
     names.join(", ")
+}
+
+impl fmt::Display for UnitSystem {
+    /// As it is written in a manifest: `SI`, `mm-t-s`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if *self == Self::SI {
+            return f.write_str("SI");
+        }
+        let name = |table: &[(&'static str, f64)], size: f64| {
+            table.iter().find(|(_, unit)| *unit == size).map_or("?", |(name, _)| name)
+        };
+        let (length, mass) = (name(LENGTHS, self.length_m), name(MASSES, self.mass_kg));
+        write!(f, "{length}-{mass}-{}", name(TIMES, self.time_s))
+    }
+}
+
+impl Serialize for UnitSystem {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl schemars::JsonSchema for UnitSystem {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "UnitSystem".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "string", "examples": ["SI", "mm-t-s", "mm-kg-ms"] })
+    }
 }
 
 impl<'de> Deserialize<'de> for UnitSystem {

@@ -52,6 +52,68 @@ fn lasso_reads_the_same_binout() {
     assert_eq!(compared, 136_791, "values compared");
 }
 
+/// The default export of every format, in each of its units, drives one mass as FE's went:
+/// velocity within 1 %, rebound within 10 %. What the obstacle feels does not.
+#[test]
+fn exported_curves_move_one_mass_as_fe_did() {
+    let groups = [
+        ("lead-car-wall", "900001", "0.001", &["36", "48", "60"][..]),
+        ("lead-car-pair", "900001-900002", "0.001", &["36", "48", "60"]),
+        ("vehicle-pair", "900001", "0.002", &["36", "48", "60"]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (group, node, scale, speeds) in groups {
+        build_fixture(here, group);
+        let train = ["train", "curves.h5", "--group", group, "--model", "linear", "-o", "m.model"];
+        crumple_ok(here, &train);
+        for speed in speeds {
+            let asked = format!("{speed}km/h");
+            let outputs = ["-o", "curve.json", "-o", "predicted.csv", "-o", "predicted.k"];
+            let predict = ["predict", "m.model", "--speed", &asked];
+            crumple_ok(here, &[&predict[..], &outputs[..]].concat());
+            let export = |output: &str, more: &[&str]| {
+                crumple_ok(here, &[&["export", "curve.json", "-o", output][..], more].concat());
+            };
+            export("body.csv", &[]);
+            export("body-mm.csv", &["--units", "mm-t-s"]);
+            export("body-kN.csv", &["--units", "mm-kg-ms"]);
+            export("body.k", &[]);
+            export("body-si.k", &["--units", "SI"]);
+            export("body.json", &[]);
+            export("contact.csv", &["--force", "contact"]);
+            let nodout = fixture(&format!("fe/{group}/{speed}kmh/nodout"));
+            let files = [
+                "predicted.csv",
+                "predicted.k",
+                "body.csv",
+                "body-mm.csv",
+                "body-kN.csv",
+                "body.k",
+                "body-si.k",
+                "body.json",
+                "contact.csv",
+            ];
+            let paths: Vec<String> =
+                files.iter().map(|f| here.join(f).display().to_string()).collect();
+            let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+            let arguments = [&[nodout.to_str().unwrap(), node, scale][..], &paths].concat();
+            let Some(found) = run_python("one_mass.py", &arguments) else { return };
+            for (file, numbers) in found.as_object().unwrap() {
+                let velocity = numbers[0].as_f64().unwrap();
+                let rebound = numbers[1].as_f64().unwrap();
+                let place = format!("{group} at {speed} km/h, {file}: {numbers}");
+                if file == "contact.csv" {
+                    assert!(velocity > 0.01, "{place}");
+                    continue;
+                }
+                assert!(velocity < 0.01, "{place}");
+                assert!((rebound - 1.0).abs() < 0.1, "{place}");
+            }
+        }
+    }
+}
+
 #[test]
 fn h5py_reads_what_db_show_prints() {
     let folder = tempfile::tempdir().unwrap();

@@ -150,7 +150,8 @@ fn speed_is_taken_from_the_first_state_and_said() {
         let speed = case["speed_m_per_s"].as_f64().unwrap();
         assert!((speed * 3.6 - first_speed).abs() < 1e-4, "{group}: {speed} m/s");
         let notes = case["notes"].to_string();
-        assert!(notes.contains("25 km/h taken from the record"), "{notes}");
+        let said = format!("speed: {first_speed} km/h taken from the record");
+        assert!(notes.contains(&said), "{notes}");
     }
 }
 
@@ -511,7 +512,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     assert_eq!((d[0], f[0]), (0.0, 0.0));
     assert_eq!(d[d.len() - 1], curve["max_deflection_m"].as_f64().unwrap());
     assert!(f.iter().all(|&f| f >= 0.0));
-    // All three files hold the same curve.
+    // All three files hold the same curve: JSON both forces, the others that of one mass.
     let written: Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
     assert_eq!(written, curve);
@@ -534,12 +535,14 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         keyword[2],
         "       101         0       1.0       1.0       0.0       0.0         0       401"
     );
+    let f = column("body_force_N");
     for (i, (d, f)) in d.iter().zip(&f).enumerate() {
         let close = |a: f64, b: f64| (a - b).abs() <= 5e-9 * b.abs();
         assert!(close(csv[i].0, *d) && close(csv[i].1, *f), "row {i}");
         let point = keyword[3 + i];
         assert_eq!(point.len(), 40);
-        assert!(close(point[..20].trim().parse().unwrap(), *d));
+        // In the study's units, mm and N.
+        assert!(close(point[..20].trim().parse::<f64>().unwrap() * 1e-3, *d));
         assert!(close(point[20..].trim().parse().unwrap(), *f));
     }
     assert_eq!(keyword[3 + d.len()], "*END");
@@ -880,9 +883,47 @@ fn scenarios_choose_the_force() {
         assert!(declared < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {declared} and {body}");
         assert_eq!(crush(source), body, "{source}: a vehicle of one mass needs the body force");
     }
-    scenario("file = \"a.csv\", force = \"body\"");
+    // A CSV file says itself which force it holds and how it unloads.
+    let run = |nose: &str| {
+        scenario(nose);
+        json(&crumple_ok(here, &["simulate", "s.toml", "--json"]))
+    };
+    let rebound = |result: &Value| {
+        let restitution = &result["summary"]["interfaces"][0]["restitution"];
+        restitution.as_f64().unwrap()
+    };
+    let (of_csv, of_json) = (run("file = \"a.csv\""), run("file = \"a.json\""));
+    assert!((rebound(&of_csv) / rebound(&of_json) - 1.0).abs() < 1e-6);
+    assert_eq!(of_csv["summary"]["interfaces"][0]["curve_force"], "body");
+    assert_eq!(of_csv["warnings"], of_json["warnings"], "{}", of_csv["warnings"]);
+    crumple_ok(here, &["export", "a.json", "--force", "contact", "-o", "contact.csv"]);
+    let contact = run("file = \"contact.csv\"");
+    assert_eq!(contact["summary"]["interfaces"][0]["curve_force"], "contact");
+    let warned = contact["warnings"].to_string();
+    assert!(warned.contains("it has a contact force only"), "{warned}");
+    scenario("file = \"a.csv\", force = \"contact\"");
     let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
-    assert!(error.contains("a CSV file does not say which force it holds"), "{error}");
+    assert!(error.contains("force names another force than"), "{error}");
+    // One that says neither is taken for what moves the body, and unloads steeply: both said.
+    let text = std::fs::read_to_string(here.join("a.csv")).unwrap();
+    let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
+    std::fs::write(here.join("bare.csv"), bare.join("\n")).unwrap();
+    let warned = run("file = \"bare.csv\"")["warnings"].to_string();
+    assert!(warned.contains("its file does not say which force it holds"), "{warned}");
+    assert!(warned.contains("it has no unloading stiffness: it unloads with its steepest rise"));
+    scenario("file = \"bare.csv\"");
+    assert!(crumple_ok(here, &["simulate", "s.toml"]).contains("unknown"));
+    std::fs::write(here.join("bad.csv"), text.replace("force_kind: body", "force_kind: bodie"))
+        .unwrap();
+    scenario("file = \"bad.csv\"");
+    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    let told = "bad.csv: line 2: \"# force_kind: bodie\": expected \"body\" or \"contact\"";
+    assert!(error.contains(told), "{error}");
+    // Standard output is one file's.
+    let predict = ["predict", "a.model", "--speed", "48km/h", "--to", "csv", "-o", "-"];
+    assert_eq!(crumple_ok(here, &predict), text);
+    assert!(!here.join("-").exists());
+    crumple_fails(here, 2, &[&predict[..], &["--json"]].concat());
     // A contact curve without its body force is not passed off as one.
     let mut curve: Value = json(&std::fs::read_to_string(here.join("a.json")).unwrap());
     curve.as_object_mut().unwrap().remove("body_force_N");
@@ -892,4 +933,10 @@ fn scenarios_choose_the_force() {
     assert!(error.contains("a contact force and no body force"), "{error}");
     let export = ["export", "old.json", "--to", "csv", "--force", "body"];
     assert!(crumple_fails(here, 1, &export).contains("no body force"));
+    let error = crumple_fails(here, 2, &["export", "old.json", "--to", "csv"]);
+    assert!(error.contains("say --force contact"), "{error}");
+    let error = crumple_fails(here, 1, &["export", "a.json", "--to", "json", "--units", "mm-t-s"]);
+    assert!(error.contains("json is always in SI"), "{error}");
+    let error = crumple_fails(here, 1, &["export", "a.json", "--to", "csv", "--units", "in-kg-s"]);
+    assert!(error.contains("lengths in mm, cm, m, forces in N, kN, MN"), "{error}");
 }

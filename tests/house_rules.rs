@@ -29,7 +29,7 @@ const MAY_NAME: [(&str, &[&str]); 23] = [
     ("surrogate", &["dataset", "forest", "curve", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
     ("nsdm", &["curve", "stream"]),
-    ("export", &["surrogate", "forest", "curve", "separated", "unit"]),
+    ("export", &["surrogate", "dataset", "forest", "curve", "separated", "unit"]),
     ("plan", &["stream", "unit"]),
     (
         "scenario",

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crumple::curve::ForceKind;
 use crumple::export::{self, ExportError, FORMATS, Format, Options};
 use crumple::file::write_whole;
+use crumple::surrogate::predict::PredictError;
 use crumple::surrogate::{Model, PredictedCurve};
 use crumple::unit::UnitSystem;
 use serde::Serialize;
@@ -16,7 +18,7 @@ use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 #[command(after_help = "Examples:
   crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
   crumple export lead50.json --to csv
-  crumple export lead50.json --to lsdyna --force body -o lead50.k
+  crumple export lead50.json --to lsdyna --force contact -o lead50-wall.k
   crumple export ddtcm.model --to onnx -o ddtcm.onnx
   crumple export --list
 
@@ -42,12 +44,12 @@ pub struct Target {
     /// Format, if not told by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
-    /// Units of the target's deck, such as mm-t-s (LS-DYNA; default: SI)
+    /// Units of the file, such as mm-t-s (default: LS-DYNA the study's, csv SI)
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Which force: the recipe's, or the one that moves a body of one mass
-    #[arg(long, value_enum, default_value_t = ForceChoice::Declared)]
-    force: ForceChoice,
+    /// Which force [default: body; a JSON file of crumple predict holds both]
+    #[arg(long, value_enum)]
+    force: Option<ForceChoice>,
     /// Number of the curve in the target's deck
     #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_999))]
     curve_id: u32,
@@ -55,10 +57,10 @@ pub struct Target {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum ForceChoice {
-    /// The force of the recipe (contact or body)
-    Declared,
-    /// The force of the body's motion
+    /// The force that moves a body of one mass
     Body,
+    /// What the obstacle feels: for bodies whose crush zone is a mass of its own
+    Contact,
 }
 
 fn units(text: &str) -> Result<UnitSystem, String> {
@@ -82,17 +84,33 @@ impl Target {
         found.map_err(|e: ExportError| Failure::Usage(e.to_string()))
     }
 
-    /// The file's bytes of the force that was asked for.
+    /// The file's bytes of the force that was asked for, or of the body's.
     pub fn encode(&self, format: &Format, curve: &PredictedCurve) -> Result<Vec<u8>, Failure> {
-        let options = self.options()?;
-        Ok(match self.force {
-            ForceChoice::Declared => format.encode(curve, &options)?,
-            ForceChoice::Body => format.encode(&curve.of_body_force()?, &options)?,
-        })
+        let options = Options { units: self.units, id: self.curve_id };
+        let kind = match self.force {
+            Some(ForceChoice::Contact) => ForceKind::Contact,
+            Some(ForceChoice::Body) | None => ForceKind::Body,
+        };
+        let alone = curve.of_force(kind).map_err(|error| match (error, self.force) {
+            (PredictError::NoBodyForce, None) => Failure::Usage(
+                "the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into(),
+            ),
+            (error, _) => error.into(),
+        })?;
+        Ok(format.encode(&alone, &options)?)
     }
 
-    fn options(&self) -> Result<Options, Failure> {
-        Ok(Options { units: self.units.unwrap_or(UnitSystem::SI), id: self.curve_id })
+    /// As [`encode`](Self::encode), but with both forces where the format holds them and none
+    /// was asked for.
+    pub fn encode_whole(
+        &self,
+        format: &Format,
+        curve: &PredictedCurve,
+    ) -> Result<Vec<u8>, Failure> {
+        match format.holds_both_forces() && self.force.is_none() {
+            true => Ok(format.encode(curve, &Options { units: self.units, id: self.curve_id })?),
+            false => self.encode(format, curve),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::curve::Parameter;
+use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, PredictedCurve, Query, predict};
@@ -11,7 +11,7 @@ use crumple::unit::km_per_h;
 
 use super::arguments::{self, MaxCrush};
 use super::output;
-use super::{CommandResult, Manners, Outcome, keep_input};
+use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
 /// Predict the force-deflection curve at a speed, with energy audit and warnings
 #[derive(clap::Args)]
@@ -55,8 +55,12 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let formats = args
         .output
         .iter()
-        .map(|path| args.target.format(Some(path)))
+        .map(|path| args.target.format(Some(path.as_path()).filter(|path| !is_stdout(path))))
         .collect::<Result<Vec<_>, _>>()?;
+    let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
+    if to_stdout > 1 || to_stdout == 1 && manners.json {
+        return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
+    }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     let model = Model::read(&args.model)?;
     let query = Query {
@@ -70,14 +74,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     // All files are encoded before the first is written.
     let files = formats
         .iter()
-        .map(|format| args.target.encode(format, &curve))
+        .map(|format| args.target.encode_whole(format, &curve))
         .collect::<Result<Vec<_>, _>>()?;
     let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
-    write_all_whole(&named.collect::<Vec<_>>())?;
+    let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
+    write_all_whole(&written)?;
     for warning in &curve.warnings {
         manners.warn(&warning.to_string());
     }
-    if manners.json {
+    if let Some((_, bytes)) = printed.first() {
+        output::print(|out| out.write_all(bytes))?;
+    } else if manners.json {
         output::print_json(&curve)?;
     } else {
         output::print(|out| {
@@ -101,7 +108,8 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         curve.model
     )?;
     let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
-    writeln!(out, "  peak force           {:.3} MN", peak / 1e6)?;
+    let kind = provenance.force_kind.name();
+    writeln!(out, "  peak force           {:.3} MN ({kind})", peak / 1e6)?;
     writeln!(
         out,
         "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
@@ -120,16 +128,23 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         provenance.kinetic_energy_j / 1e6
     )?;
     if let Some(share) = provenance.body_energy_over_kinetic {
-        writeln!(out, "  of the body force    {:.2} %", share * 100.0)?;
+        writeln!(out, "  energy of body force {:.2} %", share * 100.0)?;
     }
-    writeln!(out, "  unloading stiffness  {:.1} MN/m", curve.unloading_stiffness_n_per_m / 1e6)?;
-    if let Some(rebound) = curve.rebound {
+    let unloading = |out: &mut dyn Write, kind: ForceKind, stiffness: f64| {
         writeln!(
             out,
-            "  rebound              {} (unloading from the maximal crush with {:.1} MN/m)",
-            km_per_h(rebound.speed_m_per_s),
-            rebound.stiffness_n_per_m / 1e6
-        )?;
+            "  unloading            {:.1} MN/m of the {} force, which drives {}",
+            stiffness / 1e6,
+            kind.name(),
+            kind.drives()
+        )
+    };
+    unloading(out, provenance.force_kind, curve.unloading_stiffness_n_per_m)?;
+    if let Some(stiffness) = curve.body_unloading_stiffness_n_per_m {
+        unloading(out, ForceKind::Body, stiffness)?;
+    }
+    if let Some(rebound) = curve.rebound {
+        writeln!(out, "  rebound              {}", km_per_h(rebound.speed_m_per_s))?;
     }
     if let Some(band) = &provenance.band {
         writeln!(

@@ -268,7 +268,7 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
                 format!("{:.7} m", i.max_deflection_m),
                 format!("{:.3} ms", i.max_deflection_time_s * 1e3),
                 i.restitution.map_or("-".into(), |e| format!("{e:.4}")),
-                i.curve_force.unwrap_or("-").into(),
+                i.curve_force.unwrap_or("unknown").into(),
                 i.curve_speed_m_per_s.map_or("-".into(), km_per_h),
             ]
         })

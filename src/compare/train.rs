@@ -283,7 +283,7 @@ fn methods<'a>(
                 speed_m_per_s: fit.model.damping.nodes().to_vec(),
                 coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
             });
-            springs.replace(name, Source::Table(fit.model.envelope()?));
+            springs.replace(name, Source::of_body(fit.model.envelope()?));
         }
         add("nsdm", changed, springs, start.elapsed().as_secs_f64());
     }

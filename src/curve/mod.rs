@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::unit::Speed;
+use crate::unit::{Speed, UnitSystem};
 pub use envelope::{Envelope, EnvelopeError};
 
 /// A force–deflection history: what one run measured at an interface.
@@ -102,6 +102,21 @@ impl ForceKind {
         match self {
             Self::Contact => "contact",
             Self::Body => "body",
+        }
+    }
+
+    /// The kind of that name.
+    pub fn parse(name: &str) -> Option<Self> {
+        [Self::Contact, Self::Body].into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// Which runs a curve of this force may drive, for headers and messages.
+    pub fn drives(self) -> &'static str {
+        match self {
+            Self::Body => "bodies of one mass",
+            Self::Contact => {
+                "bodies whose crush zone is a mass of its own; one rigid mass does not follow it"
+            }
         }
     }
 }
@@ -217,6 +232,13 @@ impl Case {
     /// Index of the largest deflection in the original curve.
     pub fn loading_end(&self) -> usize {
         loading::loading_end(&self.original)
+    }
+
+    /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
+    /// versions.
+    pub fn units(&self) -> Option<UnitSystem> {
+        let recipe: serde_json::Value = serde_json::from_str(&self.recipe).ok()?;
+        UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
     /// Largest deflection, in m.

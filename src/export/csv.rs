@@ -1,48 +1,71 @@
-//! Curve as CSV: `d_m,force_N[,lo,hi]` under `#` header lines, written and read.
+//! Curve as CSV: deflection and force under `#` header lines, written and read.
 
 use std::fmt::Write;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, Options, headline, nine_digits};
-use crate::curve::{Envelope, EnvelopeError};
+use super::{ExportError, Options, facts, nine_digits};
+use crate::curve::{Envelope, EnvelopeError, ForceKind};
 use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
-use crate::unit::{FORCE, LENGTH};
+use crate::unit::{Dimension, FORCE, LENGTH, SpeedKind, UnitSystem};
 
-pub fn write(curve: &PredictedCurve, _: &Options) -> Result<Vec<u8>, ExportError> {
+pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
+    let units = options.units.unwrap_or(UnitSystem::SI);
+    let (length, force) =
+        LENGTH.name_of(units.length_m).zip(FORCE.name_of(units.force())).ok_or_else(|| {
+            ExportError::NoUnitNames { lengths: LENGTH.known_units(), forces: FORCE.known_units() }
+        })?;
     let mut out = String::new();
     // Writing to a string cannot fail.
     let mut line = |text: std::fmt::Arguments<'_>| {
         let _ = writeln!(out, "{text}");
     };
-    line(format_args!("# {}", headline(curve)));
-    line(format_args!("# deflection in m, force in N, positive in compression"));
-    line(format_args!("# speed_m_per_s: {}", curve.speed_m_per_s));
-    line(format_args!("# speed_kind: {}", curve.speed_kind.name()));
-    line(format_args!("# mass_kg: {}", curve.mass_kg));
-    line(format_args!("# energy_J: {}", nine_digits(curve.energy_j)));
-    line(format_args!(
-        "# unloading_stiffness_N_per_m: {}",
-        nine_digits(curve.unloading_stiffness_n_per_m)
-    ));
-    line(format_args!("# model: {}", curve.model));
-    line(format_args!("# training_hash: {}", curve.provenance.training_hash));
-    line(format_args!("# written_by: {}", curve.provenance.written_by));
+    for (key, value) in facts(curve) {
+        line(format_args!("# {key}: {value}"));
+    }
     for warning in &curve.warnings {
         line(format_args!("# warning: {}", warning.message.replace('\n', " ")));
     }
     let band = curve.force_low_n.as_ref().zip(curve.force_high_n.as_ref());
-    line(format_args!("d_m,force_N{}", if band.is_some() { ",lo,hi" } else { "" }));
+    line(format_args!("d_{length},force_{force}{}", if band.is_some() { ",lo,hi" } else { "" }));
+    let shown = |force_n: f64| nine_digits(force_n / units.force());
     for (i, (d, f)) in curve.deflection_m.iter().zip(&curve.force_n).enumerate() {
         let edges = match band {
-            Some((low, high)) => format!(",{},{}", nine_digits(low[i]), nine_digits(high[i])),
+            Some((low, high)) => format!(",{},{}", shown(low[i]), shown(high[i])),
             None => String::new(),
         };
-        line(format_args!("{},{}{edges}", nine_digits(*d), nine_digits(*f)));
+        line(format_args!("{},{}{edges}", nine_digits(d / units.length_m), shown(*f)));
     }
     Ok(out.into_bytes())
+}
+
+/// A curve from a CSV file, with what its header lines say of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurveTable {
+    pub envelope: Envelope,
+    /// `# unloading_stiffness_N_per_m: …`
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// `# force_kind: body` or `contact`
+    pub force_kind: Option<ForceKind>,
+    /// `# speed_kind: wall` or `closing`
+    pub speed_kind: Option<SpeedKind>,
+    /// `# speed_m_per_s: …`
+    pub speed_m_per_s: Option<f64>,
+}
+
+impl CurveTable {
+    /// A table of which nothing else is known.
+    pub fn bare(envelope: Envelope) -> Self {
+        Self {
+            envelope,
+            unloading_stiffness_n_per_m: None,
+            force_kind: None,
+            speed_kind: None,
+            speed_m_per_s: None,
+        }
+    }
 }
 
 /// Why a CSV file is no curve.
@@ -56,6 +79,8 @@ pub enum CsvError {
         "{path}: line {line}: expected a column {wanted} with its unit, such as {example}, found \"{found}\""
     )]
     Header { path: PathBuf, line: u64, wanted: &'static str, example: &'static str, found: String },
+    #[error("{path}: line {line}: \"# {key}: {found}\": expected {expected}")]
+    Fact { path: PathBuf, line: u64, key: String, found: String, expected: &'static str },
     #[error("{path}: line {line}, field {field}: expected a number, found \"{found}\"")]
     Number { path: PathBuf, line: u64, field: usize, found: String },
     #[error("{path}: {source}")]
@@ -68,27 +93,30 @@ pub enum CsvError {
 
 /// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`,
 /// `deflection_m`), its second the force (`force_N`, `force_kN`, `force_MN`); further columns
-/// are ignored. Separated by commas, semicolons or tabs, whichever stand in the header.
+/// are ignored. Separated by commas, semicolons or tabs, whichever stand in the header. Of the
+/// `# key: value` lines in front, those named in [`CurveTable`] are read.
 ///
 /// # Errors
 /// [`CsvError`] with line and field.
-pub fn read(path: &Path) -> Result<Envelope, CsvError> {
+pub fn read(path: &Path) -> Result<CurveTable, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
     let mut file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let facts = Facts::read(path, &mut file)?;
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .delimiter(separator(file.fill_buf().map_err(io)?))
         .from_reader(file);
     let header = reader.headers().map_err(malformed)?.clone();
-    let line = header.position().map_or(1, csv::Position::line);
-    let unit = |field: usize, prefixes: &[&str], of: &crate::unit::Dimension, wanted, example| {
+    let line_of =
+        |position: Option<&csv::Position>| facts.lines + position.map_or(1, csv::Position::line);
+    let unit = |field: usize, prefixes: &[&str], of: &Dimension, wanted, example| {
         let found = header.get(field).unwrap_or_default();
         let size = prefixes.iter().find_map(|prefix| of.size_of(found.strip_prefix(prefix)?));
         size.ok_or_else(|| CsvError::Header {
             path: path.into(),
-            line,
+            line: line_of(header.position()),
             wanted,
             example,
             found: found.into(),
@@ -103,7 +131,7 @@ pub fn read(path: &Path) -> Result<Envelope, CsvError> {
             let found = record.get(field).unwrap_or_default();
             found.parse::<f64>().map_err(|_| CsvError::Number {
                 path: path.into(),
-                line: record.position().map_or(0, csv::Position::line),
+                line: line_of(record.position()),
                 field: field + 1,
                 found: found.into(),
             })
@@ -115,6 +143,70 @@ pub fn read(path: &Path) -> Result<Envelope, CsvError> {
         .map_err(|source| CsvError::Envelope { path: path.into(), source })?;
     match envelope.first_pulling_point() {
         Some(point) => Err(CsvError::Pulling { path: path.into(), point }),
-        None => Ok(envelope),
+        None => Ok(CurveTable { envelope, ..facts.table }),
+    }
+}
+
+/// What stands in the `#` lines in front of a table.
+struct Facts {
+    /// With an envelope that is still to come.
+    table: CurveTable,
+    /// Lines read.
+    lines: u64,
+}
+
+/// No header line is longer.
+const LONGEST_LINE: u64 = 1 << 16;
+
+impl Facts {
+    fn read(path: &Path, file: &mut BufReader<File>) -> Result<Self, CsvError> {
+        let io = |source| CsvError::Io { path: path.into(), source };
+        let nothing = Envelope::new(vec![0.0, 1.0], vec![0.0, 0.0]);
+        let nothing = nothing.map_err(|source| CsvError::Envelope { path: path.into(), source })?;
+        let mut facts = Self { table: CurveTable::bare(nothing), lines: 0 };
+        while file.fill_buf().map_err(io)?.first() == Some(&b'#') {
+            let mut line = Vec::new();
+            std::io::Read::take(&mut *file, LONGEST_LINE)
+                .read_until(b'\n', &mut line)
+                .map_err(io)?;
+            facts.lines += 1;
+            let line = String::from_utf8_lossy(&line);
+            if let Some((key, value)) = line.trim_start_matches('#').split_once(':') {
+                facts.note(path, key.trim(), value.trim())?;
+            }
+        }
+        Ok(facts)
+    }
+
+    fn note(&mut self, path: &Path, key: &str, value: &str) -> Result<(), CsvError> {
+        let line = self.lines;
+        let wrong = |expected| CsvError::Fact {
+            path: path.into(),
+            line,
+            key: key.into(),
+            found: value.into(),
+            expected,
+        };
+        let above_zero = || {
+            let number = value.parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
+            number.ok_or_else(|| wrong("a number above 0"))
+        };
+        let table = &mut self.table;
+        match key {
+            "unloading_stiffness_N_per_m" => {
+                table.unloading_stiffness_n_per_m = Some(above_zero()?);
+            }
+            "speed_m_per_s" => table.speed_m_per_s = Some(above_zero()?),
+            "force_kind" => {
+                let kind = ForceKind::parse(value);
+                table.force_kind = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);
+            }
+            "speed_kind" => {
+                let kind = SpeedKind::parse(value);
+                table.speed_kind = Some(kind.ok_or_else(|| wrong("\"wall\" or \"closing\""))?);
+            }
+            _ => {}
+        }
+        Ok(())
     }
 }

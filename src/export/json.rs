@@ -7,7 +7,10 @@ use super::{ExportError, Options};
 use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::PredictError;
 
-pub fn write(curve: &PredictedCurve, _: &Options) -> Result<Vec<u8>, ExportError> {
+pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
+    if options.units.is_some() {
+        return Err(ExportError::SiOnly { format: "json" });
+    }
     let mut bytes = serde_json::to_vec_pretty(curve)?;
     bytes.push(b'\n');
     Ok(bytes)

@@ -2,34 +2,34 @@
 
 use std::fmt::Write;
 
-use super::{ExportError, Options, headline, nine_digits};
+use super::{ExportError, Options, facts, headline, nine_digits};
 use crate::surrogate::PredictedCurve;
+use crate::unit::UnitSystem;
 
 /// Columns of a title.
 const TITLE_WIDTH: usize = 80;
 
 pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
-    let units = options.units;
+    let units = options.units.or(curve.provenance.study_units).unwrap_or(UnitSystem::SI);
+    let stiffness = units.force() / units.length_m;
     let mut out = String::new();
     // Writing to a string cannot fail.
     let mut line = |text: std::fmt::Arguments<'_>| {
         let _ = writeln!(out, "{text}");
     };
     line(format_args!("*KEYWORD"));
-    line(format_args!("$ force over deflection, positive in compression"));
     line(format_args!(
-        "$ units: length {} m, force {} N",
+        "$ units of the points: {units} (length {} m, force {} N)",
         nine_digits(units.length_m),
         nine_digits(units.force())
     ));
-    line(format_args!("$ speed {} m/s ({})", curve.speed_m_per_s, curve.speed_kind.name()));
-    line(format_args!("$ mass {} kg", curve.mass_kg));
     line(format_args!(
-        "$ unloading stiffness {} N/m",
-        nine_digits(curve.unloading_stiffness_n_per_m)
+        "$ unloading stiffness in these units: {}",
+        nine_digits(curve.unloading_stiffness_n_per_m / stiffness)
     ));
-    line(format_args!("$ model {}, {}", curve.model, curve.provenance.written_by));
-    line(format_args!("$ training set {}", curve.provenance.training_hash));
+    for (key, value) in facts(curve) {
+        line(format_args!("$ {key}: {value}"));
+    }
     line(format_args!("*DEFINE_CURVE_TITLE"));
     line(format_args!("{}", title(&headline(curve))));
     line(format_args!(

@@ -7,9 +7,11 @@ pub mod onnx;
 
 use std::path::Path;
 
+use crate::curve::Parameter;
+use crate::dataset::OTHER_MASS;
 use crate::forest::OnnxError;
 use crate::surrogate::{Model, PredictedCurve};
-use crate::unit::UnitSystem;
+use crate::unit::{SpeedKind, UnitSystem};
 
 /// One target: its name, its file extensions, how it is written.
 pub struct Format {
@@ -37,13 +39,13 @@ pub const FORMATS: &[Format] = &[
     Format {
         name: "csv",
         extensions: &["csv"],
-        description: "columns d_m,force_N with # header lines, SI",
+        description: "columns of deflection and force with # header lines, SI or --units",
         write: Write::Curve(csv::write),
     },
     Format {
         name: "lsdyna",
         extensions: &["k", "key", "dyn"],
-        description: "LS-DYNA *DEFINE_CURVE_TITLE, in the deck's units (--units)",
+        description: "LS-DYNA *DEFINE_CURVE_TITLE, in the study's units or --units",
         write: Write::Curve(lsdyna::write),
     },
     Format {
@@ -57,15 +59,15 @@ pub const FORMATS: &[Format] = &[
 /// Choices that some targets take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Units of the target's deck.
-    pub units: UnitSystem,
+    /// Units of the file; the target's usual ones if absent.
+    pub units: Option<UnitSystem>,
     /// Number of the curve in the target's deck.
     pub id: u32,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { units: UnitSystem::SI, id: 101 }
+        Self { units: None, id: 101 }
     }
 }
 
@@ -80,6 +82,12 @@ pub enum ExportError {
     NoSuchExtension { path: String, known: String },
     #[error("{format} takes {needs}")]
     Unfit { format: &'static str, needs: String },
+    #[error("columns need units with names of their own: lengths in {lengths}, forces in {forces}")]
+    NoUnitNames { lengths: String, forces: String },
+    #[error(
+        "{format} is always in SI: leave --units away, or take a format that has units (csv, lsdyna)"
+    )]
+    SiOnly { format: &'static str },
     #[error(transparent)]
     Onnx(#[from] OnnxError),
     #[error("cannot encode the curve: {0}")]
@@ -128,6 +136,11 @@ impl Format {
         }
         write(curve, options)
     }
+
+    /// Whether one file holds both forces of a curve, each with its unloading.
+    pub fn holds_both_forces(&self) -> bool {
+        self.name == "json"
+    }
 }
 
 /// The format of that name.
@@ -166,6 +179,58 @@ fn headline(curve: &PredictedCurve) -> String {
         crate::unit::km_per_h(curve.speed_m_per_s),
         curve.speed_kind.name()
     )
+}
+
+/// What a curve is and what it may drive, as keys and values of a file's header; SI.
+fn facts(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
+    let kind = curve.provenance.force_kind;
+    let steepest = curve.envelope().map_or(0.0, |e| e.max_slope());
+    vec![
+        ("curve", headline(curve)),
+        ("force_kind", kind.name().into()),
+        ("drives", kind.drives().into()),
+        ("sign", "deflection and force positive in compression".into()),
+        ("speed_m_per_s", curve.speed_m_per_s.to_string()),
+        ("speed_kind", curve.speed_kind.name().into()),
+        ("mass_kg", curve.mass_kg.to_string()),
+        ("impact", impact(curve)),
+        ("energy_J", nine_digits(curve.energy_j)),
+        ("unloading_stiffness_N_per_m", nine_digits(curve.unloading_stiffness_n_per_m)),
+        ("unloading", unloading(curve, steepest).into()),
+        ("steepest_rise_N_per_m", nine_digits(steepest)),
+        ("model", curve.model.clone()),
+        ("training_hash", curve.provenance.training_hash.clone()),
+        ("written_by", curve.provenance.written_by.clone()),
+    ]
+}
+
+/// What the unloading stiffness gives.
+fn unloading(curve: &PredictedCurve, steepest_n_per_m: f64) -> &'static str {
+    let softer = curve.unloading_stiffness_n_per_m < steepest_n_per_m;
+    match (curve.rebound.is_some(), softer) {
+        (true, false) => "along this stiffness from the maximal crush it gives the rebound",
+        (true, true) => {
+            "along this stiffness from the maximal crush it gives the rebound; from a point of the steepest rise it would give energy"
+        }
+        (false, _) => {
+            "no run shows the rebound: at least the steepest rise, so that it gives no energy"
+        }
+    }
+}
+
+/// What hits what.
+fn impact(curve: &PredictedCurve) -> String {
+    match (curve.speed_kind, curve.provenance.parameters.get(OTHER_MASS)) {
+        (SpeedKind::Wall, _) => "one body of this mass against a rigid wall".into(),
+        (SpeedKind::Closing, Some(Parameter::Number(other))) => {
+            format!(
+                "two bodies, of this mass and of {other} kg; the speed is that of their closure"
+            )
+        }
+        (SpeedKind::Closing, _) => {
+            "two bodies of this mass each; the speed is that of their closure".into()
+        }
+    }
 }
 
 /// Nine significant digits in Fortran's form: `3.80000000E+06`.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::{CurveTable, ForceName, Scenario, ScenarioError, StageTable};
-use crate::curve::{Case, Envelope};
+use crate::curve::{Case, Envelope, ForceKind};
 use crate::database::Database;
 use crate::export::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
@@ -20,8 +20,9 @@ pub struct Sources {
 pub enum Source {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
-    /// A table or stages, whose force nobody has named.
-    Table(Envelope),
+    Table(Box<csv::CurveTable>),
+    /// Stages of a device between two bodies.
+    Stages(Envelope),
     Case(Box<Case>),
 }
 
@@ -96,6 +97,12 @@ impl<E: Into<ScenarioError>> From<E> for ReadError {
 }
 
 impl Source {
+    /// A force that moves bodies of one mass, and of which nothing else is known.
+    pub fn of_body(envelope: Envelope) -> Self {
+        let table = csv::CurveTable::bare(envelope);
+        Self::Table(Box::new(csv::CurveTable { force_kind: Some(ForceKind::Body), ..table }))
+    }
+
     fn read(
         table: &CurveTable,
         name: &str,
@@ -108,14 +115,23 @@ impl Source {
             }
             (None, Some(file), None, None) => {
                 let path = folder.join(file);
-                let is_json = path.extension().is_some_and(|e| e == "json");
-                match (is_json, table.force) {
-                    (true, _) => Ok(Self::Predicted(Box::new(json::read(&path)?))),
-                    (false, Some(ForceName::Body)) => Err(ReadError::Message(format!(
-                        "curve \"{name}\": a CSV file does not say which force it holds: leave force away"
-                    ))),
-                    (false, _) => Ok(Self::Table(csv::read(&path)?)),
+                if path.extension().is_some_and(|e| e == "json") {
+                    return Ok(Self::Predicted(Box::new(json::read(&path)?)));
                 }
+                let mut held = csv::read(&path)?;
+                let stated = match table.force {
+                    Some(ForceName::Body) => Some(ForceKind::Body),
+                    Some(ForceName::Contact) => Some(ForceKind::Contact),
+                    Some(ForceName::Declared) | None => held.force_kind,
+                };
+                if held.force_kind.is_some() && stated != held.force_kind {
+                    return Err(ReadError::Message(format!(
+                        "curve \"{name}\": force names another force than {} says it holds: leave force away",
+                        path.display()
+                    )));
+                }
+                held.force_kind = stated;
+                Ok(Self::Table(Box::new(held)))
             }
             (None, None, Some(database), None) => {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));
@@ -131,7 +147,7 @@ impl Source {
                 Ok(Self::Case(Box::new(databases[&path].case(&path, group, case)?.clone())))
             }
             (None, None, None, Some(stages)) => staged(stages)
-                .map(Self::Table)
+                .map(Self::Stages)
                 .map_err(|message| ReadError::Message(format!("curve \"{name}\": {message}"))),
             _ => Err(ReadError::Message(format!(
                 "curve \"{name}\" needs exactly one of model, file, database and stages"

@@ -1,9 +1,10 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
 use super::layout::{Role, Slot};
-use super::{CurveTable, EndName, ForceName, LawName, Source};
+use super::{CurveTable as Table, EndName, ForceName, LawName, Source};
 use crate::curve::body::recorded_force;
 use crate::curve::{Case, Envelope, ForceKind};
+use crate::export::csv::CurveTable;
 use crate::multibody::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 use crate::surrogate::predict::{PredictError, drive, predict_beyond};
 use crate::surrogate::{Model, PredictedCurve, Query};
@@ -37,7 +38,7 @@ impl<E: Into<PredictError>> From<E> for SpringError {
 /// The curve of a source that the interface needs, at `speed_m_per_s` if a model gives it.
 pub(super) fn spring(
     source: &Source,
-    table: &CurveTable,
+    table: &Table,
     slot: &Slot<'_>,
     speed_m_per_s: f64,
 ) -> Result<Spring, SpringError> {
@@ -47,30 +48,25 @@ pub(super) fn spring(
             (Some(curve.provenance.force_kind), curve.body_force_n.is_some())
         }
         Source::Case(case) => (Some(case.force_kind), case.force_kind == ForceKind::Contact),
-        Source::Table(_) => (None, false),
+        Source::Table(held) => (held.force_kind, held.force_kind == Some(ForceKind::Body)),
+        Source::Stages(_) => (None, false),
     };
     let force = which_force(table.force, slot, declared, has_body)?;
     let mut spring = match source {
         Source::Model(model) => from_model(model, table, slot, speed_m_per_s, force)?,
         Source::Predicted(curve) => from_curve(curve, table, force)?,
-        Source::Table(_) | Source::Case(_) if table.band.is_some() => {
+        Source::Table(_) | Source::Stages(_) | Source::Case(_) if table.band.is_some() => {
             return Err(SpringError::Message(
                 "band needs a model or a predicted curve (.json), which has one".into(),
             ));
         }
-        Source::Table(envelope) => Spring {
-            envelope: envelope.clone(),
-            unloading_n_per_m: None,
-            shape: None,
-            kind: None,
-            force: None,
-            speed_m_per_s: None,
-            warnings: Vec::new(),
-        },
+        Source::Table(held) => from_table(held),
+        Source::Stages(envelope) => from_table(&CurveTable::bare(envelope.clone())).silent(),
         Source::Case(case) => from_case(case, force).map_err(SpringError::Message)?,
     };
     let only_contact = force == ForceName::Declared && spring.force == Some(ForceKind::Contact);
-    if only_contact && table.force.is_none() && !slot.split && slot.role != Role::Within {
+    let stated = table.force.is_some() && !matches!(source, Source::Table(_));
+    if only_contact && !stated && !slot.split && slot.role != Role::Within {
         spring.warnings.push(
             "it has a contact force only, which a vehicle of one mass does not follow: mass that the crush zone stops early is in it; use a body force, or split the vehicles (front, rear)".into(),
         );
@@ -89,23 +85,29 @@ fn which_force(
 ) -> Result<ForceName, SpringError> {
     let is_body = match asked {
         Some(ForceName::Body) => true,
+        Some(ForceName::Contact) => false,
         Some(ForceName::Declared) | None => declared == Some(ForceKind::Body),
     };
+    if asked == Some(ForceName::Contact) && declared == Some(ForceKind::Body) {
+        return Err(SpringError::Predict(PredictError::NoContactForce));
+    }
     if slot.split && slot.role != Role::Within && is_body {
         return Err(SpringError::Message(format!(
             "interface {} has a vehicle with a crush zone of its own mass, which a body force already contains: use a contact force, or no front and rear",
             slot.name
         )));
     }
-    Ok(asked.unwrap_or(match has_body && !slot.split {
-        true => ForceName::Body,
-        false => ForceName::Declared,
-    }))
+    Ok(match asked {
+        Some(ForceName::Body) => ForceName::Body,
+        Some(ForceName::Declared | ForceName::Contact) => ForceName::Declared,
+        None if has_body && !slot.split => ForceName::Body,
+        None => ForceName::Declared,
+    })
 }
 
 fn from_model(
     model: &Model,
-    table: &CurveTable,
+    table: &Table,
     slot: &Slot<'_>,
     speed_m_per_s: f64,
     force: ForceName,
@@ -118,7 +120,7 @@ fn from_model(
     };
     let driven = match force {
         ForceName::Body if table.band.is_none() => drive(model, &query)?,
-        ForceName::Body | ForceName::Declared => None,
+        _ => None,
     };
     let (mut spring, beyond) = match driven {
         Some(drive) => {
@@ -137,7 +139,7 @@ fn from_model(
             let (curve, beyond) = predict_beyond(model, &query)?;
             let beyond = match force {
                 ForceName::Body => beyond.body,
-                ForceName::Declared => beyond.declared,
+                ForceName::Declared | ForceName::Contact => beyond.declared,
             };
             (from_curve(&curve, table, force)?, beyond)
         }
@@ -161,14 +163,33 @@ fn from_model(
     Ok(spring)
 }
 
+/// A table with what its header says; what it does not say is said.
+fn from_table(held: &CurveTable) -> Spring {
+    let mut warnings = Vec::new();
+    if held.force_kind.is_none() {
+        warnings.push(
+            "its file does not say which force it holds: taken as the one that moves the bodies; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it".into(),
+        );
+    }
+    Spring {
+        envelope: held.envelope.clone(),
+        unloading_n_per_m: held.unloading_stiffness_n_per_m,
+        shape: None,
+        kind: held.speed_kind,
+        force: held.force_kind,
+        speed_m_per_s: held.speed_m_per_s,
+        warnings,
+    }
+}
+
 /// The force that was asked for, with the unloading that goes with it.
 fn from_curve(
     curve: &PredictedCurve,
-    table: &CurveTable,
+    table: &Table,
     force: ForceName,
 ) -> Result<Spring, PredictError> {
     let mut envelope = match force {
-        ForceName::Declared => curve.envelope()?,
+        ForceName::Declared | ForceName::Contact => curve.envelope()?,
         ForceName::Body => curve.driving_envelope()?,
     };
     if let Some(member) = table.band {
@@ -182,7 +203,7 @@ fn from_curve(
         shape: None,
         kind: Some(curve.speed_kind),
         force: Some(match force {
-            ForceName::Declared => curve.provenance.force_kind,
+            ForceName::Declared | ForceName::Contact => curve.provenance.force_kind,
             ForceName::Body => ForceKind::Body,
         }),
         speed_m_per_s: Some(curve.speed_m_per_s),
@@ -253,14 +274,26 @@ fn scaled(mut spring: Spring, factor: Option<f64>) -> Result<Spring, String> {
 }
 
 impl Spring {
+    /// Without what is said of files: a device's stages are no file's.
+    fn silent(mut self) -> Self {
+        self.warnings.clear();
+        self
+    }
+
     /// The force law that the curve's table asks for.
-    pub fn law(&mut self, table: &CurveTable) -> Result<ForceLaw, String> {
+    pub fn law(&mut self, table: &Table) -> Result<ForceLaw, String> {
         let asked = table.unloading.map(|u| u.0);
         let unloading = match table.law {
             LawName::Elastic => Unloading::Elastic,
             LawName::Memory => {
                 let steepest = self.envelope.max_slope();
                 let stiffness = asked.or(self.unloading_n_per_m).unwrap_or(steepest);
+                if asked.is_none() && self.unloading_n_per_m.is_none() && steepest > 0.0 {
+                    self.warnings.push(format!(
+                        "it has no unloading stiffness: it unloads with its steepest rise, {:.4} MN/m, and so gives back little; say unloading = \"…MN/m\"",
+                        steepest / 1e6
+                    ));
+                }
                 if let Some(asked) = asked
                     && asked < steepest
                     && table.stages.is_none()

@@ -165,8 +165,8 @@ pub struct CurveTable {
     /// Of a model: values of its further parameters.
     #[serde(default)]
     pub parameters: BTreeMap<String, Parameter>,
-    /// Of a model, predicted curve or database case: the force of the recipe, or the one that
-    /// moves a body of one mass; if absent the one that the vehicles need.
+    /// Of a model, predicted curve or database case: the force that is taken; if absent the
+    /// one that the vehicles need. Of a CSV file that does not say it: the force that it holds.
     pub force: Option<ForceName>,
     /// Of a model or predicted curve: member of its band, from −1 (lower edge) over 0 (the
     /// curve) to 1 (upper edge).
@@ -181,6 +181,8 @@ pub struct CurveTable {
 pub enum ForceName {
     /// The force of the recipe (contact or body).
     Declared,
+    /// What the obstacle feels.
+    Contact,
     /// The force of the body's motion, with its rebound.
     Body,
 }

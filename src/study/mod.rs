@@ -543,7 +543,7 @@ impl LocatedRun<'_> {
             solver_wall_time_s: self.solver_wall_time_s(),
             unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
             audit: extracted.audit,
-            recipe: self.recipe.clone(),
+            recipe: self.recipe_in(units),
             fingerprint: self.fingerprint.clone(),
             sources: read
                 .iter()
@@ -553,6 +553,15 @@ impl LocatedRun<'_> {
             notes,
             warnings,
         })
+    }
+
+    /// The recipe with the units that were found for it.
+    fn recipe_in(&self, units: UnitSystem) -> String {
+        let Ok(mut recipe) = serde_json::from_str::<serde_json::Value>(&self.recipe) else {
+            return self.recipe.clone();
+        };
+        recipe["units"] = units.to_string().into();
+        recipe.to_string()
     }
 
     /// The contact force beside a body force.

@@ -20,7 +20,7 @@ use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, Force, TrainingCase, TrainingSet, grid, nearest};
 use crate::file::{WriteError, write_whole};
 use crate::forest::ForestError;
-use crate::unit::SpeedKind;
+use crate::unit::{SpeedKind, UnitSystem};
 
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
@@ -223,6 +223,9 @@ pub struct Model {
     pub force_kind: ForceKind,
     pub mass_kg: f64,
     pub other_mass_kg: Option<f64>,
+    /// Units of the solver's files that the training cases come from, for exports.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub study_units: Option<UnitSystem>,
     /// Parameters beside speed that queries must give.
     #[serde(default)]
     pub features: Vec<Feature>,
@@ -344,6 +347,7 @@ impl Model {
             force_kind: set.force_kind,
             mass_kg: set.masses.body_kg,
             other_mass_kg: set.masses.other_kg,
+            study_units: set.units,
             features: set.features.clone(),
             training_hash: set.hash(),
             max_crush_rule: default_rule(&options, set),

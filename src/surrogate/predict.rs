@@ -13,7 +13,7 @@ use super::warning::Warning;
 use super::{At, Model};
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
 use crate::dataset::{DatasetError, MASS, OTHER_MASS, feature_values, grid, nearest};
-use crate::unit::{Speed, SpeedKind};
+use crate::unit::{Speed, SpeedKind, UnitSystem};
 
 /// Points of a predicted curve beside (0, 0), as in the reference data.
 const POINTS: usize = 400;
@@ -83,10 +83,23 @@ pub struct PredictedCurve {
     /// tell how the training points scatter, not how far FE lies off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forest_quantiles: Option<ForestQuantiles>,
-    /// One stiffness for unloading from any deflection: at least the steepest rise of the
-    /// curve, so that no deflection creates energy.
+    /// Unloading stiffness that belongs to `force_N`, from its maximal crush: that of the
+    /// rebound where one is known, else the measured one, at least the steepest rise.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: f64,
+    /// The same for `body_force_N`.
+    #[serde(
+        rename = "body_unloading_stiffness_N_per_m",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Which runs `force_N` may drive.
+    #[serde(default)]
+    pub drives: String,
+    /// Which runs `body_force_N` may drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_drives: Option<String>,
     /// The rebound from the maximal crush.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound: Option<Rebound>,
@@ -133,6 +146,9 @@ pub struct Provenance {
     pub group: String,
     pub force_kind: ForceKind,
     pub training_hash: String,
+    /// Units of the training runs' files: what an export to their solver is written in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub study_units: Option<UnitSystem>,
     pub training_speeds_m_per_s: Vec<f64>,
     pub in_range: bool,
     pub nearest_training_speed_m_per_s: f64,
@@ -187,9 +203,13 @@ pub enum PredictError {
     #[error("the model has no parameter \"{name}\": its parameters are {known}")]
     UnknownParameter { name: String, known: String },
     #[error(
-        "the curve has a contact force and no body force: predict it again with a model trained by this version, or use its own force"
+        "the curve has a contact force and no body force: use the contact force, or predict it again with a model whose runs record velocities"
     )]
     NoBodyForce,
+    #[error(
+        "the curve has a body force and no contact force: its study's recipe names none; use the body force"
+    )]
+    NoContactForce,
     #[error("the {model} model has no answer at this speed: train another one")]
     NoAnswer { model: &'static str },
     #[error("the predicted curve is no curve: {0}")]
@@ -452,9 +472,12 @@ pub fn predict_beyond(
     let mut parameters = asked.parameters.clone();
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
     let (low, high) = model.range_m_per_s();
-    let curve = PredictedCurve {
-        // A softer unloading than the steepest rise would create energy.
+    let mut curve = PredictedCurve {
+        // Without a rebound a softer unloading than the steepest rise would create energy.
         unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(envelope.max_slope()),
+        body_unloading_stiffness_n_per_m: None,
+        drives: model.force_kind.drives().into(),
+        body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
         rebound,
         max_deflection_m: end,
         energy_j: envelope.work(),
@@ -462,7 +485,7 @@ pub fn predict_beyond(
         force_n: envelope.force_n().to_vec(),
         force_low_n,
         force_high_n,
-        body_force_n: body.map(|b| b.force_n().to_vec()),
+        body_force_n: body.as_ref().map(|b| b.force_n().to_vec()),
         forest_quantiles: match model.fitted() {
             Fitted::Forest(forest) | Fitted::Extra(forest) => forest
                 .quantiles(&at, envelope.deflection_m(), band::LEVEL)
@@ -479,6 +502,7 @@ pub fn predict_beyond(
             group: model.group.clone(),
             force_kind: model.force_kind,
             training_hash: model.training_hash.clone(),
+            study_units: model.study_units,
             training_speeds_m_per_s: model.cases.iter().map(|c| c.speed_m_per_s).collect(),
             in_range: (low..=high).contains(&v),
             nearest_training_speed_m_per_s: nearest,
@@ -492,6 +516,8 @@ pub fn predict_beyond(
             parameters,
         },
     };
+    curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&envelope);
+    curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b));
     Ok((curve, beyond))
 }
 
@@ -663,29 +689,58 @@ impl PredictedCurve {
         }
     }
 
-    /// The same curve with the body force in place of the declared one; itself if it has no
-    /// other. What belongs to the declared force alone (band, quantiles) goes.
+    /// The curve of one force alone, with the unloading that belongs to it. What is of the
+    /// declared force only (band, quantiles) goes with that.
     ///
     /// # Errors
-    /// As [`envelope`](Self::envelope).
-    pub fn of_body_force(&self) -> Result<Self, PredictError> {
-        let envelope = self.driving_envelope()?;
-        if self.body_force_n.is_none() {
-            return Ok(self.clone());
+    /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
+    /// force, else as [`envelope`](Self::envelope).
+    pub fn of_force(&self, kind: ForceKind) -> Result<Self, PredictError> {
+        match (kind, self.provenance.force_kind) {
+            (ForceKind::Contact, ForceKind::Body) => Err(PredictError::NoContactForce),
+            (ForceKind::Contact, ForceKind::Contact) => self.of_contact_force(),
+            (ForceKind::Body, _) => self.of_body_force(),
         }
+    }
+
+    fn of_contact_force(&self) -> Result<Self, PredictError> {
+        let stiffness = self.stiffness_at_end(&self.envelope()?);
         let mut curve = self.clone();
-        let stiffness = self.rebound.map_or(0.0, |r| r.stiffness_n_per_m);
-        curve.unloading_stiffness_n_per_m = stiffness.max(envelope.max_slope());
+        curve.unloading_stiffness_n_per_m = stiffness;
+        if let Some(rebound) = &mut curve.rebound {
+            rebound.stiffness_n_per_m = stiffness;
+        }
+        curve.without_second_force();
+        Ok(curve)
+    }
+
+    fn of_body_force(&self) -> Result<Self, PredictError> {
+        let envelope = self.driving_envelope()?;
+        let mut curve = self.clone();
+        curve.unloading_stiffness_n_per_m = self.stiffness_at_end(&envelope);
+        if self.body_force_n.is_none() {
+            return Ok(curve);
+        }
+        if curve.rebound.is_none() {
+            curve.unloading_stiffness_n_per_m = envelope.max_slope();
+        }
         curve.energy_j = envelope.work();
         curve.force_n = envelope.force_n().to_vec();
         (curve.force_low_n, curve.force_high_n, curve.forest_quantiles) = (None, None, None);
-        curve.body_force_n = None;
+        curve.drives = ForceKind::Body.drives().into();
         curve.provenance.force_kind = ForceKind::Body;
         curve.provenance.energy_over_kinetic =
             self.provenance.body_energy_over_kinetic.unwrap_or(self.provenance.energy_over_kinetic);
-        curve.provenance.body_energy_over_kinetic = None;
         curve.provenance.band = None;
+        curve.without_second_force();
         Ok(curve)
+    }
+
+    fn without_second_force(&mut self) {
+        self.body_force_n = None;
+        self.body_unloading_stiffness_n_per_m = None;
+        self.body_drives = None;
+        self.provenance.body_energy_over_kinetic = None;
     }
 
     /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
