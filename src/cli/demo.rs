@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crumple::build::{self, RunOutcome};
-use crumple::curve::Case;
+use crumple::curve::{Case, ForceKind};
 use crumple::database::Database;
 use crumple::export;
 use crumple::file::write_whole;
@@ -192,7 +192,14 @@ impl Flow<'_> {
         let curve = predict(model, &Query::at(SPEED_M_PER_S))?;
         for name in ["lead50.json", "lead50.csv", "lead50.k"] {
             let path = self.path(name);
-            let bytes = export::by_extension(&path)?.encode(&curve, &export::Options::default())?;
+            let format = export::by_extension(&path)?;
+            let bytes = match format.holds_both_forces() {
+                true => format.encode(&curve, &export::Options::default())?,
+                false => {
+                    let body = curve.of_force(ForceKind::Body)?;
+                    format.encode(&body, &export::Options::default())?
+                }
+            };
             write_whole(&path, &bytes)?;
         }
         Ok(curve)

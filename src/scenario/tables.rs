@@ -147,7 +147,8 @@ pub struct CurveTable {
     pub stages: Option<Vec<StageTable>>,
     /// Unloading stiffness; the curve's own if absent.
     pub unloading: Option<StiffnessText>,
-    /// Free distance before contact.
+    /// Free distance before contact: between the surfaces that meet, so between mid-surfaces of
+    /// meshed plates less half of both thicknesses.
     pub gap: Option<LengthText>,
     /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
     pub tension: Option<String>,
@@ -310,6 +311,6 @@ fn wall_name() -> String {
 pub struct ContactTable {
     /// Name of its curve.
     pub curve: String,
-    /// Free distance before contact; the curve's own if absent.
+    /// Free distance between the surfaces before contact; the curve's own if absent.
     pub gap: Option<LengthText>,
 }
