@@ -128,7 +128,7 @@ fn h5py_reads_what_db_show_prints() {
     let shown = crumple_ok(folder.path(), &["db", "show", "curves.h5", "--json"]);
     let shown: Value = serde_json::from_str(&shown).unwrap();
     let cases = read["cases"].as_array().unwrap();
-    assert_eq!(cases.len(), 16);
+    assert_eq!(cases.len(), 20);
     for case in cases {
         let group = case["group"].as_str().unwrap();
         let ours = shown["groups"][group]

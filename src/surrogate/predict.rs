@@ -358,7 +358,9 @@ impl<'a> Asked<'a> {
 }
 
 fn evenly(end_m: f64) -> Vec<f64> {
-    (0..=POINTS).map(|i| end_m * i as f64 / POINTS as f64).collect()
+    // The last point is the end itself, not its rounding.
+    let inner = (0..POINTS).map(|i| end_m * i as f64 / POINTS as f64);
+    inner.chain([end_m]).collect()
 }
 
 /// What drives a body of one mass: the force of its motion and how it unloads.
