@@ -274,6 +274,53 @@ fn other_widths_and_the_other_byte_order() {
     assert_eq!(of("nip"), [-3.0, -3.0]);
 }
 
+/// Ids that are all the same, by damage or malice: what is there more than once is named, and
+/// the work grows with the file and not with its square.
+#[test]
+fn equal_ids_are_named_and_take_no_square_of_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let converted = |count: usize| {
+        let mut out = Written::new();
+        out.ids("nodout", &vec![7; count]);
+        for state in 1..=2 {
+            out.cd(&format!("/nodout/d{state:06}"));
+            out.reals("time", &[f64::from(state)]);
+            out.reals("x_displacement", &vec![1.0; count]);
+        }
+        let path = folder.path().join("binout");
+        fs::write(&path, out.bytes).unwrap();
+        let output = folder.path().join("x.h5");
+        let start = std::time::Instant::now();
+        let arguments = ["histories", path.to_str().unwrap(), "-o", output.to_str().unwrap()];
+        let error = String::from_utf8(crumple_in(folder.path(), &arguments).stderr).unwrap();
+        let expected = "nodout: 1 ids, the first 7, are there more than once in one state; rows beyond the first 20 are left out";
+        assert!(error.contains(expected), "{error}");
+        start.elapsed()
+    };
+    converted(1_000);
+    // Where every id was a component of its own, this took minutes.
+    let time = converted(200_000);
+    assert!(time.as_secs() < 5, "{time:?}");
+}
+
+/// A list of ids that no model has is left out, and said.
+#[test]
+fn a_list_of_ids_is_bounded() {
+    let mut out = Written::new();
+    let count = 4_000_001;
+    out.ids("nodout", &(1..=count).collect::<Vec<i64>>());
+    out.cd("/nodout/d000001");
+    out.reals("time", &[1.0]);
+    out.data("x_displacement", 9, &vec![0x3f; 4 * count as usize]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    fs::write(&path, out.bytes).unwrap();
+    let file = section(&path, "nodout");
+    assert_eq!(file.histories.len(), 0);
+    let said = file.problems[0].to_string();
+    assert!(said.contains("has 4000001 values a state and no ids of that number"), "{said}");
+}
+
 /// Elements that erode, with two integration points each.
 #[test]
 fn ids_that_change_between_states() {

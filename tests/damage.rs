@@ -27,10 +27,11 @@ fn state_starts(text: &[u8]) -> Vec<usize> {
     starts
 }
 
-/// End of the last character of each state's rows: from there on the state is whole.
+/// End of the last line of each state's rows: from there on the state is whole.
 fn state_ends(text: &[u8], starts: &[usize]) -> Vec<usize> {
     let next = starts.iter().skip(1).copied().chain([text.len()]);
-    next.map(|end| text[..end].trim_ascii_end().len()).collect()
+    let last_row = next.map(|end| text[..end].trim_ascii_end().len());
+    last_row.map(|end| end + text[end..].iter().position(|&b| b == b'\n').unwrap() + 1).collect()
 }
 
 /// Cuts a nodout at every byte of its last two states.

@@ -92,3 +92,25 @@ fn reads_decks_of_others() {
     assert_eq!((d.outputs.len(), &*d.history_node_sets), (7, &[3, 4][..]));
     assert_eq!(messages(&d), [""; 0]);
 }
+
+/// An include without an end, such as one that the whole world includes again and again.
+#[test]
+fn a_deck_and_its_includes_are_read_up_to_a_bound() {
+    let mut open = |_: &str| -> Option<Box<dyn BufRead>> {
+        Some(Box::new(io::BufReader::with_capacity(1 << 20, io::repeat(b' '))))
+    };
+    let error = read(&mut &b"*KEYWORD\n*INCLUDE\nendless.k\n*END\n"[..], &mut open).unwrap_err();
+    assert_eq!(error.to_string(), "a deck is read up to 4 GB with its includes; it has more");
+}
+
+#[test]
+fn a_deck_that_is_no_plain_text_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("main.k");
+    let wide: Vec<u8> = "*KEYWORD\n*TITLE\nrun\n".bytes().flat_map(|b| [b, 0]).collect();
+    for bytes in [[&[0xff, 0xfe], &wide[..]].concat(), wide.clone()] {
+        fs::write(&path, bytes).unwrap();
+        let error = crumple::solver::decks::read(&path).unwrap_err().to_string();
+        assert!(error.contains("main.k: this is UTF-16 text, which iconv"), "{error}");
+    }
+}

@@ -148,13 +148,51 @@ fn damage_text(format: &str, path: &Path) {
     }
 }
 
+/// The first states of a text, as far as it is read without a problem.
+fn first_states(format: &str, text: &[u8], count: usize) -> Vec<u8> {
+    let line_ends = (0..text.len()).filter(|&at| text[at] == b'\n');
+    let whole = |at: &usize| {
+        let file = read(format, &text[..=*at]).remove(0);
+        file.time.len() == count && file.problems.is_empty()
+    };
+    let at = line_ends.take_while(|&at| at < 4 * SIZE).find(whole);
+    text[..=at.unwrap_or_else(|| panic!("{format}: no {count} whole states"))].to_vec()
+}
+
+/// Cuts the last of a few states at every byte: what is returned are the states before it,
+/// with every value, or all of them.
+fn cut_the_last_state(format: &str, path: &Path) {
+    let name = path.display().to_string();
+    let text = std::fs::read(path).unwrap();
+    let count = read(format, &text)[0].time.len().min(3);
+    let text = first_states(format, &text, count);
+    let before = first_states(format, &text, count - 1).len();
+    let whole = read(format, &text).remove(0);
+    for cut in before..text.len() {
+        let file = read(format, &text[..cut]).remove(0);
+        let states = file.time.len();
+        assert!(states >= count - 1, "{name} cut at {cut}: {states} states");
+        assert_eq!(file.time[..], whole.time[..states], "{name} cut at {cut}");
+        assert_eq!(file.histories.len(), whole.histories.len(), "{name} cut at {cut}");
+        for (a, b) in file.histories.iter().zip(&whole.histories) {
+            let same = a.values.iter().zip(&b.values).all(|(a, b)| is_same(*a, *b));
+            assert!(same && a.label() == b.label(), "{name} cut at {cut}: {}", a.label());
+        }
+        let line = text[..cut].rsplit(|&b| b == b'\n').next().unwrap();
+        let is_named = line.trim_ascii().is_empty() || !file.problems.is_empty();
+        assert!(is_named, "{name} cut at {cut}: a cut line is not named");
+    }
+}
+
 macro_rules! text_samples {
     ($($name:ident: $format:literal, $path:literal;)*) => {
         $(
             #[test]
             fn $name() {
                 let Some(folder) = shared("samples/lsdyna") else { return };
-                damage_text($format, &folder.join($format).join($path));
+                let path = folder.join($format).join($path);
+                damage_text($format, &path);
+                cut_the_last_state($format, &path);
             }
         )*
     };
@@ -179,6 +217,7 @@ text_samples! {
 #[test]
 fn our_nodout_with_many_nodes() {
     damage_text("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
+    cut_the_last_state("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
 }
 
 /// A binary file has no check sums: zeros among values are only known by what stands around

@@ -321,6 +321,162 @@ fn dotted(label: &str, value: &str) -> String {
     format!(" {label:.<29}{value:>14}\n")
 }
 
+/// Holds every cut of a text against the whole: what is returned are its first states, with
+/// every value, and a line that is cut is named.
+fn cut_at_every_byte(format: &str, text: &str) {
+    let whole = read(format, text);
+    assert_eq!(whole.problems, [], "{format}");
+    let first = (0..text.len())
+        .find(|&at| text.as_bytes()[at] == b'\n' && read(format, &text[..=at]).time.len() == 1)
+        .unwrap();
+    // A first state that ends between two lines cannot be told from a whole one.
+    let one = (first..text.len()).rev().find(|&at| read(format, &text[..at]).time.len() == 1);
+    for cut in one.unwrap().min(first + (text.len() - first) / 2)..text.len() {
+        let file = read(format, &text[..cut]);
+        let states = file.time.len();
+        assert_eq!(file.time[..], whole.time[..states], "{format} cut at {cut}");
+        if states == 0 {
+            assert!(!file.problems.is_empty(), "{format} cut at {cut}");
+            continue;
+        }
+        assert_eq!(file.histories.len(), whole.histories.len(), "{format} cut at {cut}");
+        for (a, b) in file.histories.iter().zip(&whole.histories) {
+            assert_eq!(a.label(), b.label(), "{format} cut at {cut}");
+            assert_eq!(a.values, b.values[..states], "{format} cut at {cut}: {}", a.label());
+        }
+        let last_line = text[..cut].rsplit('\n').next().unwrap();
+        let is_named = last_line.trim().is_empty() || !file.problems.is_empty();
+        assert!(is_named, "{format} cut at {cut}: \"{last_line}\"");
+    }
+}
+
+/// What a bndout of a prescribed motion is in releases that print no moments: the id of the
+/// set ends the row.
+#[test]
+fn rows_of_a_bndout_may_end_with_the_id_of_their_set() {
+    let number = format!("{:>13}", "-1.5000E+00");
+    let state = |time: &str, ids: &[u32], tail: &str| {
+        let mut text = format!(
+            "\n n o d a l   f o r c e/e n e r g y    o u t p u t  t={time:>14}\n\n velocity boundary condition forces/rigid body moments \n\n"
+        );
+        for id in ids {
+            let row = node_force("nd#", *id, false);
+            text += &format!("{}   setid ={id:>8}{tail}\n", row.trim_end());
+        }
+        text + &node_force("", 0, true)
+    };
+    let moments = format!(" xmoment={number} ymoment={number} zmoment={number}");
+    for tail in ["", &moments] {
+        let text = state("0.00000E+00", &[145, 7], tail) + &state("1.00000E-03", &[145, 7], tail);
+        let file = read("bndout", &text);
+        assert_eq!(file.problems, []);
+        assert_eq!(&file.time[..], [0.0, 1e-3]);
+        assert_eq!(values(&file, 145, "energy"), [-1.5; 2]);
+        let has_moments = file.history(Some(EntityId::new(145)), "xmoment").is_some();
+        assert_eq!(has_moments, !tail.is_empty());
+        cut_at_every_byte("bndout", &text);
+    }
+}
+
+/// Another release may print wider numbers or columns; labels still tell what is what.
+#[test]
+fn labels_tell_the_numbers_whatever_their_width() {
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E-03"] {
+        text += &dotted("time", time);
+        text += &format!(" {:.<35}{:>12}\n", "spring/damper number", 7);
+        text += &format!(" {:.<35}{:>18}\n", "x-force", "1.500000000E+00");
+    }
+    let file = read("deforc", &text);
+    assert_eq!((values(&file, 7, "x_force"), &file.problems[..]), (vec![1.5; 2], &[][..]));
+
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E+00"] {
+        text += &format!(
+            "\n\n dt of cycle       1 is controlled by shell\n\n time...........................{time:>14}\n kinetic energy.................  1.5000000000E+00\n total energy........................   2.50000E+00\n"
+        );
+    }
+    let file = read("glstat", &text);
+    let value = |component: &str| file.history(None, component).unwrap().values.clone();
+    assert_eq!(value("kinetic_energy"), [1.5; 2]);
+    assert_eq!(value("total_energy"), [2.5; 2]);
+    assert_eq!(file.problems, []);
+
+    let mut text = String::new();
+    for time in ["0.0000E+00", "1.0000E+00"] {
+        text += &format!(
+            "\n time ={time:>13}\n mat.#=  100    inten=   1.500000E+00  kinen=   2.500000E+00 heat=   1.0000E+00\n x-mom=  1.0E+00 y-mom=  2.0E+00 z-mom=  3.0E+00\n"
+        );
+    }
+    let file = read("matsum", &text);
+    assert_eq!(values(&file, 100, "kinetic_energy"), [2.5; 2]);
+    assert_eq!(values(&file, 100, "z_momentum"), [3.0; 2]);
+    assert_eq!(file.problems, []);
+
+    let mut text = String::new();
+    for time in ["0.00000000E+00", "1.00000000E-01"] {
+        text += &format!(
+            "  slave {:>17} time {time}  x  1.50000000E+00  y  2.50000000E+00  z  3.50000000E+00 mass  4.50000000E+00 heat 1.0E+00\n",
+            7
+        );
+    }
+    let file = read("rcforc", &text);
+    let entity = EntityId { id: 7, side: Some(Side::SurfA) };
+    assert_eq!(file.history(Some(entity), "z_force").unwrap().values, [3.5; 2]);
+    assert_eq!((&file.time[..], &file.problems[..]), (&[0.0, 0.1][..], &[][..]));
+
+    let mut text = String::from(" single point constraint forces\n");
+    for time in ["0.00000E+00", "1.00000E-01"] {
+        text += &format!(
+            "\n output at time ={time:>14}\n node=       123 local x,y,z forces =  1.50000E+00  2.50000E+00  3.50000E+00 setid=        10\n"
+        );
+    }
+    let file = read("spcforc", &text);
+    assert_eq!(values(&file, 123, "z_force"), [3.5; 2]);
+    assert_eq!(file.problems, []);
+
+    let mut text = String::new();
+    for time in ["0.00000E+00", "1.00000E-03"] {
+        text += &format!(
+            " constraint #      axial        shear         time  failure                                       length  rslt moment      torsion\n          1  1.50000E+00  2.50000E+00  {time}      0.0    constraint/weld  ID  12345678901   3.500000E+00\n"
+        );
+    }
+    let file = read("swforc", &text);
+    assert_eq!(values(&file, 12345678901, "length"), [3.5; 2]);
+    assert_eq!(file.problems, []);
+
+    let mut text = String::new();
+    for time in ["0.0000000E+00", "1.0000000E-03"] {
+        text += &format!(
+            " contact interface energy file, time={time:>14}\n    #             slave       master       cycle=             1    frictional   transducer\n\n         7   1.5000E+00   2.5000E+00                               3.5000E+00   4.5000E+00\n\n summary   total slave side=  1.500000000E+00\n"
+        );
+    }
+    let file = read("sleout", &text);
+    assert_eq!(values(&file, 7, "friction_energy"), [3.5; 2]);
+    assert_eq!(file.history(None, "total_slave").unwrap().values, [1.5; 2]);
+    assert_eq!(file.problems, []);
+}
+
+/// A part's hourglass energy is printed only by some releases: a last row that ends before
+/// it is not whole.
+#[test]
+fn a_matsum_cut_within_its_last_row_loses_that_state() {
+    let state = |time: &str| {
+        let labels = |labels: &[&str]| {
+            labels.iter().map(|l| format!(" {l}={:>13}", "1.0000E+00")).collect::<String>() + "\n"
+        };
+        format!(
+            "\n time ={time:>13}\n mat.#={:>5}     {}{}{}{}",
+            1,
+            labels(&["inten", "kinen", "eroded_ie", "eroded_ke"]),
+            labels(&["x-mom", "y-mom", "z-mom"]),
+            labels(&["x-rbv", "y-rbv", "z-rbv"]),
+            labels(&["hgeng", "+mass", "eroded_he"]),
+        )
+    };
+    cut_at_every_byte("matsum", &(state("0.0000E+00") + &state("1.0000E+00")));
+}
+
 /// Layouts of deforc, jntforc, rbdout, nodfor and of bndout's rigid bodies are known from
 /// the source of LSTC's converter l2a only: these texts are as it writes them.
 #[test]
@@ -346,10 +502,7 @@ fn discrete_elements() {
     assert_eq!(values(&file, 1234567, "displacement"), [1.5, -2.5]);
     assert_eq!(values(&file, 8, "relative_rotation"), [1.5, -2.5]);
     assert!(file.history(Some(EntityId::new(8)), "x_force").is_none());
-    for cut in text.len() - 100..text.len() - 1 {
-        let file = read("deforc", &text[..cut]);
-        assert_eq!((file.time.len(), file.problems.is_empty()), (1, false), "cut at {cut}");
-    }
+    cut_at_every_byte("deforc", &text);
 }
 
 #[test]
@@ -373,6 +526,7 @@ fn joints_and_joint_stiffnesses() {
     assert_eq!(values(&file, 3, "x_force"), [3.0; 2]);
     assert_eq!(values(&file, 4, "d(phi)_dt"), [4.0; 2]);
     assert_eq!(values(&file, 4, "phi_moment_stiffness"), [4.0; 2]);
+    cut_at_every_byte("jntforc", &text);
 }
 
 #[test]
@@ -406,6 +560,7 @@ fn rigid_bodies() {
     assert_eq!(values(&file, 13, "global_rvz"), [6.0; 2]);
     assert_eq!(values(&file, 12, "local_dy"), [-2.0; 2]);
     assert_eq!(values(&file, 12, "dircos_33"), [1.0; 2]);
+    cut_at_every_byte("rbdout", &text);
 }
 
 fn node_force(mark: &str, id: u32, sum: bool) -> String {
@@ -437,6 +592,7 @@ fn groups_of_nodes() {
     assert_eq!(values(&file, 7, "x_force"), [-1.5; 2]);
     assert_eq!(values(&file, 7, "group2_energy"), [-1.5; 2], "one node in two groups");
     assert_eq!(file.history(None, "group2_etotal").unwrap().values, [-1.5; 2]);
+    cut_at_every_byte("nodfor", &text);
 }
 
 #[test]
@@ -464,6 +620,7 @@ fn prescribed_motions_of_rigid_bodies_and_pressures() {
     assert_eq!(file.time.len(), 2);
     assert_eq!(values(&file, 3, "ymoment"), [2.0; 2]);
     assert_eq!(values(&file, 7, "pressure_x_force"), [-1.5; 2]);
+    cut_at_every_byte("bndout", &text);
 }
 
 /// Stresses of shells at two integration points; an element that erodes; a new one.
@@ -570,4 +727,34 @@ fn histories_of_many_interfaces_as_hdf5() {
     assert!(sides.len() == 8001 && sides.iter().all(|side| side == Side::SurfA.name()));
     let odd = hdf5.dataset("a_b").unwrap().attrs().unwrap();
     assert!(matches!(&odd["component"], hdf5_pure::AttrValue::String(name) if name == "a/b"));
+}
+
+/// States that somebody cut out of a file, or that a full disk swallowed.
+#[test]
+fn a_hole_in_time_is_named() {
+    let heading = "    time       wall#   normal-force    x-force        y-force        z-force\n";
+    let walls = |states: &[u32]| {
+        let row = |state: &u32| {
+            let time = format!("{:.5E}", f64::from(*state) * 7.5e-4);
+            let (mantissa, exponent) = time.split_once('E').unwrap();
+            let time = format!("{mantissa}E{:+03}", exponent.parse::<i32>().unwrap());
+            format!("{time:>12}{:>8}{}\n", 1, format!("{:>15}", "1.500000E+06").repeat(4))
+        };
+        heading.to_string() + &states.iter().map(row).collect::<String>()
+    };
+    let all: Vec<u32> = (0..200).collect();
+    assert_eq!(read("rwforc", &walls(&all)).problems, []);
+    let holed: Vec<u32> = (0..40).chain(109..200).collect();
+    let file = read("rwforc", &walls(&holed));
+    assert_eq!(file.time.len(), 131, "nothing is put into the hole");
+    assert_eq!(codes(&file), [ProblemCode::TimeGap]);
+    assert_eq!(
+        file.problems[0].to_string(),
+        "there is no state between time 0.02925 and 0.08175 (states 40 and 41), although states are about 7.500e-4 apart there: about 69 seem to be missing"
+    );
+    // Many are counted.
+    let torn: Vec<u32> = (0..30).flat_map(|k| k * 20..k * 20 + 12).collect();
+    let file = read("rwforc", &walls(&torn));
+    assert_eq!(file.problems.len(), 21);
+    assert_eq!(file.problems[20].code, ProblemCode::MoreProblems);
 }

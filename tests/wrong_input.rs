@@ -483,3 +483,132 @@ fn foreign_hdf5_files_are_refused() {
         assert!(error.contains("is no curve database"), "{error}");
     }
 }
+
+/// A format that does not fit gives no table of nothing, but says what the file is.
+#[test]
+fn a_named_format_that_does_not_fit_is_an_error() {
+    let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
+    let nodout = nodout.to_str().unwrap();
+    let here = Path::new(".");
+    for format in ["rcforc", "glstat", "t01"] {
+        for command in ["histories", "inspect"] {
+            let error = crumple_fails(here, 1, &[command, nodout, "--format", format]);
+            let expected = format!("this is no {format}: it looks like a nodout, read it as that");
+            assert!(error.contains(&expected), "{error}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("notes"), "a\nb\nc\n").unwrap();
+    let error = crumple_fails(folder.path(), 1, &["histories", "notes", "--format", "nodout"]);
+    assert!(error.contains("no solver output is recognised in it"), "{error}");
+    // A file that ends after its header tells no format: it is the one that was named.
+    let header = " title\n                    ls-dyna smp d R14 R14.0 date 12/12/2022\n";
+    fs::write(folder.path().join("out"), header).unwrap();
+    crumple_ok(folder.path(), &["inspect", "--strict", "out", "--format", "nodout"]);
+}
+
+/// Compressed files, other encodings, folders and damaged binary files are called by name.
+#[test]
+fn files_that_are_not_plain_say_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let t = |name: &str, bytes: &[u8], expected: &str| {
+        fs::write(folder.path().join(name), bytes).unwrap();
+        for command in ["inspect", "histories"] {
+            let error = crumple_fails(folder.path(), 1, &[command, name]);
+            assert!(error.contains(expected), "{command} {name} said:\n{error}");
+        }
+    };
+    t(
+        "nodout",
+        b"\x1f\x8b\x08\0\0\0\0\0",
+        "nodout: this is compressed by gzip, which gunzip undoes",
+    );
+    let text = fs::read_to_string(fixture("fe/lead-car-wall/25kmh/rwforc")).unwrap();
+    let utf_16 =
+        |order: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(order).collect::<Vec<u8>>();
+    for order in [u16::to_le_bytes, u16::to_be_bytes] {
+        let bytes = utf_16(order);
+        t(
+            "rwforc",
+            &bytes,
+            "rwforc: this is UTF-16 text, which iconv -f UTF-16 -t UTF-8 makes plain",
+        );
+        let marked = [&order(0xfeff)[..], &bytes].concat();
+        t("rwforc", &marked, "rwforc: this is UTF-16 text");
+    }
+    t(
+        "runT01",
+        &[0xee; 400],
+        "it is named like a T01, but does not begin like one: is it damaged?",
+    );
+    let error = crumple_fails(folder.path(), 1, &["histories", "."]);
+    assert!(
+        error.contains("this is a folder: name a file in it, such as nodout or runT01 or rwforc"),
+        "{error}"
+    );
+    // A header that is cut is no text file with another section.
+    let cut = [&84u32.to_be_bytes()[..], &4021u32.to_be_bytes(), &[b' '; 40]].concat();
+    fs::write(folder.path().join("cutT01"), cut).unwrap();
+    let output = crumple_in(folder.path(), &["histories", "cutT01", "--section", "nodout"]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("the header is damaged or cut"), "{error}");
+    assert!(!error.contains("text file"), "{error}");
+}
+
+/// A title may hold an escape sequence, which a terminal would obey.
+#[test]
+fn text_of_files_is_printed_without_control_characters() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(fixture("fe/lead-car-wall/25kmh/nodout")).unwrap();
+    let (_, rest) = text.split_once('\n').unwrap();
+    let hostile = format!(
+        "\x1b]0;owned\x07 \u{9b}31m title \r\n{}x\x1b[2Jx\n",
+        rest.replace("{END LEGEND}", "   900009     \x1b[31mred\u{9b}\n{END LEGEND}")
+    );
+    fs::write(folder.path().join("nodout"), hostile).unwrap();
+    let control = |text: &str| text.chars().any(|c| c.is_control() && c != '\n' && c != '\t');
+    for arguments in [
+        vec!["inspect", "nodout"],
+        vec!["inspect", "nodout", "--json"],
+        vec!["histories", "nodout"],
+        vec!["histories", "nodout", "--id", "5"],
+        vec!["histories", "\x1b[31mnodout"],
+    ] {
+        let output = crumple_in(folder.path(), &arguments);
+        for stream in [&output.stdout, &output.stderr] {
+            let stream = String::from_utf8(stream.clone()).unwrap();
+            assert!(!control(&stream), "{arguments:?} printed {stream:?}");
+        }
+    }
+    // JSON loses nothing.
+    let text = crumple_ok(folder.path(), &["inspect", "nodout", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(report["files"][0]["title"], "\x1b]0;owned\x07 \u{9b}31m title");
+}
+
+/// A database of curves is not lost to a name that was meant for histories.
+#[test]
+fn histories_replace_no_other_hdf5_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = build_fixture(folder.path(), "lead-car-wall");
+    let before = fs::read(&database).unwrap();
+    let rwforc = fixture("fe/lead-car-wall/25kmh/rwforc");
+    let rwforc = rwforc.to_str().unwrap();
+    let write = |name: &str| vec!["histories".to_string(), rwforc.into(), "-o".into(), name.into()];
+    let arguments = write("curves.h5");
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    for more in [&[][..], &["--json"]] {
+        let error = crumple_fails(folder.path(), 2, &[&arguments[..], more].concat());
+        assert!(
+            error.contains(
+                "curves.h5 is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force"
+            ),
+            "{error}"
+        );
+    }
+    assert_eq!(fs::read(&database).unwrap(), before);
+    crumple_ok(folder.path(), &[&arguments[..], &["--force"]].concat());
+    assert_ne!(fs::read(&database).unwrap(), before);
+    // A file of histories is replaced, as any other output.
+    crumple_ok(folder.path(), &arguments);
+}

@@ -51,7 +51,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let mut outcome = Outcome::Clean;
     for run in &runs {
         if let Some(error) = &run.error {
-            eprintln!("error: run {}: {error}", run.name);
+            output::say(&format!("error: run {}: {error}", run.name));
             outcome = Outcome::Partly;
         }
         for warning in run.case.iter().flat_map(|c| &c.warnings) {

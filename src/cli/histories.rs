@@ -1,7 +1,7 @@
 //! `crumple histories`: the histories of a solver file as a table.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crumple::file::write_whole;
 use crumple::history::{History, Side};
@@ -9,6 +9,7 @@ use crumple::solver::{self, Access, Problem, Selection, SolverFile, WantedId};
 use serde::Serialize;
 
 use super::output;
+use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
 /// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units
@@ -38,6 +39,9 @@ pub struct Args {
     /// Where to write: .csv, .h5 or .hdf5 (default: CSV on standard output)
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Replace an HDF5 file that is no file of histories, such as a curve database
+    #[arg(long)]
+    force: bool,
 }
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
@@ -52,15 +56,25 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     if let Some(output) = output {
         solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
+        if !args.force && crumple::database::is_other_hdf5(output) {
+            return Err(Failure::Usage(format!(
+                "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
+                output.display()
+            )));
+        }
     }
     let target = output.map(Target::of).transpose()?;
     // JSON on standard output beside a file needs the values themselves.
     let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !manners.json);
     let format = args.format.as_deref();
-    let file = match straight {
-        Some(path) => crumple::database::convert_histories(&args.file, format, &selection, path)?,
-        None => solver::read(&args.file, format, &selection)?,
+    let bar = Bar::new(manners, "reading");
+    let read = match straight {
+        Some(path) => crumple::database::convert_histories(&args.file, format, &selection, path)
+            .map_err(Failure::from),
+        None => solver::read(&args.file, format, &selection).map_err(Failure::from),
     };
+    bar.end();
+    let file = read?;
     if let Some(section) = &args.section
         && *section != file.section
     {
@@ -73,18 +87,15 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     for problem in &file.problems {
         manners.warn(&format!("{}: {problem}", args.file.display()));
     }
-    match (output, target) {
-        (Some(path), Some(Target::Csv)) => {
-            let mut csv = Vec::new();
-            write_csv(&mut csv, &file)?;
-            write_whole(path, &csv)?;
+    match output.zip(target).filter(|_| straight.is_none()) {
+        Some((path, target)) => {
+            let bar = Bar::new(manners, "writing");
+            let written = write(path, target, &file);
+            bar.end();
+            written?;
         }
-        (Some(_), Some(Target::Hdf5)) if straight.is_some() => {}
-        (Some(path), Some(Target::Hdf5)) => {
-            write_whole(path, &crumple::database::histories_to_hdf5(&file)?)?;
-        }
-        _ if manners.json => {}
-        _ => output::print(|out| write_csv(out, &file))?,
+        None if manners.json || straight.is_some() => {}
+        None => output::print(|out| write_csv(out, &file))?,
     }
     if manners.json {
         output::print_json(&document(args, &file))?;
@@ -98,7 +109,7 @@ enum Target {
 }
 
 impl Target {
-    fn of(path: &std::path::Path) -> Result<Self, Failure> {
+    fn of(path: &Path) -> Result<Self, Failure> {
         match path.extension().and_then(|e| e.to_str()) {
             Some("h5" | "hdf5") => Ok(Self::Hdf5),
             Some("csv") | None => Ok(Self::Csv),
@@ -107,6 +118,18 @@ impl Target {
             ))),
         }
     }
+}
+
+fn write(path: &Path, target: Target, file: &SolverFile) -> Result<(), Failure> {
+    let bytes = match target {
+        Target::Csv => {
+            let mut csv = Vec::new();
+            write_csv(&mut csv, file)?;
+            csv
+        }
+        Target::Hdf5 => crumple::database::histories_to_hdf5(file)?,
+    };
+    Ok(write_whole(path, &bytes)?)
 }
 
 /// A `time` column and one column per history, with enough digits to read back the same

@@ -135,7 +135,7 @@ impl Manners {
     /// A warning on standard error.
     pub fn warn(self, text: &str) {
         if !self.quiet {
-            eprintln!("warning: {text}");
+            output::say(&format!("warning: {text}"));
         }
     }
 }
@@ -166,7 +166,7 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
         Err(Failure::Usage(message)) => {
-            eprintln!("error: {message}");
+            output::say(&format!("error: {message}"));
             USAGE
         }
         Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
@@ -180,12 +180,12 @@ pub fn main() -> ExitCode {
 /// The error, then its causes; causes that the message already contains are left out.
 fn print_chain(error: &dyn Error) {
     let mut shown = error.to_string();
-    eprintln!("error: {shown}");
+    output::say(&format!("error: {shown}"));
     let mut source = error.source();
     while let Some(cause) = source {
         let text = cause.to_string();
         if !shown.contains(&text) {
-            eprintln!("  because: {text}");
+            output::say(&format!("  because: {text}"));
         }
         shown = text;
         source = cause.source();

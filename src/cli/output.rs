@@ -1,5 +1,8 @@
-//! Standard output: text, tables and JSON documents; a closed pipe is not an error.
+//! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
+//! an error. Everything printed goes through here, where control characters are taken out:
+//! a title in a solver's file may hold an escape sequence, which a terminal would obey.
 
+use std::borrow::Cow;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
 
@@ -9,17 +12,93 @@ use super::Failure;
 
 /// Writes to standard output through a buffer and flushes it.
 pub fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    write(&mut out).and_then(|()| out.flush())?;
-    Ok(())
+    print_with(|_| REPLACED.into(), write)
 }
 
 /// Prints one JSON document.
 pub fn print_json(document: &impl Serialize) -> Result<(), Failure> {
-    print(|out| {
+    // JSON escapes the others itself; they stand within strings only.
+    let escaped = |code: u8| format!("\\u{code:04x}");
+    print_with(escaped, |out| {
         serde_json::to_writer_pretty(&mut *out, document).map_err(io::Error::from)?;
         writeln!(out)
     })
+}
+
+fn print_with(
+    instead: impl Fn(u8) -> String,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let mut out = BufWriter::new(Plain { out: io::stdout().lock(), instead, held: false });
+    write(&mut out).and_then(|()| out.flush())?;
+    Ok(())
+}
+
+/// Prints a line on standard error.
+pub fn say(line: &str) {
+    eprintln!("{}", plain(line));
+}
+
+/// A text without control characters but line ends and tabs.
+pub fn plain(text: &str) -> Cow<'_, str> {
+    let is_control = |c: char| c.is_control() && c != '\n' && c != '\t';
+    match text.contains(is_control) {
+        true => Cow::Owned(text.replace(is_control, REPLACED)),
+        false => Cow::Borrowed(text),
+    }
+}
+
+/// What stands for a control character.
+const REPLACED: &str = "\u{fffd}";
+
+/// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
+/// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
+struct Plain<W, F> {
+    out: W,
+    /// What stands for a control character of that code.
+    instead: F,
+    /// Whether a `0xc2` waits for the byte behind it.
+    held: bool,
+}
+
+/// First byte of the characters from U+0080 to U+00BF.
+const LEAD: u8 = 0xc2;
+
+fn is_control(byte: u8) -> bool {
+    byte.is_ascii_control() && byte != b'\n' && byte != b'\t'
+}
+
+impl<W: Write, F: Fn(u8) -> String> Write for Plain<W, F> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !self.held && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
+            self.out.write_all(bytes)?;
+            return Ok(bytes.len());
+        }
+        let mut passed = Vec::with_capacity(bytes.len());
+        for &byte in bytes {
+            if std::mem::take(&mut self.held) {
+                if (0x80..=0x9f).contains(&byte) {
+                    passed.extend((self.instead)(byte).bytes());
+                    continue;
+                }
+                passed.push(LEAD);
+            }
+            match byte {
+                LEAD => self.held = true,
+                _ if is_control(byte) => passed.extend((self.instead)(byte).bytes()),
+                _ => passed.push(byte),
+            }
+        }
+        self.out.write_all(&passed)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        if std::mem::take(&mut self.held) {
+            self.out.write_all(&[LEAD])?;
+        }
+        self.out.flush()
+    }
 }
 
 /// Whether an error only says that the reader of a pipe went away.
@@ -57,4 +136,31 @@ pub fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io:
         writeln!(out, "{}", line.trim_end())?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn passed(chunks: &[&[u8]], instead: impl Fn(u8) -> String) -> String {
+        let mut out = Vec::new();
+        let mut plain = Plain { out: &mut out, instead, held: false };
+        chunks.iter().for_each(|chunk| plain.write_all(chunk).unwrap());
+        plain.flush().unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn control_characters_are_not_printed() {
+        let text = "a\x1b[31m\tb\x7f\u{9b}31m µ\r\n";
+        let expected = "a\u{fffd}[31m\tb\u{fffd}\u{fffd}31m µ\u{fffd}\n";
+        assert_eq!(plain(text), expected);
+        // However the text is divided.
+        for at in 0..=text.len() {
+            let (a, b) = text.as_bytes().split_at(at);
+            assert_eq!(passed(&[a, b], |_| REPLACED.into()), expected, "divided at {at}");
+        }
+        let json = passed(&["\u{9b}µ".as_bytes()], |code| format!("\\u{code:04x}"));
+        assert_eq!(json, "\\u009bµ");
+    }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Manners;
+use super::output::plain;
 
 /// A spinner that names the step just done.
 pub struct Bar(Option<ProgressBar>);
@@ -22,7 +23,7 @@ impl Bar {
 
     pub fn step(&self, done: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(done.to_string());
+            bar.set_message(plain(done).into_owned());
         }
     }
 

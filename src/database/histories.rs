@@ -1,6 +1,6 @@
 //! Histories as HDF5: one dataset per component, states by entities.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -57,6 +57,22 @@ pub fn convert_histories(
     Ok(file)
 }
 
+/// Whether a file is HDF5 but no file of histories: a curve database, or of someone else.
+/// What cannot be read as HDF5 to its root counts as such, since a table may be damaged.
+pub fn is_other_hdf5(path: &Path) -> bool {
+    let is_file = path.metadata().is_ok_and(|meta| meta.is_file());
+    if !is_file || !hdf5_pure::is_hdf5(path).unwrap_or(false) {
+        return false;
+    }
+    let format = hdf5_pure::File::open_streaming(path).ok().and_then(|file| {
+        match file.root().attrs().ok()?.remove("format")? {
+            AttrValue::String(format) => Some(format),
+            _ => None,
+        }
+    });
+    format.as_deref() != Some(FORMAT)
+}
+
 /// Encodes the selected histories of a file, in the solver's units.
 ///
 /// `/time` holds one time per state; `/<component>` has the shape states × entities (or
@@ -66,17 +82,18 @@ pub fn convert_histories(
 /// dataset's has `_` in it, and its own name in the attribute `component`.
 pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
     let mut out = builder(file);
-    let mut components: Vec<&Arc<str>> = Vec::new();
+    let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
+    let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
     for history in &file.histories {
-        if !components.contains(&&history.component) {
-            components.push(&history.component);
-        }
+        let k = *index.entry(&history.component).or_insert_with(|| {
+            components.push((&history.component, Vec::new()));
+            components.len() - 1
+        });
+        components[k].1.push(history);
     }
     let mut long = Vec::new();
     let mut names = Names::default();
-    for component in components {
-        let channels: Vec<&History> =
-            file.histories.iter().filter(|h| h.component == *component).collect();
+    for (component, channels) in components {
         let name = names.of(component);
         let dataset = out.create_dataset(&name);
         if *name != **component {
@@ -107,7 +124,7 @@ fn encode(error: hdf5_pure::Error) -> DatabaseError {
 /// A file with what describes the source, and the times.
 fn builder(file: &SolverFile) -> FileBuilder {
     let mut out = FileBuilder::new();
-    out.set_attr("format", AttrValue::String("crumple histories".into()));
+    out.set_attr("format", AttrValue::String(FORMAT.into()));
     out.set_attr("source_format", AttrValue::String(file.format.into()));
     for (name, value) in [("title", &file.title), ("version", &file.version)] {
         if let Some(value) = value {
@@ -164,6 +181,8 @@ fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) -> Result<(
     Ok(())
 }
 
+/// Root attribute `format` of these files.
+const FORMAT: &str = "crumple histories";
 const TIME: &str = "time";
 const IDS: &str = "ids";
 const SIDES: &str = "sides";

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::{Case, CurveError};
 use crate::file::{WriteError, write_whole};
-pub use histories::{ConvertError, convert_histories, histories_to_hdf5};
+pub use histories::{ConvertError, convert_histories, histories_to_hdf5, is_other_hdf5};
 pub use lock::{LockError, WriterLock};
 
 /// The cases of one database file.

@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 
 use super::lsdyna::deck::{self, Deck, Interface, Named};
 use super::lsdyna::line::Lines;
-use super::{Entity, ReadError, SolverFile};
+use super::{Entity, ReadError, SolverFile, source};
 
 /// Endings of keyword decks.
 const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
 /// Names of a folder that are looked at, and decks among them that are read.
 const MAX_NAMES: usize = 10_000;
 const MAX_DECKS: usize = 20;
+/// Bytes by which text that is not plain is known.
+const HEAD: usize = 16;
 /// Lines looked at for the first keyword.
 const HEAD_LINES: usize = 1_000;
 
@@ -54,6 +56,10 @@ pub fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError
         return Err(io(std::io::Error::other("this is no file")));
     }
     let mut file = BufReader::new(File::open(path).map_err(io)?);
+    let head = file.fill_buf().map_err(io)?;
+    if let Some(what) = source::encoded(&head[..head.len().min(HEAD)]) {
+        return Err(io(std::io::Error::other(what)));
+    }
     let deck = deck::read(&mut file, &mut open).map_err(io)?;
     Ok((deck, included))
 }

@@ -118,11 +118,15 @@ impl Format {
         parts: &[Box<dyn Source>],
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
-        match (&self.reader, parts) {
-            (Reader::Text { read, .. }, [first, ..]) => Ok(vec![read(&**first, selection)?]),
-            (Reader::Text { .. }, []) => Ok(Vec::new()),
-            (Reader::Binary { read, .. }, parts) => read(parts, selection),
+        let mut sections = match (&self.reader, parts) {
+            (Reader::Text { read, .. }, [first, ..]) => vec![read(&**first, selection)?],
+            (Reader::Text { .. }, []) => Vec::new(),
+            (Reader::Binary { read, .. }, parts) => read(parts, selection)?,
+        };
+        for section in &mut sections {
+            section.problems.extend(problem::of_time(&section.time));
         }
+        Ok(sections)
     }
 }
 
@@ -263,6 +267,10 @@ pub enum ReadError {
     Io { path: PathBuf, source: io::Error },
     #[error("{path}: {looks_like}: the readers take {known}")]
     UnknownFormat { path: PathBuf, looks_like: String, known: String },
+    #[error("{path}: this is no {format}: it looks like a {looks_like}, read it as that")]
+    OtherFormat { path: PathBuf, format: String, looks_like: &'static str },
+    #[error("{path}: this is a folder: name a file in it{files}")]
+    Folder { path: PathBuf, files: String },
     #[error(
         "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
     )]
@@ -359,21 +367,19 @@ pub fn read_sections(
     selection: &Selection,
 ) -> Result<Vec<SolverFile>, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
+    let is_forced = format.is_some();
     let (format, parts) = open(path, format, selection)?;
     let mut sections = format.read(&parts, selection).map_err(io)?;
+    if is_forced {
+        check_format(path, format, &*parts[0], &sections)?;
+    }
     let mut head = [0; 16];
     let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
     let is_container = lsdyna::binout::recognises(&head[..count]);
     if let Some(missing) = missing_continuation(path).filter(|_| format.is_binary()) {
         let message =
             format!("{missing} is not there, so that what continues behind it is not read");
-        let problem = Problem {
-            code: ProblemCode::CutRecord,
-            line: None,
-            byte: None,
-            columns: None,
-            message,
-        };
+        let problem = Problem::new(ProblemCode::CutRecord, message);
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }
     if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
@@ -401,12 +407,11 @@ fn open(
 ) -> Result<(&'static Format, Parts), ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     if path.is_dir() {
-        return Err(ReadError::UnknownFormat {
-            path: path.into(),
-            looks_like: "this is a folder".into(),
-            known: format_names(),
-        });
+        return Err(ReadError::Folder { path: path.into(), files: files_in(path) });
     }
+    // Before the first is opened: its size is then fixed, and what a run wrote into a
+    // continuation that began later would stand behind a hole.
+    let family = family(path);
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {
         Some(name) => named(name)?,
@@ -414,12 +419,57 @@ fn open(
     };
     let mut parts = vec![first];
     if format.is_binary() {
-        for part in family(path).into_iter().skip(1) {
+        for part in family.into_iter().skip(1) {
             parts.push(source::open(&part, selection.access).map_err(io)?);
         }
     }
     Ok((format, parts))
 }
+
+/// Holds a named format against what the file looks like, if nothing was read by it.
+fn check_format(
+    path: &Path,
+    format: &Format,
+    source: &dyn Source,
+    sections: &[SolverFile],
+) -> Result<(), ReadError> {
+    if sections.iter().any(|s| !s.time.is_empty()) {
+        return Ok(());
+    }
+    match look_at(path, source)? {
+        (Some(found), _) if found.name != format.name => Err(ReadError::OtherFormat {
+            path: path.into(),
+            format: format.name.into(),
+            looks_like: found.name,
+        }),
+        // A file that ends after its header tells no format, nor does one that has just begun.
+        (None, false) if source.size().is_ok_and(|size| size > 0) => {
+            Err(ReadError::UnknownFormat {
+                path: path.into(),
+                looks_like: NOT_RECOGNISED.into(),
+                known: format_names(),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The files of a folder that are named like a solver's, for messages: `, such as nodout`.
+fn files_in(folder: &Path) -> String {
+    const LOOKED_AT: usize = 1_000;
+    let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
+    let mut named: Vec<String> = entries
+        .take(LOOKED_AT)
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.ends_with(T01) || FORMATS.iter().any(|f| name.starts_with(f.name)))
+        .collect();
+    named.sort();
+    named.truncate(3);
+    if named.is_empty() { String::new() } else { format!(", such as {}", named.join(" or ")) }
+}
+
+/// How OpenRadioss names its time history: the run's name and this.
+const T01: &str = "T01";
 
 /// Opens the file at `path` for reading state by state, if it is a nodout without damage
 /// that is laid out evenly; [`read`] takes any other.
@@ -470,38 +520,9 @@ fn named(name: &str) -> Result<&'static Format, ReadError> {
 const DETECT_LINES: u64 = 100_000;
 
 fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError> {
-    let io = |source| ReadError::Io { path: path.into(), source };
-    let unknown = |looks_like: &str| ReadError::UnknownFormat {
-        path: path.into(),
-        looks_like: looks_like.into(),
-        known: format_names(),
-    };
-    let mut head = Vec::new();
-    Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
-    if head.starts_with(b"\x89HDF\r\n\x1a\n") {
-        return Err(unknown("this is an HDF5 file"));
-    }
-    if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
+    let (by_content, is_lsdyna) = look_at(path, source)?;
+    if let Some(format) = by_content {
         return Ok(format);
-    }
-    let mut lines = lsdyna::line::Lines::new(Stream::new(source));
-    let mut is_lsdyna = false;
-    while let Some(line) = lines.next_line().map_err(io)? {
-        if line.number > DETECT_LINES {
-            return Err(unknown("no solver output is recognised in it"));
-        }
-        if lsdyna::deck::signature(line.text) {
-            return Err(ReadError::Deck { path: path.into() });
-        }
-        is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
-        if line.number <= 2 {
-            continue;
-        }
-        // Titles in a legend are free text, but none begins like a line of a body, whose
-        // signature also ends a legend that lost its closing line.
-        if let Some(format) = FORMATS.iter().find(|f| f.is_signature(line.text)) {
-            return Ok(format);
-        }
     }
     let named_so = |f: &&Format| path.file_name().is_some_and(|name| name == f.name);
     if let Some(format) = FORMATS.iter().find(named_so) {
@@ -513,11 +534,63 @@ fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError
     });
     match by_name {
         Some(format) if is_lsdyna => Ok(format),
-        _ if is_lsdyna => Err(unknown(
-            "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
-        )),
-        _ => Err(unknown("no solver output is recognised in it")),
+        _ => Err(ReadError::UnknownFormat {
+            path: path.into(),
+            looks_like: match is_lsdyna {
+                true => "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
+                false => NOT_RECOGNISED,
+            }
+            .into(),
+            known: format_names(),
+        }),
     }
+}
+
+const NOT_RECOGNISED: &str = "no solver output is recognised in it";
+
+/// The format that the content tells, and whether it has the header of LS-DYNA's text files.
+fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>, bool), ReadError> {
+    let io = |source| ReadError::Io { path: path.into(), source };
+    let unknown = |looks_like: &str| ReadError::UnknownFormat {
+        path: path.into(),
+        looks_like: looks_like.into(),
+        known: format_names(),
+    };
+    let mut head = Vec::new();
+    Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
+    if head.starts_with(b"\x89HDF\r\n\x1a\n") {
+        return Err(unknown("this is an HDF5 file"));
+    }
+    if let Some(what) = source::encoded(&head) {
+        return Err(unknown(what));
+    }
+    if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
+        return Ok((Some(format), false));
+    }
+    let is_named_t01 = path.file_name().is_some_and(|n| n.to_string_lossy().ends_with(T01));
+    if is_named_t01 && !head.is_empty() {
+        return Err(unknown("it is named like a T01, but does not begin like one: is it damaged?"));
+    }
+    let mut lines = lsdyna::line::Lines::new(Stream::new(source));
+    let mut is_lsdyna = false;
+    while let Some(line) = lines.next_line().map_err(io)? {
+        if line.number > DETECT_LINES {
+            return Err(unknown(NOT_RECOGNISED));
+        }
+        if lsdyna::deck::signature(line.text) {
+            return Err(ReadError::Deck { path: path.into() });
+        }
+        is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
+        if line.number <= 2 {
+            continue;
+        }
+        // Titles in a legend are free text, but none begins like a line of a body, whose
+        // signature also ends a legend that lost its closing line.
+        if let Some(format) = FORMATS.iter().find(|f| f.is_signature(line.text)) {
+            return Ok((Some(format), is_lsdyna));
+        }
+    }
+    Ok((None, is_lsdyna))
 }
 
 /// Holds every selected id and component against what the file has.

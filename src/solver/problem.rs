@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::lsdyna::line::Line;
+use crate::history::time_gaps;
 
 /// Problems kept per file; further ones are counted only.
 const MAX_KEPT: usize = 200;
@@ -40,6 +41,8 @@ pub enum ProblemCode {
     /// A single state's time is before the one of the state above it; the order of the file
     /// is kept.
     TimeGoesBack,
+    /// An interval without a state, far longer than those around it; nothing is put there.
+    TimeGap,
     /// Values that are zero between others that are not: the file was overwritten there, or
     /// the quantity really vanished. They are returned as they are.
     SuspectZeros,
@@ -80,6 +83,30 @@ impl fmt::Display for Problem {
         }
         f.write_str(&self.message)
     }
+}
+
+impl Problem {
+    /// A problem without a place.
+    pub(in crate::solver) fn new(code: ProblemCode, message: String) -> Self {
+        Self { code, line: None, byte: None, columns: None, message }
+    }
+}
+
+/// Gaps listed of one file; of more the rest is counted.
+const MAX_GAPS: usize = 20;
+
+/// The holes in a file's times.
+pub(in crate::solver) fn of_time(time: &[f64]) -> Vec<Problem> {
+    let gaps = time_gaps(time);
+    let more = gaps.len().saturating_sub(MAX_GAPS);
+    let listed = gaps.iter().take(MAX_GAPS);
+    let mut problems: Vec<Problem> =
+        listed.map(|gap| Problem::new(ProblemCode::TimeGap, gap.to_string())).collect();
+    if more > 0 {
+        let message = format!("{more} further intervals without a state are not listed");
+        problems.push(Problem::new(ProblemCode::MoreProblems, message));
+    }
+    problems
 }
 
 /// Where a problem is.
@@ -145,13 +172,8 @@ impl Problems {
 
     pub fn into_list(mut self) -> Vec<Problem> {
         if self.dropped > 0 {
-            self.kept.push(Problem {
-                code: ProblemCode::MoreProblems,
-                line: None,
-                byte: None,
-                columns: None,
-                message: format!("{} further problems are not listed", self.dropped),
-            });
+            let message = format!("{} further problems are not listed", self.dropped);
+            self.kept.push(Problem::new(ProblemCode::MoreProblems, message));
         }
         self.kept
     }

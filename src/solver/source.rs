@@ -2,7 +2,8 @@
 //!
 //! Plain reading is the default, because the file of a run that is still going may grow or
 //! shrink at any time: a plain read then ends early, while the access to a map beyond the
-//! end of its file kills the process.
+//! end of its file kills the process. What is written behind the opening is not there for a
+//! reader: its end would move while it reads, and half a line would be followed by another.
 
 use std::fs::File;
 use std::io::{self, BufRead, Read};
@@ -10,7 +11,7 @@ use std::path::Path;
 
 /// Bytes that can be read at any position, from several threads at once.
 pub trait Source: Send + Sync {
-    /// Number of bytes now; a file that is being written may have another number later.
+    /// Number of bytes; of a file those that it had when it was opened.
     fn size(&self) -> io::Result<u64>;
 
     /// Reads up to `buffer.len()` bytes from `offset`; 0 at the end.
@@ -49,7 +50,7 @@ pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
         file = copy;
     }
     Ok(match access {
-        Access::Plain => Box::new(file),
+        Access::Plain => Box::new(Opened::new(file)?),
         Access::Map => Box::new(Mapped::new(&file)?),
     })
 }
@@ -64,20 +65,39 @@ fn is_pipe(_: std::fs::FileType) -> bool {
     false
 }
 
-impl Source for File {
+/// A file with the size that it had when it was opened.
+pub struct Opened {
+    file: File,
+    size: u64,
+}
+
+impl Opened {
+    pub fn new(file: File) -> io::Result<Self> {
+        let size = file.metadata()?.len();
+        Ok(Self { file, size })
+    }
+}
+
+impl Source for Opened {
     fn size(&self) -> io::Result<u64> {
-        Ok(self.metadata()?.len())
+        Ok(self.size)
     }
 
-    #[cfg(unix)]
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        std::os::unix::fs::FileExt::read_at(self, buffer, offset)
+        let there = usize::try_from(self.size.saturating_sub(offset)).unwrap_or(usize::MAX);
+        let count = there.min(buffer.len());
+        read_file_at(&self.file, &mut buffer[..count], offset)
     }
+}
 
-    #[cfg(windows)]
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        std::os::windows::fs::FileExt::seek_read(self, buffer, offset)
-    }
+#[cfg(unix)]
+fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, buffer, offset)
+}
+
+#[cfg(windows)]
+fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
 /// A file mapped into memory.
@@ -136,6 +156,29 @@ impl Source for Vec<u8> {
         Some(self)
     }
 }
+
+/// What a file is that begins so, and what to do, if it is compressed or no plain text.
+pub fn encoded(head: &[u8]) -> Option<&'static str> {
+    const ENCODED: [(&[u8], &str); 7] = [
+        (b"\x1f\x8b", "this is compressed by gzip, which gunzip undoes"),
+        (b"BZh", "this is compressed by bzip2, which bunzip2 undoes"),
+        (b"\xfd7zXZ\0", "this is compressed by xz, which unxz undoes"),
+        (b"\x28\xb5\x2f\xfd", "this is compressed by zstd, which unzstd undoes"),
+        (b"PK\x03\x04", "this is a zip archive, which unzip unpacks"),
+        (b"\xff\xfe", UTF_16),
+        (b"\xfe\xff", UTF_16),
+    ];
+    if let Some((_, what)) = ENCODED.iter().find(|(start, _)| head.starts_with(start)) {
+        return Some(what);
+    }
+    // Without a byte order mark: every second byte of plain text is 0.
+    let pairs = head.as_chunks::<2>().0;
+    let is_text = |b: u8| matches!(b, b' '..=b'~' | b'\t' | b'\r' | b'\n');
+    let is_utf_16 = |high: usize| pairs.iter().all(|p| p[high] == 0 && is_text(p[1 - high]));
+    (pairs.len() >= 4 && (is_utf_16(0) || is_utf_16(1))).then_some(UTF_16)
+}
+
+const UTF_16: &str = "this is UTF-16 text, which iconv -f UTF-16 -t UTF-8 makes plain";
 
 /// Fills as much of `buffer` as the source has from `offset` on; returns how much.
 pub fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
@@ -276,16 +319,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_plain_text_is_known_by_its_beginning() {
+        let wide = |text: &str| text.bytes().flat_map(|b| [b, 0]).collect::<Vec<u8>>();
+        assert_eq!(encoded(&wide("*KEYWORD")), Some(UTF_16));
+        assert_eq!(encoded(&wide("*KEYWORD")[1..15]), Some(UTF_16), "the other byte order");
+        assert!(encoded(b"\x1f\x8b\x08\x00").unwrap().contains("gunzip"));
+        for plain in [&b"*KEYWORD\n*TITLE\n"[..], b"", b" \0", &[0; 16], b"\0\0\0\x54\0\0\x0b\xd3"]
+        {
+            assert_eq!(encoded(plain), None, "{plain:?}");
+        }
+    }
+
+    #[test]
     fn a_window_reads_ahead_and_ends() {
         let mut file = tempfile::tempfile().unwrap();
         let bytes: Vec<u8> = (0..100u8).collect();
         io::Write::write_all(&mut file, &bytes).unwrap();
-        let mut window = Window::new(&file);
+        let opened = Opened::new(file.try_clone().unwrap()).unwrap();
+        io::Write::write_all(&mut file, &bytes).unwrap();
+        let mut window = Window::new(&opened);
         assert_eq!(window.get(10, 5, 20).unwrap(), Some(&bytes[10..15]));
         assert_eq!(window.get(30, 5, 0).unwrap(), Some(&bytes[30..35]), "was read ahead");
         assert_eq!(window.get(33, 40, 0).unwrap(), Some(&bytes[33..73]));
         assert_eq!(window.get(90, 10, 50).unwrap(), Some(&bytes[90..100]));
-        assert_eq!(window.get(95, 10, 0).unwrap(), None);
+        assert_eq!(window.get(95, 10, 0).unwrap(), None, "what was written later is not there");
         assert_eq!(window.get(0, 2, 0).unwrap(), Some(&bytes[..2]));
     }
 }

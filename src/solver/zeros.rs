@@ -1,6 +1,10 @@
 //! Zeros that look like an overwritten part of a binary file, which has no check sums.
+//!
+//! One value, or all of one entity's, may be zero in one state by physics: a node stands on
+//! a wall, a contact is lost. So only several values beside each other are named.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::problem::{ProblemCode, Problems};
 use crate::history::{EntityId, History};
@@ -21,17 +25,22 @@ const MAY_VANISH: [&str; 12] = [
     "swforc",
 ];
 
+/// Entities beside each other that lose one component in one state before that is named.
+const ENTITIES: usize = 3;
+
 /// Whether all components of an entity are needed to tell damage from a quantity that is
 /// zero for one state.
 pub fn may_vanish(section: &str) -> bool {
     MAY_VANISH.contains(&section)
 }
 
-/// Names the states in which a value is exactly zero though it is not in the states around
-/// it (at the ends of a history: in the one beside it).
+/// Names the states in which a component is exactly zero for several entities beside each
+/// other, though it is not in the states around it (at the ends of a history: in the one
+/// beside it), and for most of them returns to about what it was.
 ///
-/// Displacements, velocities and energies do not do that. Forces may: there, another
-/// component of the entity must be there in that state, because a lost contact loses all.
+/// The last tells zeros that were written over values from a front that stands on a wall for
+/// one state. Forces may vanish together: there, another component of the entity must be
+/// there in that state, because a lost contact loses all.
 pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
     let may_vanish = may_vanish(section);
     let mut of_entity: HashMap<Option<EntityId>, Vec<&History>> = HashMap::new();
@@ -40,8 +49,14 @@ pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
             of_entity.entry(history.entity).or_default().push(history);
         }
     }
-    let mut states: Vec<(usize, usize, String)> = Vec::new();
-    for history in histories {
+    let states = histories.first().map_or(0, |h| h.values.len());
+    let mut found: Vec<Run> = Vec::new();
+    let mut runs: Vec<Option<Run>> = vec![None; states];
+    let mut component: Option<&Arc<str>> = None;
+    for (k, history) in histories.iter().enumerate() {
+        if component.replace(&history.component) != Some(&history.component) {
+            runs.fill(None);
+        }
         let values = &history.values;
         // Most have no zero at all, which is found fast.
         if !values.contains(&0.0) {
@@ -53,27 +68,56 @@ pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
             if may_vanish && !alone {
                 continue;
             }
-            if let Some((_, count, _)) = states.iter_mut().find(|(s, ..)| *s == state) {
-                *count += 1;
-            } else if states.len() < MAX_STATES {
-                states.push((state, 1, history.label()));
+            let above = runs[state].filter(|run| run.last + 1 == k);
+            let first = above.map_or(k, |run| run.first);
+            let returning = above.map_or(0, |run| run.returning);
+            let returning = returning + usize::from(returns(values, state));
+            let run = Run { state, first, last: k, returning };
+            runs[state] = Some(run);
+            if run.is_suspect() {
+                let known = found.iter().position(|r| r.state == state && r.first == first);
+                match known {
+                    Some(shorter) => found[shorter] = run,
+                    None if found.len() < MAX_RUNS => found.push(run),
+                    None => {}
+                }
             }
         }
     }
-    states.sort_by_key(|(state, ..)| *state);
-    let time = histories.first().map(|h| h.time.clone());
-    for (state, count, first) in states {
-        let at = time.as_ref().and_then(|t| t.get(state)).copied().unwrap_or(f64::NAN);
+    found.sort_by_key(|run| run.state);
+    for Run { state, first, last, .. } in found {
+        let at = histories[first].time.get(state).copied().unwrap_or(f64::NAN);
         let message = format!(
-            "{section}: {count} values of state {} (time {at:?}), the first of {first}, are zero but not so in the states around it: was the file overwritten there?",
-            state + 1
+            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+            last - first + 1,
+            state + 1,
+            histories[first].label(),
+            histories[last].label(),
         );
         problems.add(ProblemCode::SuspectZeros, None, None, message);
     }
 }
 
-/// States listed; more are damage that needs no list.
-const MAX_STATES: usize = 100;
+/// Entities beside each other whose component vanishes in one state.
+#[derive(Clone, Copy)]
+struct Run {
+    state: usize,
+    /// Indices of the first and the last history.
+    first: usize,
+    last: usize,
+    /// How many are behind it about what they were before.
+    returning: usize,
+}
+
+impl Run {
+    fn is_suspect(&self) -> bool {
+        let length = self.last - self.first + 1;
+        length >= ENTITIES && 2 * self.returning > length
+    }
+}
+
+/// Runs listed; more are damage that needs no list.
+const MAX_RUNS: usize = 100;
 
 /// States whose value is zero between two that are not.
 fn vanishing(values: &[f64]) -> impl Iterator<Item = usize> {
@@ -84,31 +128,52 @@ fn vanishing(values: &[f64]) -> impl Iterator<Item = usize> {
     })
 }
 
+/// Whether a value is behind a state about what it was before: of the same sign and at most
+/// twice as large. At the last state nobody knows.
+fn returns(values: &[f64], state: usize) -> bool {
+    let (before, behind) = (values[state - 1], values.get(state + 1).copied());
+    behind.is_none_or(|behind| (0.5..=2.0).contains(&(behind / before)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn codes(section: &str, rows: &[(&str, &[f64])]) -> usize {
-        let histories: Vec<History> = rows
-            .iter()
-            .map(|(component, values)| History {
-                entity: Some(EntityId::new(7)),
-                component: (*component).into(),
-                time: (0..values.len()).map(|k| k as f64).collect(),
-                values: values.to_vec(),
-            })
-            .collect();
+    /// Problems of one component of several entities.
+    fn codes(section: &str, rows: &[&[f64]], others: Option<&[f64]>) -> Vec<String> {
+        let history = |component: &str, id: usize, values: &[f64]| History {
+            entity: Some(EntityId::new(id as i64)),
+            component: component.into(),
+            time: (0..values.len()).map(|k| k as f64).collect(),
+            values: values.to_vec(),
+        };
+        let mut histories: Vec<History> =
+            rows.iter().enumerate().map(|(k, values)| history("x", k, values)).collect();
+        if let Some(values) = others {
+            histories.extend((0..rows.len()).map(|k| history("y", k, values)));
+        }
         let mut problems = Problems::default();
         suspect(section, &histories, &mut problems);
-        problems.into_list().len()
+        problems.into_list().into_iter().map(|p| p.message).collect()
     }
 
     #[test]
-    fn a_motion_does_not_vanish_but_a_contact_may() {
-        let (gap, all): (&[f64], &[f64]) = (&[1.0, 0.0, 2.0], &[1.0, 3.0, 2.0]);
-        assert_eq!(codes("nodout", &[("x_velocity", gap), ("y_velocity", all)]), 1);
-        assert_eq!(codes("nodout", &[("x_velocity", &[0.0, 0.0, 2.0])]), 0, "not yet moving");
-        assert_eq!(codes("rcforc", &[("x_force", gap), ("y_force", gap)]), 0, "contact lost");
-        assert_eq!(codes("rcforc", &[("x_force", gap), ("y_force", all)]), 1);
+    fn several_values_beside_each_other_do_not_vanish() {
+        let (gap, all): (&[f64], &[f64]) = (&[1.0, 0.0, 1.5], &[1.0, 3.0, 2.0]);
+        let said = codes("nodout", &[gap, gap, gap, all], None);
+        assert_eq!(said.len(), 1);
+        assert!(said[0].contains("3 values of state 2 (time 1.0), x[0] to x[2], are"), "{said:?}");
+        assert_eq!(codes("rcforc", &[gap; 3], Some(all)).len(), 1);
+    }
+
+    #[test]
+    fn a_node_on_a_wall_and_a_lost_contact_are_no_damage() {
+        let (gap, all): (&[f64], &[f64]) = (&[1.0, 0.0, 1.5], &[1.0, 3.0, 2.0]);
+        let stands: &[f64] = &[10.0, 0.0, -0.3];
+        assert_eq!(codes("nodout", &[gap, gap, all, gap, gap], None), [""; 0], "single nodes");
+        assert_eq!(codes("nodout", &[stands; 5], None), [""; 0], "a front on a wall");
+        let rests: &[f64] = &[0.0, 0.0, 2.0];
+        assert_eq!(codes("nodout", &[rests; 5], None), [""; 0], "not yet moving");
+        assert_eq!(codes("rcforc", &[gap; 5], Some(gap)), [""; 0], "contact lost");
     }
 }

@@ -99,7 +99,7 @@ impl Abstat {
     fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let count = [10, 12].into_iter().find(|&n| field(n - 1).1 == text.len())?;
-        (line.ended && text.len() >= self.width).then_some(())?;
+        (text.len() >= self.width).then_some(())?;
         self.width = text.len();
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
         let airbag = EntityId::new(integer(line.columns(ID.0, ID.1))?);
@@ -117,7 +117,7 @@ impl Abstat {
         let from = memchr::memmem::find(text, MATERIAL)? + MATERIAL.len();
         let to = memchr::memmem::find(text, AREAS[0].label.as_bytes())?;
         let material = integer(text.get(from..to)?)?;
-        let fields = fields(line, &AREAS, 0)?;
+        let fields = fields(line, &AREAS)?;
         fields.iter().all(Option::is_some).then_some(())?;
         let known = self.materials.iter().find(|(m, _)| *m == material).map(|(_, t)| *t);
         let table = match known {

@@ -15,11 +15,14 @@ pub trait Body {
     /// Whether a line can only stand below the header.
     fn is_signature(&self, line: &[u8]) -> bool;
 
-    /// One line below the header, outside a legend.
+    /// One line below the header, outside a legend, with its line end.
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>);
 
     /// A damaged line was left out: what was begun before it cannot go on behind it.
     fn interrupt(&mut self) {}
+
+    /// The file ends within `line`: ends the pending state if the line cannot belong to it.
+    fn unfinished(&mut self, _line: &Line<'_>, _states: &mut States<'_>) {}
 
     /// The end of the file, at `place`.
     fn end(&mut self, place: Place, states: &mut States<'_>);
@@ -149,6 +152,18 @@ impl<'a> Frame<'a> {
                 return Ok(true);
             }
             _ => {}
+        }
+        if !line.ended && !line.is_blank() {
+            // Nobody knows what is missing from it, not even where all its numbers seem whole.
+            if !self.fence.is_open() {
+                body.unfinished(&line, &mut self.states);
+                if !self.states.is_pending() {
+                    self.states.begin(None, (&line).into());
+                }
+                self.states.damage(&line, None, "the file ends within this line".into());
+                body.interrupt();
+            }
+            return Ok(true);
         }
         if line.overlong {
             self.states.problems.add(

@@ -41,7 +41,7 @@ impl Body for Curvout {
         if line.text.starts_with(STATE) {
             let time = super::at_time(line.text);
             states.begin(time, line.into());
-            if time.is_none() || !line.ended {
+            if time.is_none() {
                 states.damage(line, None, "expected \"( at time … )\"".into());
             }
         } else if self.row(line, states).is_none() {
@@ -62,7 +62,7 @@ impl Curvout {
         let id_end = start + text[start..].iter().position(u8::is_ascii_whitespace)?;
         let id = integer(&text[..id_end])?;
         let is_number = matches!(real(&text[id_end..]), Field::Real(_));
-        (is_number && line.ended).then_some(())?;
+        is_number.then_some(())?;
         let table = *self.table.get_or_insert_with(|| states.table("curves", &["ordinate"]));
         states.row(table, EntityId::new(id), line, |_| Some((id_end + 1, text.len())));
         Some(())

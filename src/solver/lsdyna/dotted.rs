@@ -3,6 +3,7 @@
 //! Never seen with data; read as the source of LSTC's converter `l2a` writes them.
 
 use super::ascii::Body;
+use super::label_values::is_number;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -10,8 +11,7 @@ use crate::solver::states::{States, TableId};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
 const LABEL: usize = 30;
-const VALUE: (usize, usize) = (31, 44);
-const ID: (usize, usize) = (31, 40);
+const VALUE_WIDTH: usize = 14;
 /// Labels of one file; more are damage.
 const MAX_TABLES: usize = 100;
 
@@ -31,9 +31,18 @@ impl Dotted {
 
 /// The label of a line, without its dots.
 pub fn label(line: &[u8]) -> Option<&str> {
-    let label = std::str::from_utf8(line.get(..LABEL)?).ok()?;
-    let is_label = label.starts_with(' ') && label.ends_with('.');
-    is_label.then(|| label.trim_end_matches('.').trim())
+    split(line, LABEL).map(|(label, _)| label)
+}
+
+/// The label of a line, without its dots, and where the dots end. One dot ends a label only
+/// where labels usually end, at column `usual`.
+pub fn split(line: &[u8], usual: usize) -> Option<(&str, usize)> {
+    let end = match memchr::memmem::rfind(line, b"..") {
+        Some(at) => at + 2,
+        None => (line.get(usual - 1) == Some(&b'.')).then_some(usual)?,
+    };
+    let label = std::str::from_utf8(line.get(..end)?).ok()?;
+    label.starts_with(' ').then(|| (label.trim_end_matches('.').trim(), end))
 }
 
 /// The name of a component in a binout: `x-force` is `x_force`, `d(phi)/dt (degrees)` is
@@ -61,9 +70,9 @@ impl Body for Dotted {
             return;
         }
         if self.value(line, states).is_none() {
-            let found = shown(line.columns(1, 44));
+            let found = shown(line.columns(1, LABEL + VALUE_WIDTH));
             let message = format!("expected a label and its value, found \"{}\"", found.trim_end());
-            states.damage(line, Some([VALUE.0, VALUE.1]), message);
+            states.damage(line, Some([LABEL + 1, LABEL + VALUE_WIDTH]), message);
         }
     }
 
@@ -76,18 +85,18 @@ impl Body for Dotted {
 
 impl Dotted {
     fn value(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
-        let label = label(line.text)?;
-        let width = line.text.trim_ascii_end().len();
+        let text = line.text.trim_ascii_end();
+        let (label, from) = split(text, LABEL)?;
+        let value = &text[from..];
         if self.entities.contains(&label) {
             self.entity = None;
-            (width == ID.1).then_some(())?;
-            self.entity = Some(EntityId::new(integer(line.columns(ID.0, ID.1))?));
+            self.entity = Some(EntityId::new(integer(value)?));
             return Some(());
         }
-        (width == VALUE.1).then_some(())?;
+        is_number(value, VALUE_WIDTH).then_some(())?;
         if label == "time" {
             self.entity = None;
-            let time = match real(line.columns(VALUE.0, VALUE.1)) {
+            let time = match real(value) {
                 Field::Real(time) => Some(time),
                 _ => None,
             };
@@ -105,7 +114,7 @@ impl Dotted {
             }
             None => return None,
         };
-        states.row(table, self.entity?, line, |_| Some(VALUE));
+        states.row(table, self.entity?, line, |_| Some((from + 1, text.len())));
         Some(())
     }
 }

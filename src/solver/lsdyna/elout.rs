@@ -230,7 +230,7 @@ impl Elout {
         if !self.at_points {
             let numbers = text.len().checked_sub(RESULTANT_AT)? / RESULTANT_WIDTH;
             let whole = text.len() == RESULTANT_AT + numbers * RESULTANT_WIDTH;
-            (whole && (6..=7).contains(&numbers) && line.ended).then_some(())?;
+            (whole && (6..=7).contains(&numbers)).then_some(())?;
             let names = &RESULTANTS[..numbers];
             let key = Key { quantity, point: 0, surface: "", location: None, names };
             let table =
@@ -262,7 +262,7 @@ impl Elout {
             // "id-part" of an element, "id-" of a node.
             let dash = memchr::memchr(b'-', text)?;
             let part = &text[dash + 1..];
-            (line.ended && (part.is_empty() || integer(part).is_some())).then_some(())?;
+            (part.is_empty() || integer(part).is_some()).then_some(())?;
             self.entity = Some(EntityId::new(integer(&text[..dash])?));
             return Some(());
         }
@@ -297,7 +297,7 @@ impl Elout {
             (all, more) if all.len() == more => all,
             _ => return None,
         };
-        (numbers.len() == tensor_end + further.len() * wide && line.ended).then_some(())?;
+        (numbers.len() == tensor_end + further.len() * wide).then_some(())?;
         let key = Key { quantity, point, surface, location, names: further };
         let table = self.table(key, states, || {
             let kind = match quantity {

@@ -3,7 +3,8 @@
 use std::io;
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, integer, real};
+use super::dotted::split;
+use super::line::{Field, Line, integer, is_whole_real, real};
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::States;
@@ -12,7 +13,7 @@ use crate::solver::{Selection, SolverFile};
 const STATE: &[u8] = b" dt of cycle";
 /// "label padded with dots to column 32, value columns 33–46".
 const LABEL: usize = 32;
-const VALUE: (usize, usize) = (33, 46);
+const VALUE_WIDTH: usize = 14;
 
 /// Labels whose component in binout is not the label with underscores.
 const NAMES: [(&str, &str); 3] = [
@@ -50,12 +51,7 @@ impl Body for Glstat {
             }
             return;
         }
-        let component = component(line.text);
-        if !line.ended && !line.is_blank() && (component.is_none() || line.text.len() < VALUE.1) {
-            states.damage(line, None, "the line is cut by the end of the file".into());
-            return;
-        }
-        let Some(mut component) = component else {
+        let Some((mut component, from)) = component(line.text) else {
             let text = line.text.trim_ascii();
             let is_stars = !text.is_empty() && text.iter().all(|&b| b == b'*');
             let is_ruler = self.in_properties && is_stars;
@@ -65,20 +61,22 @@ impl Body for Glstat {
             }
             return; // Text between the labels: mass properties, warnings.
         };
+        let columns = [from + 1, value_end(line.text, from)];
         // Only a wall's number may stand behind the value.
-        let rest = line.text.get(VALUE.1..).unwrap_or_default().trim_ascii();
-        if !rest.is_empty() && wall_number(line.text).is_none() {
+        let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
+        let wall = wall_number(rest);
+        if !rest.is_empty() && wall.is_none() {
             let message = "expected the line to end behind its value";
-            states.damage(line, Some([VALUE.1 + 1, line.text.len()]), message.into());
+            states.damage(line, Some([columns[1] + 1, line.text.len()]), message.into());
             return;
         }
         // With several walls the label repeats, and the wall follows the value.
-        if let Some(wall) = wall_number(line.text) {
+        if let Some(wall) = wall {
             component = format!("{component}_wall_{wall}");
         }
-        let value = line.columns(VALUE.0, VALUE.1);
+        let value = line.columns(columns[0], columns[1]);
         if component != "time" {
-            states.scalar(&component, value, line, [VALUE.0, VALUE.1]);
+            states.scalar(&component, value, line, columns);
             return;
         }
         match real(value) {
@@ -87,34 +85,47 @@ impl Body for Glstat {
             }
             // The line that opens a state is missing: its time opens it.
             Field::Real(time) => states.begin(Some(time), line.into()),
-            _ => states.damage(line, Some([VALUE.0, VALUE.1]), "expected a time".into()),
+            _ => states.damage(line, Some(columns), "expected a time".into()),
         }
     }
 
     fn end(&mut self, _: Place, _: &mut States<'_>) {}
 }
 
+/// Where the value that begins behind `from` ends: with a whole number, else where values
+/// usually end.
+fn value_end(text: &[u8], from: usize) -> usize {
+    let behind = text.get(from..).unwrap_or_default();
+    let blanks = behind.iter().take_while(|b| b.is_ascii_whitespace()).count();
+    let word = behind[blanks..].iter().take_while(|b| !b.is_ascii_whitespace()).count();
+    match is_whole_real(&behind[blanks..blanks + word]) {
+        true => from + blanks + word,
+        false => from + VALUE_WIDTH,
+    }
+}
+
 /// The number behind `wall#`, which follows the value of a stonewall energy.
-fn wall_number(text: &[u8]) -> Option<i64> {
-    let rest = text.get(VALUE.1..)?.trim_ascii_start();
+fn wall_number(rest: &[u8]) -> Option<i64> {
     integer(rest.strip_prefix(b"wall#")?)
 }
 
-/// The component a label names, as binout does; `None` if the line has no label.
-fn component(text: &[u8]) -> Option<String> {
-    let label = text.get(..LABEL)?;
-    if label.last() != Some(&b'.') || label[0] != b' ' {
-        return None;
-    }
-    let label = std::str::from_utf8(label).ok()?;
-    let label = label.trim_end_matches('.').trim();
+/// The component a label names, as binout does, and where the label ends; `None` if the line
+/// has no label.
+fn component(text: &[u8]) -> Option<(String, usize)> {
+    let (label, end) = split(text, LABEL)?;
+    // Dots stand in other text as well; there, no number follows them.
+    let value = text.get(end..value_end(text, end).min(text.len())).unwrap_or_default();
+    let is_value = end == LABEL || is_whole_real(value.trim_ascii());
     let known = NAMES.iter().find(|(l, _)| *l == label);
-    known.map(|(_, name)| name.to_string()).or_else(|| {
+    let name = known.map(|(_, name)| name.to_string()).or_else(|| {
         // The tables of mass properties ("row1= …") can have a point in that column.
-        let is_label = label.starts_with(|c: char| c.is_ascii_alphabetic()) && !label.contains('=');
+        // Stars are of lines that were overwritten.
+        let is_text = label.starts_with(|c: char| c.is_ascii_alphabetic());
+        let is_label = is_text && !label.contains(['=', '*']);
         let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
         is_label.then(|| words.collect::<Vec<_>>().join("_"))
-    })
+    });
+    name.filter(|_| is_value).map(|name| (name, end))
 }
 
 #[cfg(test)]
@@ -123,18 +134,19 @@ mod tests {
 
     #[test]
     fn every_wall_has_its_own_energy() {
-        fn t(line: &str, expected: Option<i64>) {
-            assert_eq!(wall_number(line.as_bytes()), expected, "{line:?}");
+        fn t(rest: &str, expected: Option<i64>) {
+            assert_eq!(wall_number(rest.as_bytes()), expected, "{rest:?}");
         }
-        t(" stonewall energy...............   1.00000E+00 wall# 1", Some(1));
-        t(" stonewall energy...............   1.00000E+00 wall#12", Some(12));
-        t(" stonewall energy...............   1.00000E+00", None);
+        t("wall# 1", Some(1));
+        t("wall#12", Some(12));
+        t("", None);
     }
 
     #[test]
     fn labels_become_binout_names() {
         fn t(line: &str, expected: Option<&str>) {
-            assert_eq!(component(line.as_bytes()).as_deref(), expected, "{line:?}");
+            let name = component(line.as_bytes()).map(|(name, _)| name);
+            assert_eq!(name.as_deref(), expected, "{line:?}");
         }
         t(" kinetic energy.................   9.93442E-06", Some("kinetic_energy"));
         t(" hourglass energy ..............   0.00000E+00", Some("hourglass_energy"));

@@ -1,8 +1,11 @@
 //! Rows of labels and numbers (`xforce=   1.0000E+00   yforce= …`): where the numbers are.
+//!
+//! A number is what stands between its label and the next one, so that a label that comes or
+//! goes with a release, and a gap of another width, change nothing.
 
-use super::line::Line;
+use super::line::{Line, is_whole_real};
 
-/// A component, its label, and the width of the number right behind the label.
+/// A component, its label, and the usual width of the number right behind the label.
 pub struct Labelled {
     pub component: &'static str,
     pub label: &'static str,
@@ -10,28 +13,82 @@ pub struct Labelled {
 }
 
 /// First and last column of every component's number; `None` for labels that the line does
-/// not have. The line must end with its last number, or with `tail` columns behind it: a cut
-/// line does not.
-pub fn fields(
-    line: &Line<'_>,
-    labels: &[Labelled],
-    tail: usize,
-) -> Option<Vec<Option<(usize, usize)>>> {
+/// not have. `None` for the row if something else than one number stands behind a label.
+pub fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
-    let fields: Vec<Option<(usize, usize)>> = labels
-        .iter()
-        .map(|l| {
-            let at = memchr::memmem::find(text, l.label.as_bytes())? + l.label.len();
-            Some((at + 1, at + l.width))
-        })
-        .collect();
-    let end = fields.iter().flatten().map(|(_, to)| *to).max()?;
+    // Beginning and end of each label, and which of the components it names.
+    let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
+    for (k, labelled) in labels.iter().enumerate() {
+        let mut found = memchr::memmem::find_iter(text, labelled.label);
+        let Some(at) = found.next() else { continue };
+        // A label that is there twice: two rows were joined.
+        found.next().is_none().then_some(())?;
+        marks.push((at, at + labelled.label.len(), Some(k)));
+    }
+    if marks.is_empty() {
+        return None;
+    }
+    for equals in memchr::memchr_iter(b'=', text) {
+        if !marks.iter().any(|&(from, to, _)| (from..to).contains(&equals)) {
+            let word = text[..equals].trim_ascii_end();
+            let start = word.iter().rposition(u8::is_ascii_whitespace).map_or(0, |at| at + 1);
+            marks.push((start, equals + 1, None));
+        }
+    }
+    marks.sort_unstable();
+    let ends = marks.iter().skip(1).map(|mark| mark.0).chain([text.len()]);
+    let mut fields = vec![None; labels.len()];
+    for (&(_, from, known), to) in marks.iter().zip(ends) {
+        let value = text.get(from..to)?.trim_ascii_end();
+        if let Some(k) = known {
+            let to = from + value.len();
+            is_number(value, labels[k].width).then_some(())?;
+            fields[k] = Some((from + 1, to));
+        } else if value.is_empty() {
+            return None;
+        }
+    }
     // Stars outside a number: lines were overwritten, and what stands behind is of another.
     let in_number =
         |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
     let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));
-    let whole = end == text.len() || (tail > 0 && end + tail == text.len());
-    (whole && !stars).then_some(fields)
+    (!stars).then_some(fields)
+}
+
+/// Whether the text behind a label is one number: a whole one, or, whatever it holds, one
+/// that fills the usual width.
+pub fn is_number(text: &[u8], width: usize) -> bool {
+    text.len() == width || is_whole_real(text.trim_ascii())
+}
+
+/// First and last column of the `count` numbers between the bytes `from` and `to`: apart from
+/// each other, or in columns of the usual width that end at `to`.
+pub fn numbers(
+    line: &Line<'_>,
+    from: usize,
+    to: usize,
+    count: usize,
+    width: usize,
+) -> Option<Vec<(usize, usize)>> {
+    let text = line.text.get(from..to)?;
+    let mut apart = Vec::with_capacity(count);
+    let mut at = 0;
+    while let Some(start) = text[at..].iter().position(|b| !b.is_ascii_whitespace()) {
+        let start = at + start;
+        let length = text[start..].iter().position(u8::is_ascii_whitespace);
+        at = length.map_or(text.len(), |length| start + length);
+        if apart.len() == count || !is_whole_real(&text[start..at]) {
+            apart.clear();
+            break;
+        }
+        apart.push((from + start + 1, from + at));
+    }
+    if apart.len() == count {
+        return Some(apart);
+    }
+    let first = to.checked_sub(count * width).filter(|&first| first >= from)?;
+    let is_apart = line.text[from..first].trim_ascii().is_empty();
+    is_apart.then(|| (0..count).map(|k| (first + k * width + 1, first + (k + 1) * width)).collect())
 }
 
 /// The components' names.
@@ -42,4 +99,45 @@ pub fn components<const N: usize>(labels: &[Labelled; N]) -> [&'static str; N] {
 /// Short for a table of labels.
 pub const fn labelled(component: &'static str, label: &'static str, width: usize) -> Labelled {
     Labelled { component, label, width }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(text: &str) -> Option<Vec<Option<String>>> {
+        let labels = [labelled("a", "x=", 10), labelled("b", "y=", 10)];
+        let line = Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
+        let fields = fields(&line, &labels)?;
+        let of = |field: &Option<(usize, usize)>| {
+            field.map(|(from, to)| text[from - 1..to].trim().to_string())
+        };
+        Some(fields.iter().map(of).collect())
+    }
+
+    #[test]
+    fn a_number_is_what_stands_behind_its_label() {
+        let (a, b) = (Some("1.50E+00".to_string()), Some("-2.50E+00".to_string()));
+        let both = Some(vec![a.clone(), b.clone()]);
+        assert_eq!(values(" n  7  x=  1.50E+00  y= -2.50E+00"), both);
+        assert_eq!(values(" x=     1.50E+00 set =  145 y=-2.50E+00  id =   9"), both);
+        assert_eq!(values(" y= -2.50E+00 x=  1.50E+00"), both, "in any order");
+        assert_eq!(values(" x=  1.50E+00 set = 145"), Some(vec![a, None]));
+        assert_eq!(values(" x=********** y= -2.50E+00"), Some(vec![Some("*".repeat(10)), b]));
+    }
+
+    #[test]
+    fn what_is_cut_or_joined_is_no_row() {
+        for text in [
+            " x=  1.50E+0 y= -2.50E+00",
+            " x=  1.50E+00 y=",
+            " x=  1.50E+00 set =",
+            " x=  1.50E+00  y= -2.5 x=  1.50E+00",
+            " x=  1.50E+00 7 y= -2.50E+00",
+            " ** x=  1.50E+00 y= -2.50E+00",
+            " z=  1.50E+00",
+        ] {
+            assert_eq!(values(text), None, "{text}");
+        }
+    }
 }

@@ -33,10 +33,10 @@ impl Line<'_> {
         self.text.iter().any(|b| b.is_ascii_control() && !matches!(b, b'\t' | b'\r' | b'\x0c'))
     }
 
-    /// Whether a line that holds no numbers is as the solver wrote it: whole, and without
-    /// stars, which stand only where a number should be.
+    /// Whether a line that holds no numbers is as the solver wrote it: without stars, which
+    /// stand only where a number should be.
     pub fn is_heading(&self) -> bool {
-        self.ended && memchr::memmem::find(self.text, b"**").is_none()
+        memchr::memmem::find(self.text, b"**").is_none()
     }
 
     /// Columns `from..=to`, counted from 1, as far as the line reaches.
@@ -186,6 +186,27 @@ fn fortran_real(text: &[u8]) -> Field {
     fast_float2::parse(&repaired).map_or(Field::Bad, finite)
 }
 
+/// Whether a text is a real as solvers print it, with nothing cut from it: a point between
+/// digits and an exponent of two or three digits; or stars, or no finite number.
+pub fn is_whole_real(text: &[u8]) -> bool {
+    let digits = |text: &[u8]| text.iter().take_while(|b| b.is_ascii_digit()).count();
+    let rest = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
+    let before = digits(rest);
+    let Some(fraction) = rest[before..].strip_prefix(b".") else {
+        return !text.is_empty() && matches!(real(text), Field::Overflow | Field::NotFinite(_));
+    };
+    let behind = digits(fraction);
+    let exponent = match &fraction[behind..] {
+        [b'E' | b'e' | b'D' | b'd', exponent @ ..] => exponent,
+        exponent => exponent,
+    };
+    let [b'+' | b'-', exponent @ ..] = exponent else { return false };
+    before > 0
+        && behind > 0
+        && (2..=3).contains(&exponent.len())
+        && digits(exponent) == exponent.len()
+}
+
 /// Reads one integer: the whole field, blanks around it allowed.
 pub fn integer(field: &[u8]) -> Option<i64> {
     std::str::from_utf8(field.trim_ascii()).ok()?.parse().ok()
@@ -226,6 +247,17 @@ mod tests {
         t("\0\0\0", Field::Bad);
         t("-", Field::Bad);
         t("0x10", Field::Bad);
+    }
+
+    #[test]
+    fn a_real_that_was_cut_is_not_whole() {
+        for whole in ["1.5000E+00", "-0.5D-03", "0.00+00", "-1.5000-345", "***", "NaN"] {
+            assert!(is_whole_real(whole.as_bytes()), "{whole}");
+        }
+        for cut in ["1.5000E+0", "1.5000E+", "1.5000", "1.", "5000E+00", "", "7", "1.5E+00-2.5E+00"]
+        {
+            assert!(!is_whole_real(cut.as_bytes()), "{cut}");
+        }
     }
 
     #[test]

@@ -120,6 +120,9 @@ pub enum Event<'a> {
 
 const CD: u8 = 2;
 const DATA: u8 = 3;
+const TABLE: u8 = 5;
+/// Changes of directory, variables and the end of a symbol table.
+const IN_TABLE: [u8; 3] = [CD, 4, 6];
 /// Commands: null, cd, data, variable, begin and end of a symbol table, its offset.
 const COMMANDS: std::ops::RangeInclusive<u8> = 1..=7;
 /// Longest path that is taken for one; real ones are far shorter.
@@ -154,6 +157,10 @@ pub fn walk(
                 at += length;
                 ahead = if length < MANY as u64 / 4 { MANY } else { NEAR };
             }
+            Err(None) if is_cut_table(source, header, at)? => {
+                each(Event::Cut { at });
+                return Ok(());
+            }
             Err(message) => {
                 let resumed = resume(source, header, at + 1, size)?;
                 let cut = resumed.is_none() && message.is_none();
@@ -167,6 +174,24 @@ pub fn walk(
         }
     }
     Ok(())
+}
+
+/// Whether the end of the file cuts a symbol table at `at`: up to there it holds nothing but
+/// what a table does. Its records change directories too, but hold no data to go on with.
+fn is_cut_table(source: &dyn Source, header: Header, at: u64) -> io::Result<bool> {
+    let mut window = Window::new(source);
+    let frame = usize::from(header.width) + 1;
+    let mut next = at;
+    while let Some(head) = window.get(next, frame, NEAR)? {
+        let (length, command) = (header.unsigned(&head[..frame - 1]), head[frame - 1]);
+        let is_of_table = if next == at { command == TABLE } else { IN_TABLE.contains(&command) };
+        if !is_of_table || length < frame as u64 {
+            return Ok(false);
+        }
+        // The length of the first record is that of the whole table.
+        next = if next == at { at + frame as u64 } else { next.saturating_add(length) };
+    }
+    Ok(next > at)
 }
 
 struct Record<'a> {

@@ -81,7 +81,7 @@ impl Body for Matsum {
             self.part = None;
             // Five digits: two states may print one time, so the line begins a state.
             match real(rest) {
-                Field::Real(time) if line.ended && rest.len() >= WIDTH => {
+                Field::Real(time) if rest.len() >= WIDTH => {
                     states.begin(Some(time), line.into());
                 }
                 _ => {
@@ -125,7 +125,7 @@ impl Matsum {
                 states.table(name, &components)
             })
         });
-        let Some(fields) = fields(line, LINES[index].1, 0) else {
+        let Some(fields) = fields(line, LINES[index].1) else {
             states.damage(line, None, "expected labels and their numbers".into());
             return;
         };

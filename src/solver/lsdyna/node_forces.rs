@@ -111,9 +111,7 @@ impl NodeForces {
         let from = memchr::memchr(b'#', text)? + 1;
         let to = memchr::memmem::find(text, ID)?;
         let id = integer(text.get(from..to)?)?;
-        // "setid =  200034" may stand between the forces and the moments, or last.
-        let tail = b"   setid =        0".len();
-        let fields = fields(line, &ROW, tail)?;
+        let fields = fields(line, &ROW)?;
         fields[..4].iter().all(Option::is_some).then_some(())?;
         let [table, _] = self.tables(states)?;
         self.body = Some(id);
@@ -122,7 +120,7 @@ impl NodeForces {
     }
 
     fn moments(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
-        let fields = fields(line, &MOMENTS, 0)?;
+        let fields = fields(line, &MOMENTS)?;
         let id = self.body?;
         fields.iter().all(Option::is_some).then_some(())?;
         let [_, table] = self.tables(states)?;
@@ -131,7 +129,7 @@ impl NodeForces {
     }
 
     fn totals(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
-        let fields = fields(line, &TOTALS, 0)?;
+        let fields = fields(line, &TOTALS)?;
         let prefix = self.prefix(self.current?);
         for (label, field) in TOTALS.iter().zip(fields) {
             let Some((from, to)) = field else { continue };
@@ -158,7 +156,7 @@ impl Body for NodeForces {
             let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
             match at.map(|at| real(&text[at..])) {
                 // Every kind of boundary condition has a heading of its own at one time.
-                Some(Field::Real(time)) if line.ended => {
+                Some(Field::Real(time)) => {
                     if states.pending_time() != Some(time) {
                         states.begin(Some(time), line.into());
                     }

@@ -5,6 +5,7 @@
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::numbers;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -17,10 +18,8 @@ const BODIES: [&[u8]; 2] = [b" nodal rigid body", b" rigid body"];
 const LOCAL: &[u8] = b" output in principal or user defined local";
 /// Lines that hold no values.
 const HEADINGS: [&[u8]; 5] = [b"1", b"global", b"principal or user defined", b"a ", b"output in"];
-/// Behind the label up to column 17, fields of 12; rows of direction cosines: 10 and 15.
-const LABEL: usize = 17;
+/// Behind the label, fields of 12; in rows of direction cosines of 15.
 const WIDTH: usize = 12;
-const ROW_LABEL: usize = 10;
 const ROW_WIDTH: usize = 15;
 
 /// Labels of lines, with their components in global and in local directions.
@@ -89,7 +88,7 @@ impl Rbdout {
             self.body = None;
             let at = memchr::memmem::find(text, b"time=").map(|at| at + 5);
             let time = match at.map(|at| real(&text[at..])) {
-                Some(Field::Real(time)) if line.ended => Some(time),
+                Some(Field::Real(time)) => Some(time),
                 _ => None,
             };
             states.begin(time, line.into());
@@ -97,7 +96,7 @@ impl Rbdout {
         }
         if let Some(rest) = BODIES.iter().find_map(|label| text.strip_prefix(*label)) {
             self.is_local = false;
-            self.body = line.ended.then(|| integer(rest)).flatten().map(EntityId::new);
+            self.body = integer(rest).map(EntityId::new);
             return self.body.map(drop);
         }
         let start = text.trim_ascii_start();
@@ -117,14 +116,12 @@ impl Rbdout {
         });
         let (label, global, local) = LINES[index];
         let components = if self.is_local { local } else { global };
-        let (from, width) = match label.starts_with(b"row") {
-            true => (ROW_LABEL, ROW_WIDTH),
-            false => (LABEL, WIDTH),
-        };
-        (!components.is_empty() && text.len() == from + components.len() * width).then_some(())?;
+        let width = if label.starts_with(b"row") { ROW_WIDTH } else { WIDTH };
+        (!components.is_empty()).then_some(())?;
+        let from = text.len() - start.len() + label.len();
+        let fields = numbers(line, from, text.len(), components.len(), width)?;
         let table = tables[index][usize::from(self.is_local)];
-        states
-            .row(table, self.body?, line, |k| Some((from + k * width + 1, from + (k + 1) * width)));
+        states.row(table, self.body?, line, |k| fields.get(k).copied());
         Some(())
     }
 }

@@ -3,9 +3,9 @@
 use std::io;
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Field, Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
-use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
@@ -78,14 +78,6 @@ impl Body for Rcforc {
             if !self.undefined.contains(&id) {
                 self.undefined.push(id);
             }
-            if !line.ended && !line.text.ends_with(b"undefined") {
-                states.problems.add(
-                    ProblemCode::BadLine,
-                    Some(line.into()),
-                    None,
-                    "the line is cut by the end of the file".into(),
-                );
-            }
         } else if let Some((side, rest)) = side(line.text) {
             self.row(side, rest, line, states);
         } else {
@@ -112,37 +104,18 @@ impl Rcforc {
         let text = line.text;
         let parsed = time_at(text).and_then(|at| {
             let id = integer(text.get(id_from..at)?)?;
-            let from = at + TIME.len();
-            match real(text.get(from..from + WIDTH)?) {
-                Field::Real(time) => Some((id, time, at)),
-                _ => None,
-            }
+            let (time, fields) = in_columns(text, at).or_else(|| by_labels(text, at))?;
+            Some((id, time, fields))
         });
-        let Some((id, time, at)) = parsed else {
-            states.damage(line, Some([9, 36]), "expected an interface id and a time".into());
+        let Some((id, time, fields)) = parsed else {
+            self.damage(id_from, line, states);
             return;
         };
-        let missing = COLUMNS.iter().find(|c| c.always && !c.fits(text, at));
-        let moments = COLUMNS.iter().filter(|c| c.is_moment()).all(|c| c.fits(text, at));
-        if let Some(bad) = missing {
-            let label = shown(bad.label);
-            states.damage(
-                line,
-                Some([at + bad.offset + 1 - bad.label.len(), at + bad.offset + bad.width]),
-                format!("expected \"{}\" and a number of {} columns", label.trim(), bad.width),
-            );
-            return;
-        }
-        // Text behind the last whole column, or a cut file's row that is shorter than others.
-        let end =
-            COLUMNS.iter().filter(|c| c.fits(text, at)).map(|c| at + c.offset + c.width).max();
-        let rest = text.get(end.unwrap_or(0)..).unwrap_or_default();
-        if !rest.trim_ascii().is_empty() || (!moments && (self.moments || !line.ended)) {
-            states.damage(
-                line,
-                Some([end.unwrap_or(0) + 1, text.len().max(end.unwrap_or(0) + 1)]),
-                "expected the row's further columns, or its end".into(),
-            );
+        let moments =
+            COLUMNS.iter().zip(&fields).all(|(c, field)| !c.is_moment() || field.is_some());
+        if !moments && self.moments {
+            let message = "expected moments, as the rows above have them";
+            states.damage(line, Some([text.len(), text.len()]), message.into());
             return;
         }
         self.moments |= moments;
@@ -156,12 +129,90 @@ impl Rcforc {
         if begins {
             states.begin(Some(time), line.into());
         }
-        states.row(table, entity, line, |k| {
-            let column = &COLUMNS[k];
-            let from = at + column.offset;
-            column.fits(text, at).then_some((from + 1, from + column.width))
-        });
+        states.row(table, entity, line, |k| fields[k]);
     }
+
+    /// Says what a row lacks.
+    fn damage(&self, id_from: usize, line: &Line<'_>, states: &mut States<'_>) {
+        let text = line.text;
+        let at = time_at(text).filter(|&at| {
+            let time = text.get(at + TIME.len()..at + TIME.len() + WIDTH);
+            text.get(id_from..at).and_then(integer).is_some()
+                && time.is_some_and(|time| matches!(real(time), Field::Real(_)))
+        });
+        let Some(at) = at else {
+            states.damage(line, Some([9, 36]), "expected an interface id and a time".into());
+            return;
+        };
+        if let Some(bad) = COLUMNS.iter().find(|c| c.always && !c.fits(text, at)) {
+            let label = shown(bad.label);
+            states.damage(
+                line,
+                Some([at + bad.offset + 1 - bad.label.len(), at + bad.offset + bad.width]),
+                format!("expected \"{}\" and a number of {} columns", label.trim(), bad.width),
+            );
+            return;
+        }
+        let end = end_of_columns(text, at);
+        states.damage(
+            line,
+            Some([end + 1, text.len().max(end + 1)]),
+            "expected the row's further columns, or its end".into(),
+        );
+    }
+}
+
+/// Time and columns of a row.
+type Row = (f64, [Option<(usize, usize)>; COLUMNS.len()]);
+
+/// A row as every known release prints it; `None` if anything stands elsewhere.
+fn in_columns(text: &[u8], at: usize) -> Option<Row> {
+    let from = at + TIME.len();
+    let Field::Real(time) = real(text.get(from..from + WIDTH)?) else { return None };
+    let whole = COLUMNS.iter().all(|c| !c.always || c.fits(text, at));
+    let rest = text.get(end_of_columns(text, at)..).unwrap_or_default();
+    let fields = COLUMNS.each_ref().map(|column| {
+        let from = at + column.offset;
+        column.fits(text, at).then_some((from + 1, from + column.width))
+    });
+    (whole && rest.trim_ascii().is_empty()).then_some((time, fields))
+}
+
+/// Where the last column ends that is there.
+fn end_of_columns(text: &[u8], at: usize) -> usize {
+    let ends = COLUMNS.iter().filter(|c| c.fits(text, at)).map(|c| at + c.offset + c.width);
+    ends.max().unwrap_or(0)
+}
+
+/// A row whose numbers have other widths, or that has further labels: each label with the
+/// number behind it.
+fn by_labels(text: &[u8], at: usize) -> Option<Row> {
+    let mut end = at + TIME.len();
+    let mut word = || {
+        let from = end + text[end..].iter().position(|b| !b.is_ascii_whitespace())?;
+        let length = text[from..].iter().position(u8::is_ascii_whitespace);
+        end = length.map_or(text.len(), |length| from + length);
+        Some((from, end))
+    };
+    let (from, to) = word()?;
+    let Field::Real(time) = real(&text[from..to]) else { return None };
+    is_whole_real(&text[from..to]).then_some(())?;
+    let mut fields = [None; COLUMNS.len()];
+    while let Some((from, mut to)) = word() {
+        let mut value = word()?;
+        if &text[from..to] == b"tied" && &text[value.0..value.1] == b"area" {
+            (to, value) = (value.1, word()?);
+        }
+        let label = &text[from..to];
+        let number = &text[value.0..value.1];
+        let is_label = label[0].is_ascii_alphabetic();
+        (is_label && (is_whole_real(number) || integer(number).is_some())).then_some(())?;
+        if let Some(k) = COLUMNS.iter().position(|c| c.label.trim_ascii() == label) {
+            fields[k].replace((value.0 + 1, value.1)).is_none().then_some(())?;
+        }
+    }
+    let whole = COLUMNS.iter().zip(&fields).all(|(c, field)| !c.always || field.is_some());
+    whole.then_some((time, fields))
 }
 
 impl Column {

@@ -3,6 +3,7 @@
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::numbers;
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -17,7 +18,7 @@ const ID: (usize, usize) = (1, 10);
 /// Energies of both sides and of friction. Old files have no third column, and for
 /// single-surface contacts no second one.
 const FIELDS: [(usize, usize); 3] = [(11, 23), (24, 36), (65, 77)];
-/// Sums: label to column 28, value behind it.
+/// Sums: the value stands behind the label.
 const SUMS: [(&[u8], &str); 6] = [
     (b"total slave side=", "total_slave"),
     (b"total surfa side=", "total_slave"),
@@ -26,7 +27,7 @@ const SUMS: [(&[u8], &str); 6] = [
     (b"total energy    =", "total_energy"),
     (b"friction energy =", "total_friction"),
 ];
-const SUM: (usize, usize) = (29, 42);
+const SUM_WIDTH: usize = 14;
 
 pub fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
@@ -71,20 +72,25 @@ impl Body for Sleout {
 impl Sleout {
     fn values(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
-        let label = SUMS.iter().find(|(label, _)| memchr::memmem::find(text, label).is_some());
-        if let Some((_, name)) = label {
-            let stars = memchr::memmem::find(line.columns(1, SUM.0 - 1), b"**");
-            (text.len() == SUM.1 && stars.is_none()).then_some(())?;
-            states.scalar(name, line.columns(SUM.0, SUM.1), line, [SUM.0, SUM.1]);
+        let sum = SUMS.iter().find_map(|(label, name)| {
+            Some((memchr::memmem::find(text, label)? + label.len(), name))
+        });
+        if let Some((from, name)) = sum {
+            memchr::memmem::find(&text[..from], b"**").is_none().then_some(())?;
+            let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
+            states.scalar(name, line.columns(first, last), line, [first, last]);
             return Some(());
         }
         let id = integer(line.columns(ID.0, ID.1))?;
-        let columns = FIELDS.iter().position(|(_, to)| *to == text.len())? + 1;
-        let whole = line.ended && (text.len() >= self.width || self.width < FIELDS[2].1);
+        // Further columns, such as one of transducers, stand apart behind the third.
+        let last = FIELDS[2].1;
+        let is_wider = text.get(last).is_some_and(u8::is_ascii_whitespace);
+        let width = if is_wider { last } else { text.len() };
+        let columns = FIELDS.iter().position(|(_, to)| *to == width)? + 1;
         let between = line.columns(FIELDS[1].1 + 1, FIELDS[2].0 - 1);
-        let is_apart = between.trim_ascii().is_empty();
-        (is_apart && (whole || text.len() == FIELDS[2].1)).then_some(())?;
-        self.width = self.width.max(text.len());
+        let is_whole = width >= self.width || self.width < last;
+        (is_whole && between.trim_ascii().is_empty()).then_some(())?;
+        self.width = self.width.max(width);
         let table = *self.table.get_or_insert_with(|| states.table("interfaces", &COMPONENTS));
         states.row(table, EntityId::new(id), line, |k| (k < columns).then_some(FIELDS[k]));
         Some(())

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::numbers;
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -18,10 +19,9 @@ const NODE: &[u8] = b" node=";
 const FORCES: &[u8] = b"local x,y,z forces =";
 const MOMENTS: &[u8] = b"local x,y,z moments=";
 const RESULTANT: &[u8] = b"force resultants   =";
-/// Three `E14.4` behind each label, then `  setid=` and eight digits (absent in old files).
+/// Three `E14.4` behind each label, then `setid=` and digits (absent in old files).
 const WIDTH: usize = 14;
-const SET_ID: &[u8] = b"  setid=";
-const SET_ID_WIDTH: usize = 8;
+const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
@@ -43,8 +43,6 @@ struct Spcforc {
     tables: Vec<[TableId; 2]>,
     /// Rows of each node in the pending state: one for each set of constraints it is in.
     rows: HashMap<i64, [usize; 2]>,
-    /// Whether rows end with the id of a set: then a row without it is cut.
-    has_set_ids: bool,
 }
 
 impl Body for Spcforc {
@@ -80,24 +78,19 @@ impl Spcforc {
             memchr::memmem::find(text, label).map(|at| (at, label, kind))
         })?;
         let from = at + label.len();
-        let end = from + 3 * WIDTH;
-        let field = |k: usize| (from + k * WIDTH + 1, from + (k + 1) * WIDTH);
+        let set_id = memchr::memmem::find(text, SET_ID);
+        let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
+        let fields = numbers(line, from, end, 3, WIDTH)?;
         let Some(kind) = kind else {
-            let is_alone = text[..at].trim_ascii().is_empty();
-            (text.len() == end && is_alone).then_some(())?;
-            for (k, name) in ["x_resultant", "y_resultant", "z_resultant"].iter().enumerate() {
-                let (first, last) = field(k);
+            (set_id.is_none() && text[..at].trim_ascii().is_empty()).then_some(())?;
+            let names = ["x_resultant", "y_resultant", "z_resultant"];
+            for (name, &(first, last)) in names.iter().zip(&fields) {
                 states.scalar(name, line.columns(first, last), line, [first, last]);
             }
             return Some(());
         };
-        let rest = text.get(end..)?;
-        match rest.strip_prefix(SET_ID) {
-            Some(id) if id.len() == SET_ID_WIDTH && integer(id).is_some() => {
-                self.has_set_ids = true;
-            }
-            None if rest.is_empty() && !self.has_set_ids => {}
-            _ => return None,
+        if let Some(set_id) = set_id {
+            integer(&text[set_id + SET_ID.len()..])?;
         }
         // The width of the node's field is 6 or 8 by release.
         let id = integer(text[..at].strip_prefix(NODE)?)?;
@@ -105,7 +98,7 @@ impl Spcforc {
         *count += 1;
         let row = *count;
         let table = self.table(row, kind, states)?;
-        states.row(table, EntityId::new(id), line, |k| Some(field(k)));
+        states.row(table, EntityId::new(id), line, |k| Some(fields[k]));
         Some(())
     }
 

@@ -3,6 +3,7 @@
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::{is_number, numbers};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
@@ -13,18 +14,16 @@ use crate::solver::{Selection, SolverFile};
 const COLUMN_LINE: &[u8] = b" constraint #";
 const COMPONENTS: [&str; 7] =
     ["axial", "shear", "failure", "length", "resultant_moment", "torsion", "failure_time"];
-/// Columns: order number 1–11 (not the id), axial, shear and time of 13, failure to 59, kind
-/// and id to 91, then up to three numbers of 13, or the time of failure.
+/// Columns: order number 1–11 (not the id), axial, shear and time of 13, failure to 59, kind,
+/// `ID` and the id, then up to three numbers of 13, or the time of failure.
 const AXIAL: (usize, usize) = (12, 24);
 const SHEAR: (usize, usize) = (25, 37);
 const TIME: (usize, usize) = (38, 50);
 const FAILURE: (usize, usize) = (51, 59);
-const KIND: (usize, usize) = (60, 82);
-const ID: (usize, usize) = (83, 91);
-const REST: usize = 91;
+const ID: &[u8] = b"ID";
 const WIDTH: usize = 13;
-const FAILED: &[u8] = b"  failure time=";
-const FAILURE_TIME: (usize, usize) = (107, 118);
+const FAILED: &[u8] = b"failure time=";
+const FAILURE_TIME_WIDTH: usize = 12;
 /// Kinds of connection, each with ids of its own.
 const MAX_KINDS: usize = 20;
 
@@ -68,18 +67,32 @@ impl Swforc {
         let text = line.text.trim_ascii_end();
         integer(text.get(..AXIAL.0 - 1)?)?;
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
-        let kind = line.columns(KIND.0, KIND.1).trim_ascii();
-        let kind = kind.strip_suffix(b"ID")?.trim_ascii_end().to_vec();
-        (!kind.contains(&b'*')).then_some(())?;
-        let id = integer(line.columns(ID.0, ID.1))?;
-        let rest = text.get(REST..)?;
-        let failed = rest.starts_with(FAILED);
-        let numbers = if failed { 0 } else { rest.len() / WIDTH };
-        let whole = match failed {
-            true => text.len() >= FAILURE_TIME.1,
-            false => numbers <= 3 && rest.len() == numbers * WIDTH,
+        let at = FAILURE.1 + memchr::memmem::find(text.get(FAILURE.1..)?, ID)?;
+        let kind = text[FAILURE.1..at].trim_ascii().to_vec();
+        (!kind.is_empty() && !kind.contains(&b'*')).then_some(())?;
+        let id_from = at + ID.len();
+        let blanks = text[id_from..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let digits = text[id_from + blanks..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let rest = id_from + blanks + digits;
+        let id = integer(&text[id_from..rest])?;
+        let failed = memchr::memmem::find(&text[rest..], FAILED).map(|at| rest + at + FAILED.len());
+        let fields = match failed {
+            Some(from) => {
+                let behind = &text[from..];
+                let blanks = behind.iter().take_while(|b| b.is_ascii_whitespace()).count();
+                let word = behind[blanks..].iter().position(u8::is_ascii_whitespace);
+                let end = from + word.map_or(behind.len(), |length| blanks + length);
+                is_number(&text[from..end], FAILURE_TIME_WIDTH).then_some(())?;
+                vec![(from + 1, end)]
+            }
+            None => {
+                let words = text[rest..].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+                let columns = (text.len() - rest).is_multiple_of(WIDTH);
+                let count = if columns { (text.len() - rest) / WIDTH } else { words.count() };
+                (count <= 3).then_some(())?;
+                numbers(line, rest, text.len(), count, WIDTH)?
+            }
         };
-        (whole && line.ended).then_some(())?;
         let known = self.kinds.iter().find(|(k, _)| *k == kind).map(|(_, table)| *table);
         let table = match known {
             Some(table) => table,
@@ -102,8 +115,8 @@ impl Swforc {
             0 => Some(AXIAL),
             1 => Some(SHEAR),
             2 => failure.then_some(FAILURE),
-            6 => failed.then_some(FAILURE_TIME),
-            _ => (k - 3 < numbers).then_some((REST + (k - 3) * WIDTH + 1, REST + (k - 2) * WIDTH)),
+            6 => failed.and(fields.first().copied()),
+            _ => fields.get(k - 3).copied().filter(|_| failed.is_none()),
         });
         Some(())
     }

@@ -77,11 +77,14 @@ pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<
             None,
             format!("the header is damaged or cut at byte {}", records.position()),
         );
-        let file = SolverFile { problems: problems.into_list(), ..empty("glstat") };
+        let file = SolverFile {
+            problems: problems.into_list(),
+            ..empty(selection.section.as_deref().unwrap_or("glstat"))
+        };
         return Ok(vec![file]);
     };
     let mut states = States::new(&header, selection);
-    states.read(&mut records, &mut problems)?;
+    states.read(&header, &mut records, &mut problems)?;
     Ok(states.finish(&header, selection, problems))
 }
 

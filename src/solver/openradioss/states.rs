@@ -20,6 +20,10 @@ struct Channel {
     values: Vec<f64>,
 }
 
+/// Values beside each other that a node loses for one state when it stands on a wall: its
+/// velocity and its acceleration.
+const STANDING: usize = 6;
+
 /// The states, of selected values only.
 pub struct States {
     time: Vec<f64>,
@@ -105,7 +109,12 @@ impl States {
 
     /// Reads states until the end. One that is damaged is left out and said; as all have the
     /// same length, the next one is found behind it.
-    pub fn read(&mut self, records: &mut Records<'_>, problems: &mut Problems) -> io::Result<()> {
+    pub fn read(
+        &mut self,
+        header: &Header,
+        records: &mut Records<'_>,
+        problems: &mut Problems,
+    ) -> io::Result<()> {
         let mut start = records.position();
         let mut number = 0;
         let mut above: [Option<Vec<Vec<u8>>>; 2] = [None, None];
@@ -124,7 +133,7 @@ impl States {
             }
             if state.len() == self.lengths.len() {
                 damaged = self.say(damaged, number, problems);
-                self.look_for_zeros(&above, Some(&state), problems);
+                self.look_for_zeros(header, &above, Some(&state), problems);
                 self.store(&state, start, problems);
                 let [_, last] = above;
                 above = [last, Some(state)];
@@ -134,7 +143,7 @@ impl States {
             start += self.stride();
         }
         self.say(damaged, number + 1, problems);
-        self.look_for_zeros(&above, None, problems);
+        self.look_for_zeros(header, &above, None, problems);
         if self.not_finite > 0 {
             let message = format!(
                 "{} values are no finite numbers; they are returned as such",
@@ -161,33 +170,59 @@ impl States {
         None
     }
 
-    /// Names the last state above if values of it are zero that are not in the states around
-    /// it: T01 has no check sums, and neither a motion nor an impulse does that.
+    /// Names the last state above if more values beside each other are zero, though not in the
+    /// states around it, than a node that stands on a wall has: T01 has no check sums.
     fn look_for_zeros(
         &self,
+        header: &Header,
         above: &[Option<Vec<Vec<u8>>>; 2],
         below: Option<&Vec<Vec<u8>>>,
         problems: &mut Problems,
     ) {
         let [Some(before), Some(state)] = above else { return };
         let is_zero = |word: &[u8]| word[0] & 0x7f == 0 && word[1..] == [0, 0, 0];
-        let mut count = 0;
         for (k, record) in state.iter().enumerate().skip(1) {
             let words = record.chunks_exact(4).zip(before[k].chunks_exact(4)).enumerate();
-            count += words
-                .filter(|(i, (now, before))| {
-                    let after = below.is_none_or(|b| !is_zero(&b[k][4 * i..4 * i + 4]));
-                    is_zero(now) && !is_zero(before) && after
-                })
-                .count();
+            let vanishes = words.map(|(i, (now, before))| {
+                let after = below.is_none_or(|b| !is_zero(&b[k][4 * i..4 * i + 4]));
+                is_zero(now) && !is_zero(before) && after
+            });
+            let mut first = None;
+            for (i, vanishes) in vanishes.chain([false]).enumerate() {
+                if vanishes {
+                    first.get_or_insert(i);
+                    continue;
+                }
+                let Some(first) = first.take().filter(|first| i - first > STANDING) else {
+                    continue;
+                };
+                let message = format!(
+                    "{} values of the state at time {:?}, {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+                    i - first,
+                    self.time.last().copied().unwrap_or(f64::NAN),
+                    self.name(header, k, first),
+                    self.name(header, k, i - 1),
+                );
+                let place = self.starts.last().copied().map(Place::at_byte);
+                problems.add(ProblemCode::SuspectZeros, place, None, message);
+            }
         }
-        if count > 0 {
-            let message = format!(
-                "{count} values of the state at time {:?} are zero but not so in the states around it: was the file overwritten there?",
-                self.time.last().copied().unwrap_or(f64::NAN)
-            );
-            let place = self.starts.last().copied().map(Place::at_byte);
-            problems.add(ProblemCode::SuspectZeros, place, None, message);
+    }
+
+    /// What the `word`-th value of a state's record is.
+    fn name(&self, header: &Header, record: usize, word: usize) -> String {
+        let Some(group) = record.checked_sub(self.first_group).map(|k| &header.groups[k]) else {
+            let global = GLOBAL_COMPONENTS.get(word).filter(|_| record == 1 && header.globals > 0);
+            return global.map_or(format!("value {}", word + 1), |name| name.to_string());
+        };
+        let width = group.codes.len().max(1);
+        let id = group.objects.get(word / width).map_or(0, |(id, _)| *id);
+        let code = usize::try_from(group.codes[word % width]).unwrap_or(0);
+        match group.section() {
+            Some("nodout") if (1..=NODE_COMPONENTS.len()).contains(&code) => {
+                format!("{}[{id}]", NODE_COMPONENTS[code - 1])
+            }
+            section => format!("variable {code} of {} {id}", section.unwrap_or("object")),
         }
     }
 

@@ -22,8 +22,10 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 /// Components of a state that are no results.
 const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 
-/// Largest array of ids or titles that is read; real ones are far shorter.
+/// Largest text of titles that is read, and ids of one list; real ones are far shorter. A
+/// longer list fits no values, which are then said to be left out.
 const MAX_METADATA: u64 = 256 << 20;
+const MAX_IDS: u64 = 4_000_000;
 /// Values of one entity for several integration points that are told apart.
 const MAX_POINTS: usize = 128;
 
@@ -40,20 +42,26 @@ struct States {
     whole: Vec<usize>,
     time: Arc<[f64]>,
     /// Ids of each of them where states name their own.
-    ids: Option<Vec<Vec<i64>>>,
+    ids: Option<Vec<Ids>>,
 }
 
-/// Rows of one entity whose names are listed.
+/// A state's ids; states with the same ones share them.
+type Ids = Arc<[i64]>;
+
+/// Rows that one entity has in a state; a node is in so many sets of constraints at most.
 const MAX_ROWS: usize = 20;
+/// Sections in which an id that is there twice is a fault of the file.
+const HAVE_ONE_ROW: [&str; 6] =
+    ["nodout", "matsum", "rwforc/forces", "secforc", "rbdout", "abstat"];
 
 /// Whom the values of a component belong to.
 #[derive(Clone)]
 enum Owners {
     Global,
     /// One value per entity, in this order in every state.
-    Fixed(Vec<EntityId>),
+    Fixed(Arc<[EntityId]>),
     /// Each state names its own entities; here all of them.
-    OfState(Vec<EntityId>),
+    OfState(Arc<[EntityId]>),
 }
 
 impl<'a> Reader<'a> {
@@ -78,7 +86,9 @@ impl<'a> Reader<'a> {
         Ok((place.payload.kind, header, self.bytes(place, 0, length)?))
     }
 
-    fn integers(&self, place: Place) -> io::Result<Vec<i64>> {
+    fn integers(&self, mut place: Place) -> io::Result<Vec<i64>> {
+        let size = place.payload.kind.size().unwrap_or(1) as u64;
+        place.payload.bytes = place.payload.bytes.min(MAX_IDS * size);
         let (kind, header, bytes) = self.whole(place)?;
         Ok(kind.integers(header, &bytes))
     }
@@ -96,7 +106,7 @@ impl<'a> Reader<'a> {
         }
         if let Some(ids) = &states.ids {
             let mut states_with: HashMap<i64, usize> = HashMap::new();
-            for id in ids.iter().flatten() {
+            for id in ids.iter().flat_map(|ids| ids.iter()) {
                 *states_with.entry(*id).or_default() += 1;
             }
             let partly = states_with.values().filter(|&&n| n < ids.len()).count();
@@ -110,7 +120,8 @@ impl<'a> Reader<'a> {
             }
         }
         let lists = [&metadata.ids, &metadata.force_ids, &metadata.moment_ids];
-        let named = lists.into_iter().flatten().chain(states.ids.iter().flatten()).flatten();
+        let of_states = states.ids.iter().flatten().flat_map(|ids| ids.iter());
+        let named = lists.into_iter().flatten().flatten().chain(of_states);
         let lost = named.filter(|id| is_lost(section, **id)).count();
         if lost > 0 {
             let message = format!(
@@ -123,13 +134,22 @@ impl<'a> Reader<'a> {
         let mut known: HashSet<EntityId> = HashSet::new();
         let mut components: Vec<Arc<str>> = Vec::new();
         let mut wanted: Vec<(&Component, Arc<str>, Owners, Option<usize>)> = Vec::new();
+        let mut lists: Vec<EntityList> = Vec::new();
         for component in section.components.iter().filter(|c| !is_not_result(&c.name)) {
             let Some((owners, points)) =
                 self.owners(section, component, &metadata, &states, problems)?
             else {
                 continue;
             };
-            for id in owners.entities().iter().filter(|id| !is_lost(section, id.id)) {
+            let list = match lists.iter().position(|l| *l.entities == *owners.entities()) {
+                Some(known) => known,
+                None => {
+                    lists.push(EntityList::new(section, &owners, problems));
+                    lists.len() - 1
+                }
+            };
+            let (list, owners) = (&lists[list], owners.sharing(&lists[list]));
+            for id in list.entities.iter().filter(|id| !is_lost(section, id.id)) {
                 if !states.whole.is_empty() && known.insert(*id) {
                     entities.push(*id);
                 }
@@ -139,10 +159,8 @@ impl<'a> Reader<'a> {
                     0 => component.name.clone(),
                     _ => format!("{}_ip{}", component.name, point + 1).into(),
                 };
-                let rows = rows_of_one(owners.entities()).into_iter().zip(owners.entities());
-                let rows = rows.filter(|(_, id)| !is_lost(section, id.id)).map(|(row, _)| row);
-                let rows = rows.max().unwrap_or(1).min(MAX_ROWS);
-                let names: Vec<Arc<str>> = (1..=rows).map(|row| row_name(&name, row)).collect();
+                let names: Vec<Arc<str>> =
+                    (1..=list.most_rows).map(|row| row_name(&name, row)).collect();
                 let audited = self.selection.audit && component.is_real();
                 let is_wanted = names.iter().any(|name| self.selection.wants_component(name));
                 components.extend(names);
@@ -314,15 +332,25 @@ impl<'a> Reader<'a> {
         let ids = match section.component("ids") {
             None => self.ids_by_order(section, &whole)?,
             Some(component) => {
-                let of = |state: &usize| match component.records.get(state) {
-                    Some(&place) => self.integers(place),
-                    None => Ok(Vec::new()),
-                };
-                Some(whole.iter().map(of).collect::<io::Result<_>>()?)
+                let mut ids: Vec<Ids> = Vec::with_capacity(whole.len());
+                for state in &whole {
+                    let read = match component.records.get(state) {
+                        Some(&place) => self.integers(place)?,
+                        None => Vec::new(),
+                    };
+                    let above = ids.last().filter(|above| ***above == *read).cloned();
+                    ids.push(above.unwrap_or_else(|| read.into()));
+                }
+                Some(ids)
             }
         };
-        let twice = |ids: &Vec<i64>| ids.len() - ids.iter().collect::<HashSet<_>>().len();
-        let twice = ids.iter().flatten().map(twice).max().unwrap_or(0);
+        let twice = |ids: &Ids| ids.len() - ids.iter().collect::<HashSet<_>>().len();
+        let mut above: Option<&Ids> = None;
+        let mut changed = ids.iter().flatten().filter(|&ids| {
+            let same = above.replace(ids).is_some_and(|above| Arc::ptr_eq(above, ids));
+            !same
+        });
+        let twice = changed.by_ref().map(twice).max().unwrap_or(0);
         if twice > 0 {
             let message = format!(
                 "{}: {twice} ids are there twice in one state; the last value of each is returned",
@@ -335,15 +363,13 @@ impl<'a> Reader<'a> {
 
     /// The ids in force when each state was written, if they changed; sections whose rows
     /// are told by more than an id are not asked.
-    fn ids_by_order(
-        &self,
-        section: &Section,
-        whole: &[usize],
-    ) -> io::Result<Option<Vec<Vec<i64>>>> {
+    fn ids_by_order(&self, section: &Section, whole: &[usize]) -> io::Result<Option<Vec<Ids>>> {
         let places: Vec<Place> =
             section.lists.iter().filter(|(name, _)| *name == "ids").map(|(_, p)| *p).collect();
-        let lists: Vec<Vec<i64>> =
-            places.iter().map(|&place| self.integers(place)).collect::<io::Result<_>>()?;
+        let lists: Vec<Ids> = places
+            .iter()
+            .map(|&place| self.integers(place).map(Ids::from))
+            .collect::<io::Result<_>>()?;
         let more = section.lists.iter().any(|(name, _)| *name != "ids");
         if more || lists.windows(2).all(|w| w[0] == w[1]) {
             return Ok(None);
@@ -426,14 +452,15 @@ impl<'a> Reader<'a> {
             if let Some(points) = points {
                 let mut all: Vec<EntityId> = Vec::new();
                 let mut known = HashSet::new();
-                for id in ids.iter().flatten().filter(|&&id| known.insert(id)) {
+                let each = ids.iter().flat_map(|ids| ids.iter());
+                for id in each.filter(|&&id| known.insert(id)) {
                     all.push(EntityId::new(*id));
                 }
-                return Ok(Some((Owners::OfState(all), points)));
+                return Ok(Some((Owners::OfState(all.into()), points)));
             }
         }
         if let Some(ids) = metadata.entities(&component.name, width) {
-            return Ok(Some((Owners::Fixed(ids), 1)));
+            return Ok(Some((Owners::Fixed(ids.into()), 1)));
         }
         if width == 1 {
             return Ok(Some((Owners::Global, 1)));
@@ -482,10 +509,12 @@ impl<'a> Reader<'a> {
         states: &States,
     ) -> io::Result<(Vec<History>, Problems)> {
         let mut problems = Problems::default();
+        let rows = rows_of_one(owners.entities());
         let kept: Vec<(usize, Option<EntityId>)> = match owners {
             Owners::Global => vec![(0, None)],
             _ => {
                 let all = owners.entities().iter().enumerate();
+                let all = all.filter(|(k, _)| rows.get(*k).is_none_or(|&row| row <= MAX_ROWS));
                 let audit = self.selection.audit;
                 all.filter(|(_, id)| audit || self.selection.wants(**id))
                     .filter(|(_, id)| !is_lost(section, id.id))
@@ -511,7 +540,7 @@ impl<'a> Reader<'a> {
         let (mut bytes, mut row) = (Vec::new(), Vec::new());
         // Where each entity's value is, while the states' ids stay the same.
         let mut pick = Pick::new(kept.iter().map(|&(k, _)| Some(k)).collect());
-        let mut current: Option<&Vec<i64>> = None;
+        let mut current: Option<&Ids> = None;
         for (k, state) in states.whole.iter().enumerate() {
             let width = match owners {
                 Owners::Global => 1,
@@ -570,7 +599,6 @@ impl<'a> Reader<'a> {
             );
             problems.add(ProblemCode::NotFinite, None, None, message);
         }
-        let rows = rows_of_one(owners.entities());
         let history = |((k, entity), values): ((usize, Option<EntityId>), Vec<f64>)| History {
             entity,
             component: rows.get(k).map_or_else(|| name.clone(), |&row| row_name(name, row)),
@@ -612,6 +640,45 @@ impl Owners {
             Self::Global => &[],
             Self::Fixed(ids) | Self::OfState(ids) => ids,
         }
+    }
+
+    /// The same with a list that other components have as well.
+    fn sharing(self, list: &EntityList) -> Self {
+        match self {
+            Self::Global => self,
+            Self::Fixed(_) => Self::Fixed(list.entities.clone()),
+            Self::OfState(_) => Self::OfState(list.entities.clone()),
+        }
+    }
+}
+
+/// Entities that one component or several have values of.
+struct EntityList {
+    entities: Arc<[EntityId]>,
+    /// Rows of the entity that has most, as far as they are read.
+    most_rows: usize,
+}
+
+impl EntityList {
+    /// Says which entities are there more often than they can be.
+    fn new(section: &Section, owners: &Owners, problems: &mut Problems) -> Self {
+        let entities: Arc<[EntityId]> = owners.entities().into();
+        let rows = rows_of_one(&entities);
+        let rows = || rows.iter().zip(&*entities).filter(|(_, id)| !is_lost(section, id.id));
+        let most_rows = rows().map(|(&row, _)| row).max().unwrap_or(1);
+        let limit = if HAVE_ONE_ROW.contains(&&*section.name) { 1 } else { MAX_ROWS };
+        if most_rows > limit {
+            let again = rows().filter(|(row, _)| **row == limit + 1).count();
+            let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
+            let message = format!(
+                "{}: {again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
+                section.name,
+                first.unwrap_or_default(),
+                if limit == 1 { "once".to_string() } else { format!("{limit} times") },
+            );
+            problems.add(ProblemCode::RepeatedLabel, None, None, message);
+        }
+        Self { entities, most_rows: most_rows.min(MAX_ROWS) }
     }
 }
 

@@ -140,7 +140,8 @@ pub struct ImpactSpeed {
 /// `*INCLUDE_PATH`. Includes end 16 deep and at the 1000th.
 ///
 /// # Errors
-/// Only those of reading `source`. Anything else is in [`Deck::problems`]; the place of a
+/// Only those of reading `source`, and where the deck with its includes has more than 4 GB.
+/// Anything else is in [`Deck::problems`]; the place of a
 /// problem in an included file is in that file, which its message names.
 pub fn read(
     source: &mut dyn BufRead,

@@ -1,6 +1,8 @@
 //! Reads a deck card by card.
 
-use std::io::{self, BufRead};
+use std::cell::Cell;
+use std::io::{self, BufRead, Read};
+use std::rc::Rc;
 
 use super::super::line::{Line, Lines, shown};
 use super::card::{Card, Field, text};
@@ -14,6 +16,9 @@ use crate::solver::problem::{Place, Problem, ProblemCode, Problems};
 
 /// Bytes of damaged text shown in a message.
 const MAX_SHOWN: usize = 80;
+/// Bytes read of a deck and its includes, each as often as it is included; real ones have a
+/// tenth of it.
+const MAX_BYTES: u64 = 4_000_000_000;
 /// Entries kept of each list.
 pub(super) const MAX_ENTRIES: usize = 100_000;
 
@@ -21,6 +26,7 @@ pub(super) type Open<'a> = dyn FnMut(&str) -> Option<Box<dyn BufRead>> + 'a;
 
 pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<Deck> {
     let mut reader = Reader {
+        left: Rc::new(Cell::new(MAX_BYTES)),
         deck: Deck::default(),
         problems: Problems::default(),
         parameters: Parameters::default(),
@@ -49,6 +55,8 @@ pub(super) struct Block {
 }
 
 pub(super) struct Reader<'a, 'o> {
+    /// Bytes that may still be read.
+    left: Rc<Cell<u64>>,
     pub deck: Deck,
     pub problems: Problems,
     pub parameters: Parameters,
@@ -64,6 +72,40 @@ pub(super) struct Reader<'a, 'o> {
     pub full: Vec<&'static str>,
 }
 
+/// A file of the deck, read as long as the whole deck keeps within its bound.
+struct Bounded<'a> {
+    source: &'a mut dyn BufRead,
+    left: Rc<Cell<u64>>,
+}
+
+impl Read for Bounded<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let there = self.fill_buf()?;
+        let count = there.len().min(out.len());
+        out[..count].copy_from_slice(&there[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl BufRead for Bounded<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.left.get() == 0 {
+            let message = format!(
+                "a deck is read up to {} GB with its includes; it has more",
+                MAX_BYTES / 1_000_000_000
+            );
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, message));
+        }
+        self.source.fill_buf()
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.left.set(self.left.get().saturating_sub(count as u64));
+        self.source.consume(count);
+    }
+}
+
 /// A field without a number, which a problem says.
 pub(super) struct Missing;
 
@@ -73,7 +115,7 @@ impl Reader<'_, '_> {
         source: &mut dyn BufRead,
         mut deck_format: Format,
     ) -> io::Result<()> {
-        let mut lines = Lines::new(source);
+        let mut lines = Lines::new(Bounded { source, left: self.left.clone() });
         let mut block: Option<Block> = None;
         while let Some(line) = lines.next_line()? {
             match line.text.first() {
@@ -294,13 +336,8 @@ impl Reader<'_, '_> {
 
 fn left_out(what: &'static str) -> Problem {
     let limit = if what.starts_with("include") { MAX_INCLUDES } else { MAX_ENTRIES };
-    Problem {
-        code: ProblemCode::UnreadRows,
-        line: None,
-        byte: None,
-        columns: None,
-        message: format!("{what} beyond the first {limit} are left out"),
-    }
+    let message = format!("{what} beyond the first {limit} are left out");
+    Problem::new(ProblemCode::UnreadRows, message)
 }
 
 /// Without ids the solver counts. How it counts through a mixture of kinds is not

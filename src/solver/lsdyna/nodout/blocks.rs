@@ -8,6 +8,7 @@ use super::Nodout;
 use super::stride::{Stride, Wanted};
 use crate::history::EntityId;
 use crate::solver::lsdyna::ascii::Frame;
+use crate::solver::problem;
 use crate::solver::source::{Source, Window};
 use crate::solver::states::TableId;
 use crate::solver::{Selection, SolverFile};
@@ -79,6 +80,7 @@ impl Blocks {
         let (Some(times), true) = (times, ends_there && rising && file.problems.is_empty()) else {
             return Ok(None);
         };
+        file.problems = problem::of_time(&times);
         file.time = times.into();
         file.histories.clear();
         let mut columns: Vec<(usize, Column)> = Vec::new();

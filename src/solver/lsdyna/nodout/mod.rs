@@ -101,17 +101,21 @@ impl Body for Nodout {
         } else if let Some(block) = self.block {
             row(block, line, states);
         } else {
-            // Outside a block, the state above is over; without a state line the rows
-            // below cannot be placed.
-            if !self.continue_announced(states) {
-                states.begin(None, line.into());
-            }
+            self.unfinished(line, states);
             let found = shown(line.columns(1, 60));
             states.damage(
                 line,
                 None,
                 format!("expected a state line, found \"{}\"", found.trim_end()),
             );
+        }
+    }
+
+    fn unfinished(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+        // Outside a block, the state above is over; without a state line the rows below
+        // cannot be placed.
+        if self.block.is_none() && !self.continue_announced(states) {
+            states.begin(None, line.into());
         }
     }
 
