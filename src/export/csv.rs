@@ -1,12 +1,11 @@
 //! Curve as CSV: `d_m,force_N[,lo,hi]` under `#` header lines, written and read.
 
 use std::fmt::Write;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, Options, headline, nine_digits};
+use super::{ExportError, MAX_CURVE_BYTES, Options, headline, nine_digits};
 use crate::curve::{Envelope, EnvelopeError};
+use crate::file;
 use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
 use crate::unit::{FORCE, LENGTH};
@@ -75,12 +74,12 @@ pub enum CsvError {
 pub fn read(path: &Path) -> Result<Envelope, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
-    let mut file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(io)?;
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .delimiter(separator(file.fill_buf().map_err(io)?))
-        .from_reader(file);
+        .delimiter(separator(&bytes))
+        .from_reader(&*bytes);
     let header = reader.headers().map_err(malformed)?.clone();
     let line = header.position().map_or(1, csv::Position::line);
     let unit = |field: usize, prefixes: &[&str], of: &crate::unit::Dimension, wanted, example| {
