@@ -84,7 +84,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             write_whole(path, &crumple::database::histories_to_hdf5(&file)?)?;
         }
         _ if manners.json => {}
-        _ => output::print(|out| write_csv(out, &file))?,
+        _ => output::print_data(|out| write_csv(out, &file))?,
     }
     if manners.json {
         output::print_json(&document(args, &file))?;

@@ -102,7 +102,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             }
             Err(error) if args.files.len() == 1 => return Err(error.into()),
             Err(error) => {
-                eprintln!("error: {error}");
+                output::say(&format!("error: {error}"));
                 outcome = Outcome::Partly;
             }
         }

@@ -23,6 +23,8 @@ mod validate;
 use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use crumple::file::is_same;
@@ -135,12 +137,24 @@ impl Manners {
     /// A warning on standard error.
     pub fn warn(self, text: &str) {
         if !self.quiet {
-            eprintln!("warning: {text}");
+            output::say(&format!("warning: {text}"));
         }
     }
 }
 
+/// Lets a write beyond the limit on the size of files (`ulimit -f`) fail, with a message that
+/// names the file, where the signal's default would end the process without one.
+#[cfg(unix)]
+fn survive_file_size_limit() {
+    // Without the handler the process ends, and the old file is there all the same.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+}
+
+#[cfg(not(unix))]
+fn survive_file_size_limit() {}
+
 pub fn main() -> ExitCode {
+    survive_file_size_limit();
     let cli = Cli::parse();
     let manners = cli.manners;
     let result = match cli.command {
@@ -166,7 +180,7 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
         Err(Failure::Usage(message)) => {
-            eprintln!("error: {message}");
+            output::say(&format!("error: {message}"));
             USAGE
         }
         Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
@@ -180,12 +194,12 @@ pub fn main() -> ExitCode {
 /// The error, then its causes; causes that the message already contains are left out.
 fn print_chain(error: &dyn Error) {
     let mut shown = error.to_string();
-    eprintln!("error: {shown}");
+    output::say(&format!("error: {shown}"));
     let mut source = error.source();
     while let Some(cause) = source {
         let text = cause.to_string();
         if !shown.contains(&text) {
-            eprintln!("  because: {text}");
+            output::say(&format!("  because: {text}"));
         }
         shown = text;
         source = cause.source();
