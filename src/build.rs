@@ -22,6 +22,31 @@ pub enum BuildError {
     NoRun { path: PathBuf, reasons: String },
 }
 
+/// Why a run could not be used, and what is wrong with its files, which may be the cause.
+#[derive(Debug, thiserror::Error)]
+#[error("{reason}{}", listed(.problems))]
+pub struct RunFailure {
+    #[source]
+    pub reason: RunError,
+    /// As `crumple inspect` finds them.
+    pub problems: Vec<String>,
+}
+
+/// Problems that a message repeats.
+const LISTED: usize = 3;
+
+fn listed(problems: &[String]) -> String {
+    if problems.is_empty() {
+        return String::new();
+    }
+    let shown = problems.iter().take(LISTED).cloned().collect::<Vec<_>>().join("; ");
+    let more = match problems.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!("; and {more} more, which crumple inspect lists"),
+    };
+    format!(" (damage in the run's files: {shown}{more})")
+}
+
 /// How one run ended.
 #[derive(Debug)]
 pub enum RunOutcome {
@@ -30,7 +55,7 @@ pub enum RunOutcome {
     /// Unchanged since it was built.
     Kept,
     /// Not usable, with the reason; an earlier build of it stays in the database.
-    Failed { reason: RunError, earlier_kept: bool },
+    Failed { reason: RunFailure, earlier_kept: bool },
 }
 
 /// What a build did.
@@ -64,7 +89,7 @@ pub fn build(
         true => Database::read(path)?,
         false => Database::default(),
     };
-    let results: Vec<(String, Result<Option<Case>, RunError>)> = study
+    let results: Vec<(String, Result<Option<Case>, RunFailure>)> = study
         .runs()
         .par_iter()
         .map(|entry| {
@@ -111,12 +136,19 @@ fn case(
     study: &Study,
     entry: &study::RunEntry,
     database: &Database,
-) -> Result<Option<Case>, RunError> {
-    let located = study.locate(entry)?;
+) -> Result<Option<Case>, RunFailure> {
+    let located =
+        study.locate(entry).map_err(|reason| RunFailure { reason, problems: Vec::new() })?;
     let name = entry.case_name();
     let kept = database
         .cases(study.group())
         .iter()
-        .any(|c| c.name == name && c.fingerprint == located.fingerprint);
-    if kept { Ok(None) } else { located.extract().map(Some) }
+        .any(|c| c.name == name && c.fingerprint == located.fingerprint)
+        // A case that somebody has changed since is made anew.
+        && !database.is_altered(study.group(), &name);
+    if kept {
+        return Ok(None);
+    }
+    let failure = |reason| RunFailure { reason, problems: located.problems() };
+    located.extract().map(Some).map_err(failure)
 }

@@ -1,19 +1,162 @@
-//! Writing files so that a reader sees the old content or the new, never half of it.
+//! Files: read only where they are files, and up to a bound; written so that a reader sees the
+//! old content or the new, never half of it.
 
 use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+/// What can be read at a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    File,
+    /// A named pipe or the output of another program: it can be read once and has no size.
+    Pipe,
+}
+
+/// What stands at `path`. It is not opened: opening a pipe waits for its writer.
+///
+/// # Errors
+/// Those of the operating system; for a folder, a device or a socket what it is.
+pub fn kind(path: &Path) -> io::Result<Kind> {
+    let kind = fs::metadata(path)?.file_type();
+    let refused = |what: &str| {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("this is {what}: give a file")))
+    };
+    match kind {
+        kind if kind.is_file() => Ok(Kind::File),
+        kind if kind.is_dir() => refused("a folder"),
+        kind if is_pipe(kind) => Ok(Kind::Pipe),
+        // A device may have no end.
+        _ => refused("a device or a socket"),
+    }
+}
+
+#[cfg(unix)]
+fn is_pipe(kind: fs::FileType) -> bool {
+    std::os::unix::fs::FileTypeExt::is_fifo(&kind)
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: fs::FileType) -> bool {
+    false
+}
+
+/// Opens a file for reading; all else is refused before it is opened.
+///
+/// # Errors
+/// As of [`kind`], and for a pipe.
+pub fn open(path: &Path) -> io::Result<File> {
+    match kind(path)? {
+        Kind::File => File::open(path),
+        Kind::Pipe => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "this is a pipe: write its content to a file and give that",
+        )),
+    }
+}
+
+/// Reads a file of `most` bytes at most.
+///
+/// # Errors
+/// As of [`open`]; for a longer file its size and the bound.
+pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let size = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    if size <= most {
+        bytes.try_reserve_exact(size as usize).map_err(|_| out_of_memory(size))?;
+        file.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    let size = size.max(bytes.len() as u64);
+    match size <= most {
+        true => Ok(bytes),
+        false => Err(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!(
+                "the file has {size} bytes, expected at most {most} ({} MiB): is this another kind of file?",
+                most >> 20
+            ),
+        )),
+    }
+}
+
+/// Reads a text file of `most` bytes at most.
+///
+/// # Errors
+/// As of [`read`], and for bytes that are not UTF-8.
+pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
+    String::from_utf8(read(path, most)?).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        let message = format!("byte {at} is not UTF-8: save the file as UTF-8 text");
+        io::Error::new(io::ErrorKind::InvalidData, message)
+    })
+}
+
+/// That so many bytes are not to be had.
+pub fn out_of_memory(bytes: u64) -> io::Error {
+    let message = format!("there is no memory for its {bytes} bytes");
+    io::Error::new(io::ErrorKind::OutOfMemory, message)
+}
 
 /// A file could not be written; whatever stood there before still does.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}; what was there before is unchanged")]
+#[error("cannot write {path}: {source}{}", if *.is_old_kept { "; what was there before is unchanged" } else { "" })]
 pub struct WriteError {
     pub path: PathBuf,
+    /// Whether there was anything before.
+    is_old_kept: bool,
     #[source]
     pub source: io::Error,
+}
+
+impl WriteError {
+    /// Says of some causes what to do.
+    pub fn new(path: &Path, source: io::Error) -> Self {
+        Self { path: path.into(), is_old_kept: path.is_file(), source: explained(path, source) }
+    }
+}
+
+/// Why nothing can be made at `path`, where the operating system says too little.
+pub fn explained(path: &Path, source: io::Error) -> io::Error {
+    let folder = folder_of(path);
+    let message = match (source.kind(), fs::metadata(folder)) {
+        (io::ErrorKind::FileTooLarge, _) if source.raw_os_error().is_some() => {
+            "the file would be larger than the limit of this session (ulimit -f) or of the disk"
+                .into()
+        }
+        (io::ErrorKind::NotFound | io::ErrorKind::NotADirectory, Err(_)) => {
+            match folder.ancestors().find(|part| part.exists()) {
+                Some(part) if !part.is_dir() => {
+                    format!("{} is a file and no folder: name another", part.display())
+                }
+                _ => format!(
+                    "the folder {} does not exist: make it, or name another",
+                    folder.display()
+                ),
+            }
+        }
+        (io::ErrorKind::NotADirectory, Ok(meta)) if !meta.is_dir() => {
+            format!("{} is a file and no folder: name another", folder.display())
+        }
+        (io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem, Ok(meta))
+            if meta.is_dir() && source.raw_os_error().is_some() =>
+        {
+            format!(
+                "nothing can be written in the folder {} ({source}): name another",
+                folder.display()
+            )
+        }
+        _ => return source,
+    };
+    io::Error::new(source.kind(), message)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
 }
 
 /// Writes `bytes` to `path` as a whole: to a temporary file beside it, then by renaming.
@@ -32,18 +175,22 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 /// # Errors
 /// [`WriteError`] names the first path that cannot be written.
 pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
-    let named = |path: &Path| {
-        let path = path.to_path_buf();
-        move |source| WriteError { path, source }
-    };
-    let mut prepared = Vec::new();
+    let mut prepared: Vec<(&Path, Draft)> = Vec::new();
     for (path, bytes) in files {
-        prepared.push((path, prepare(path, bytes).map_err(named(path))?));
-    }
-    for (path, file) in prepared {
-        if let Some((temporary, target)) = file {
-            temporary.persist(target).map_err(|e| e.error).map_err(named(path))?;
+        let failed = |source| WriteError::new(path, source);
+        let target = target_of(path);
+        if prepared.iter().any(|(_, draft)| draft.target == target) {
+            return Err(failed(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "it is named twice: name each file once",
+            )));
         }
+        if let Some(draft) = prepare(path, bytes).map_err(failed)? {
+            prepared.push((path, draft));
+        }
+    }
+    for (path, draft) in prepared {
+        draft.place().map_err(|source| WriteError::new(path, source))?;
     }
     Ok(())
 }
@@ -52,8 +199,6 @@ pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
 /// Gives back what the function gives; nothing is replaced if that is `None`.
 ///
 /// The content is not forced to the disk: it is derived from a file that is still there.
-/// What a killed process left half-written is removed by the next that writes to `path`, for
-/// which the temporary file has one name: the caller keeps other writers of `path` away.
 ///
 /// # Errors
 /// [`WriteError`] names the path; nothing half-written stays behind.
@@ -62,14 +207,30 @@ pub fn write_at<T>(
     fill: impl FnOnce(&File) -> io::Result<Option<T>>,
 ) -> Result<Option<T>, WriteError> {
     let write = || -> io::Result<Option<T>> {
-        let (temporary, target) = temporary(path, Naming::ByTarget)?;
-        let done = fill(temporary.as_file())?;
+        let draft = Draft::beside(path)?;
+        let done = fill(&draft.file)?;
         if done.is_some() {
-            temporary.persist(target).map_err(|e| e.error)?;
+            draft.place()?;
         }
         Ok(done)
     };
-    write().map_err(|source| WriteError { path: path.into(), source })
+    write().map_err(|source| WriteError::new(path, source))
+}
+
+/// Writes a file as [`write_whole`] does, by a function that is given the path of the temporary
+/// file and may do with it what it likes but remove it.
+///
+/// # Errors
+/// [`WriteError`] names the path, or of `fill`; nothing is replaced then.
+pub fn write_by_path<E: From<WriteError>>(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let failed = |source| WriteError::new(path, source);
+    let draft = Draft::beside(path).map_err(failed)?;
+    fill(&draft.path)?;
+    draft.file.sync_all().and_then(|()| draft.place()).map_err(failed)?;
+    Ok(())
 }
 
 /// Whether two paths name the same existing file.
@@ -77,65 +238,126 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Writes the bytes to a temporary file beside their target; to a device at once.
-fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<(NamedTempFile, PathBuf)>> {
+/// Opens the file at `path`, which is made if need be, and locks it; `None` if another process
+/// holds it. The kernel frees the lock with the file, however the process ends.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn lock(path: &Path) -> io::Result<Option<File>> {
+    loop {
+        // Only a file: opening a pipe would wait, and a link leads elsewhere.
+        if fs::symlink_metadata(path).is_ok_and(|meta| !meta.is_file()) {
+            fs::remove_file(path)?;
+        }
+        let file =
+            OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(error)) => return Err(error),
+        }
+        // The last holder removes the file or renames it; a lock on that protects nothing.
+        if is_at(&file, path) {
+            return Ok(Some(file));
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |m: fs::Metadata| (m.dev(), m.ino());
+    file.metadata().map(identity).ok() == fs::symlink_metadata(path).map(identity).ok()
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Writes the bytes to a draft beside their target; to a device at once.
+fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
     if fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let mut device = OpenOptions::new().write(true).open(path)?;
         device.write_all(bytes)?;
         device.flush()?;
         return Ok(None);
     }
-    let (mut temporary, target) = temporary(path, Naming::Random)?;
-    temporary.write_all(bytes)?;
-    temporary.as_file().sync_all()?;
-    Ok(Some((temporary, target)))
+    let mut draft = Draft::beside(path)?;
+    draft.file.write_all(bytes)?;
+    draft.file.sync_all()?;
+    Ok(Some(draft))
 }
 
-/// How a temporary file is named.
-#[derive(Clone, Copy)]
-enum Naming {
-    Random,
-    /// What has that name already was left by a process that was killed.
-    ByTarget,
+/// The file that is replaced: a link is followed, so that its target is and not the link.
+fn target_of(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// An empty temporary file beside the target of `path`, and that target.
-fn temporary(path: &Path, naming: Naming) -> io::Result<(NamedTempFile, PathBuf)> {
-    let existing = match fs::metadata(path) {
-        Ok(meta) if meta.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-        Ok(meta) if !meta.is_file() => return Err(io::ErrorKind::Unsupported.into()),
-        Ok(meta) => Some(meta.permissions()),
-        Err(_) => None,
-    };
-    if existing.as_ref().is_some_and(fs::Permissions::readonly) {
-        return Err(io::ErrorKind::PermissionDenied.into());
-    }
-    // A link is followed, so that its target is replaced and not the link.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let folder = match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut name = OsString::from(".crumple-");
-    let mut builder = tempfile::Builder::new();
-    match naming {
-        Naming::Random => builder.prefix(&name).suffix(".part"),
-        Naming::ByTarget => {
-            name.push(target.file_name().unwrap_or_default());
-            name.push(".part");
-            match fs::remove_file(folder.join(&name)) {
-                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-                _ => builder.prefix(&name).rand_bytes(0),
+/// Longer names of targets are shortened to their hash: names of files have up to 255 bytes.
+const MAX_NAME_BYTES: usize = 200;
+
+/// A file under work beside its target. Its name is made of the target's, so that what a killed
+/// process left is taken up and emptied by the next; it is locked, so that of two processes that
+/// write one target the second is told.
+struct Draft {
+    file: File,
+    path: PathBuf,
+    target: PathBuf,
+}
+
+impl Draft {
+    fn beside(path: &Path) -> io::Result<Self> {
+        let existing = match fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => {
+                let message = "this is a folder: name a file in it";
+                return Err(io::Error::new(io::ErrorKind::IsADirectory, message));
             }
+            Ok(meta) if !meta.is_file() => {
+                let message = "this is a device or a pipe, which takes no file of this kind";
+                return Err(io::Error::new(io::ErrorKind::Unsupported, message));
+            }
+            Ok(meta) => Some(meta.permissions()),
+            Err(_) => None,
+        };
+        if existing.as_ref().is_some_and(fs::Permissions::readonly) {
+            let message = "the file is read-only: name another, or allow writing it";
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
         }
-    };
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(existing.unwrap_or_else(|| fs::Permissions::from_mode(0o666)));
+        let target = target_of(path);
+        let name = target.file_name().unwrap_or_default();
+        let mut own = OsString::from(".crumple-");
+        match name.len() <= MAX_NAME_BYTES {
+            true => own.push(name),
+            false => own.push(&*blake3::hash(name.as_encoded_bytes()).to_hex()),
+        }
+        own.push(".part");
+        let path = folder_of(&target).join(own);
+        let file = lock(&path)?.ok_or_else(|| {
+            let message = "another process is writing it: try again when it has finished";
+            io::Error::new(io::ErrorKind::ResourceBusy, message)
+        })?;
+        let draft = Self { file, path, target };
+        draft.file.set_len(0)?;
+        if let Some(permissions) = existing {
+            draft.file.set_permissions(permissions)?;
+        }
+        Ok(draft)
     }
-    let temporary = builder.tempfile_in(folder)?;
-    Ok((temporary, target))
+
+    /// Renames it over its target.
+    fn place(self) -> io::Result<()> {
+        fs::rename(&self.path, &self.target)
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        // Gone if it was placed, and then the name may be another process's.
+        if is_at(&self.file, &self.path) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -155,6 +377,77 @@ mod tests {
     #[test]
     fn names_the_path_it_cannot_write() {
         let error = write_whole(Path::new("/no/such/folder/a.txt"), b"x").unwrap_err();
-        assert!(error.to_string().starts_with("cannot write /no/such/folder/a.txt: "));
+        assert_eq!(
+            error.to_string(),
+            "cannot write /no/such/folder/a.txt: the folder /no/such/folder does not exist: make it, or name another"
+        );
+    }
+
+    #[test]
+    fn what_a_killed_writer_left_is_cleared_by_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.csv".to_string(), "long".repeat(60)] {
+            let path = folder.path().join(name);
+            // As a killed process does: the draft stays, its lock is freed.
+            let draft = Draft::beside(&path).unwrap();
+            (&draft.file).write_all(b"half of a longer content").unwrap();
+            let left = draft.path.clone();
+            fs::hard_link(&left, folder.path().join("kept")).unwrap();
+            drop(draft);
+            fs::rename(folder.path().join("kept"), &left).unwrap();
+            write_whole(&path, b"new").unwrap();
+            assert_eq!(fs::read(&path).unwrap(), b"new");
+            assert!(!left.exists());
+        }
+    }
+
+    #[test]
+    fn a_second_writer_of_a_file_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        write_whole(&path, b"old").unwrap();
+        write_at(&path, |file| {
+            let mut file = file;
+            file.write_all(b"first")?;
+            let error = write_whole(&path, b"second").unwrap_err().to_string();
+            assert!(error.contains("a.csv: another process is writing it: try again"), "{error}");
+            assert!(error.ends_with("what was there before is unchanged"), "{error}");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+            Ok(Some(()))
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        let twice = write_all_whole(&[(&path, b"1"), (&folder.path().join("./a.csv"), b"2")]);
+        assert!(twice.unwrap_err().to_string().contains("it is named twice"));
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_the_drafts_place_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let victim = folder.path().join("victim");
+        fs::write(&victim, "mine").unwrap();
+        std::os::unix::fs::symlink(&victim, folder.path().join(".crumple-a.csv.part")).unwrap();
+        write_whole(&folder.path().join("a.csv"), b"new").unwrap();
+        assert_eq!(fs::read(&victim).unwrap(), b"mine");
+        assert_eq!(fs::read(folder.path().join("a.csv")).unwrap(), b"new");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_files_are_read_and_up_to_a_bound() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "12345").unwrap();
+        assert_eq!(read(&folder.path().join("a"), 5).unwrap(), b"12345");
+        let refused = |path: &Path, expected: &str| {
+            let error = read(path, 4).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        };
+        refused(&folder.path().join("a"), "the file has 5 bytes, expected at most 4");
+        refused(folder.path(), "this is a folder: give a file");
+        refused(Path::new("/dev/zero"), "this is a device or a socket: give a file");
+        // Files of the system have no size.
+        refused(Path::new("/proc/self/status"), "expected at most 4");
     }
 }

@@ -1,10 +1,11 @@
 //! TOML files written by users: parsing, with errors that name file, line and columns.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
+
+use crate::file;
 
 /// Manifests have a few kilobytes; anything beyond this is another kind of file.
 const MAX_BYTES: u64 = 16 << 20;
@@ -14,8 +15,6 @@ const MAX_BYTES: u64 = 16 << 20;
 pub enum ManifestError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: io::Error },
-    #[error("{path}: {bytes} bytes are too many for a TOML file: is this another kind of file?")]
-    TooLarge { path: PathBuf, bytes: u64 },
     #[error("{path}: line {line}, columns {from}-{to}: {message}")]
     Toml { path: PathBuf, line: usize, from: usize, to: usize, message: String },
     #[error("{path}: {message}")]
@@ -27,12 +26,16 @@ pub enum ManifestError {
 /// # Errors
 /// [`ManifestError`] with the place of an unknown key, a missing key or a bad value.
 pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
-    let io = |source| ManifestError::Io { path: path.into(), source };
-    let bytes = fs::metadata(path).map_err(io)?.len();
-    if bytes > MAX_BYTES {
-        return Err(ManifestError::TooLarge { path: path.into(), bytes });
-    }
-    parse(path, &fs::read_to_string(path).map_err(io)?)
+    parse(path, &read_text(path)?)
+}
+
+/// Reads the text of the TOML file at `path`.
+///
+/// # Errors
+/// [`ManifestError::Io`] for what is no file, not UTF-8 or too large.
+pub fn read_text(path: &Path) -> Result<String, ManifestError> {
+    file::read_text(path, MAX_BYTES)
+        .map_err(|source| ManifestError::Io { path: path.into(), source })
 }
 
 /// Parses TOML text; `path` is for messages.

@@ -166,6 +166,34 @@ fn near_ids_come_first() {
     );
 }
 
+/// What inspect finds in a file that cannot be used stands in build's message.
+#[test]
+fn a_run_that_fails_says_what_is_wrong_with_its_files() {
+    let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");
+    let path = study.folder.path().join("25kmh/rwforc");
+    let text = fs::read_to_string(&path).unwrap();
+    // Every row but one is overwritten.
+    let mut rows = 0;
+    let lines: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let is_row = line.split_whitespace().count() == 6
+                && line.split_whitespace().all(|word| word.parse::<f64>().is_ok());
+            rows += usize::from(is_row);
+            if is_row && rows > 1 { line.replace('.', "?") } else { line.to_string() }
+        })
+        .collect();
+    assert!(rows > 100);
+    fs::write(&path, lines.join("\n") + "\n").unwrap();
+    let error = study.fails();
+    let inspected = crumple_ok(study.folder.path(), &["inspect", "25kmh/rwforc", "--json"]);
+    let inspected: serde_json::Value = serde_json::from_str(&inspected).unwrap();
+    let first = inspected["files"][0]["problems"][0]["message"].as_str().unwrap();
+    assert!(error.contains("(damage in the run's files: rwforc: line "), "{error}");
+    assert!(error.contains(first), "{error}");
+    assert!(error.contains(" more, which crumple inspect lists)"), "{error}");
+}
+
 /// One bad run among good ones is reported; the others are built.
 #[test]
 fn the_other_runs_go_on() {

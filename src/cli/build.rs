@@ -1,6 +1,7 @@
 //! `crumple build`: from a study manifest to a curve database.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crumple::build::{self, BuildReport, RunOutcome};
 use serde::Serialize;
@@ -44,7 +45,11 @@ struct RunReport {
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let bar = progress::Bar::new(manners, "reading runs");
-    let report = build::build(&args.study, &args.output, |name| bar.step(name));
+    let done = AtomicUsize::new(0);
+    let report = build::build(&args.study, &args.output, |name| {
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        bar.step(&format!("{done} runs read, last {name}"));
+    });
     bar.end();
     let report = report?;
     let runs: Vec<RunReport> = report.runs.iter().map(|r| run_report(&report, r)).collect();

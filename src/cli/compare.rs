@@ -35,8 +35,8 @@ pub struct Args {
     /// Curve database
     #[arg(required_unless_present = "train", conflicts_with = "train")]
     database: Option<PathBuf>,
-    /// Group to compare in
-    #[arg(long, required_unless_present = "train", conflicts_with = "train")]
+    /// Group to compare in (default: the only one)
+    #[arg(long, conflicts_with = "train")]
     group: Option<String>,
     /// Speed to leave out, with its unit; every inner speed in turn if absent
     #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, conflicts_with = "train")]
@@ -96,11 +96,11 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     if let Some(path) = &args.train {
         return train(path, &settings, manners);
     }
-    let (Some(path), Some(group)) = (&args.database, &args.group) else {
-        return Err(Failure::Usage("name a database and --group, or --train".into()));
+    let Some(path) = &args.database else {
+        return Err(Failure::Usage("name a database, or --train".into()));
     };
     let database = Database::read(path)?;
-    let cases = database.group(path, group)?;
+    let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
     let speeds = match args.speed {
         Some(speed) => vec![speed],
         None => compare::inner_speeds(group, cases)?,

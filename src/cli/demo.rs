@@ -8,7 +8,7 @@ use crumple::build::{self, RunOutcome};
 use crumple::curve::{Case, ForceKind};
 use crumple::database::Database;
 use crumple::export;
-use crumple::file::write_whole;
+use crumple::file::{WriteError, write_at, write_whole};
 use crumple::multibody::{Run, simulate};
 use crumple::scenario;
 use crumple::surrogate::leave_one_out::Validation;
@@ -141,11 +141,8 @@ impl Flow<'_> {
 
     fn unpack(&mut self) -> Result<(), Failure> {
         let target = self.folder.join("fe");
-        std::fs::create_dir_all(&target)?;
-        FE_RUNS.extract(&target)?;
-        std::fs::create_dir_all(target.join("train-set"))?;
-        TRAIN_SET.extract(target.join("train-set"))?;
-        Ok(())
+        extract(&FE_RUNS, &target)?;
+        Ok(extract(&TRAIN_SET, &target.join("train-set"))?)
     }
 
     fn build(&mut self) -> Result<Database, Failure> {
@@ -214,6 +211,16 @@ impl Flow<'_> {
         let prepared = scenario::load(&path)?;
         Ok(simulate(&prepared.chain, &prepared.settings)?)
     }
+}
+
+/// Writes the bundled files of a folder and all below it.
+fn extract(bundled: &Dir, target: &Path) -> Result<(), WriteError> {
+    let folder = target.join(bundled.path());
+    std::fs::create_dir_all(&folder).map_err(|e| WriteError::new(&folder, e))?;
+    for file in bundled.files() {
+        write_at(&target.join(file.path()), |mut out| out.write_all(file.contents()).map(Some))?;
+    }
+    bundled.dirs().try_for_each(|inner| extract(inner, target))
 }
 
 fn cases(database: &Database) -> impl Iterator<Item = (&str, &Case)> {

@@ -161,7 +161,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             let text = String::from_utf8_lossy(&bytes).into_owned();
             output::print_json(&Text { format: format.name, text })?;
         }
-        None => output::print(|out| out.write_all(&bytes))?,
+        None => output::print_data(|out| out.write_all(&bytes))?,
         Some(path) => {
             write_whole(path, &bytes)?;
             if manners.json {

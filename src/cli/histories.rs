@@ -95,7 +95,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             written?;
         }
         None if manners.json || straight.is_some() => {}
-        None => output::print(|out| write_csv(out, &file))?,
+        None => output::print_data(|out| write_csv(out, &file))?,
     }
     if manners.json {
         output::print_json(&document(args, &file))?;

@@ -23,6 +23,8 @@ mod validate;
 use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use crumple::file::is_same;
@@ -140,7 +142,19 @@ impl Manners {
     }
 }
 
+/// Lets a write beyond the limit on the size of files (`ulimit -f`) fail, with a message that
+/// names the file, where the signal's default would end the process without one.
+#[cfg(unix)]
+fn survive_file_size_limit() {
+    // Without the handler the process ends, and the old file is there all the same.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+}
+
+#[cfg(not(unix))]
+fn survive_file_size_limit() {}
+
 pub fn main() -> ExitCode {
+    survive_file_size_limit();
     let cli = Cli::parse();
     let manners = cli.manners;
     let result = match cli.command {

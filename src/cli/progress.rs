@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Manners;
-use super::output::plain;
+use super::{Manners, output};
 
 /// A spinner that names the step just done.
 pub struct Bar(Option<ProgressBar>);
@@ -23,7 +22,8 @@ impl Bar {
 
     pub fn step(&self, done: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(plain(done).into_owned());
+            // Names come from files.
+            bar.set_message(output::plain(done).replace('\n', " "));
         }
     }
 

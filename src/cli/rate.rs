@@ -1,9 +1,9 @@
 //! `crumple rate`: how far a prediction is from its reference, by every measure.
 
-use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crumple::file;
 use crumple::rating::deceleration::Deceleration;
 use crumple::rating::magnitude_phase::MagnitudePhase;
 use crumple::rating::{self, Quantity, Rating, Settings, Signal, table};
@@ -11,6 +11,9 @@ use crumple::solver::{self, ReadError, Selection, WantedId};
 use crumple::unit::TIME;
 
 use super::{CommandResult, Failure, Manners, Outcome, output};
+
+/// Most bytes of a table that is rated: some million rows.
+const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Rate a prediction against a reference: ratios, peaks, ISO/TS 18571, CORA and others
 #[derive(clap::Args)]
@@ -314,8 +317,9 @@ impl Place<'_> {
 
     fn read_table(&self) -> Result<Read, Failure> {
         let path = self.path.display();
-        let mut file = File::open(self.path).map_err(|e| failed(format!("{path}: {e}")))?;
-        let columns = table::read(&mut file, self.column).map_err(|error| {
+        let text = file::read(self.path, MAX_TABLE_BYTES);
+        let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
+        let columns = table::read(&mut &*text, self.column).map_err(|error| {
             let how = match error {
                 table::TableError::NoColumn { .. } | table::TableError::SeveralColumns { .. } => {
                     format!(" with --column-{}", self.letter)

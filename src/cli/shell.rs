@@ -44,7 +44,7 @@ fn print(bytes: &[u8], manners: Manners) -> CommandResult {
     if manners.json {
         output::print_json(&Text { text: String::from_utf8_lossy(bytes).into_owned() })?;
     } else {
-        output::print(|out| out.write_all(bytes))?;
+        output::print_data(|out| out.write_all(bytes))?;
     }
     Ok(Outcome::Clean)
 }

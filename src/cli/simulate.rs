@@ -130,7 +130,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         columns.extend(further_columns(&prepared, &run));
         output::print_json(&document(&columns, &summary, &run.ledger, &warnings)?)?;
     } else if to_stdout {
-        output::print(|out| write_csv(out, &columns))?;
+        output::print_data(|out| write_csv(out, &columns))?;
     } else {
         output::print(|out| {
             print(out, &summary, &run.ledger)?;

@@ -1,7 +1,7 @@
 //! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
 
 use std::fs::OpenOptions;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -161,11 +161,11 @@ fn write(
         let mut write =
             |out: &mut dyn Write| sweep::write_rows(sweep, out, output, settings, &mut progress);
         match is_stdout(output) {
-            true => write(&mut BufWriter::new(io::stdout().lock())),
+            true => output::print_data(write),
             false => {
                 let device = OpenOptions::new().write(true).open(output);
-                let failed = |source| crumple::file::WriteError { path: output.into(), source };
-                write(&mut device.map_err(failed)?)
+                let failed = |source| crumple::file::WriteError::new(output, source);
+                Ok(write(&mut device.map_err(failed)?)?)
             }
         }
     } else {
@@ -177,9 +177,10 @@ fn write(
                 false => ControlFlow::Continue(()),
             }
         })
+        .map_err(Failure::from)
     };
     bar.end();
-    Ok(report?)
+    report
 }
 
 /// Set by the first Ctrl-C (or SIGTERM), so that a run ends behind the chunk it is at; the

@@ -18,6 +18,7 @@ use super::{CommandResult, Failure, Manners, Outcome, keep_input};
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
+  crumple train curves.h5 -o lead.model                # of the only group
   crumple train curves.h5 --group lead-car-wall -o lead.model
   crumple train curves.h5 --group lead-car-wall --paper -o ddtcm.model
   crumple train curves.h5 --group lead-car-wall --model nearest -o fdrm.model
@@ -26,9 +27,9 @@ simplest of the best. The same seed gives the same bytes, on any number of threa
 pub struct Args {
     /// Curve database
     database: PathBuf,
-    /// Group to train on
+    /// Group to train on (default: the only one)
     #[arg(long)]
-    group: String,
+    group: Option<String>,
     /// Kind of model
     #[arg(long, value_enum, default_value_t = Kind::Auto)]
     model: Kind,
@@ -164,8 +165,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let choice = args.choice()?;
     keep_input(&args.database, &args.output)?;
     let database = Database::read(&args.database)?;
-    let cases = database.group(&args.database, &args.group)?;
-    let model = validate::train(&args.group, cases, choice)?;
+    let (group, cases) = database.group_or_only(&args.database, args.group.as_deref())?;
+    let model = validate::train(group, cases, choice)?;
     model.write(&args.output)?;
     let truncated: Vec<&str> =
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
@@ -190,7 +191,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     if manners.json {
         output::print_json(&Document {
             output: args.output.display().to_string(),
-            group: &args.group,
+            group,
             model: model.options.name(),
             options: &model.options,
             max_crush_rule: model.max_crush_rule,

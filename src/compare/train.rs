@@ -14,6 +14,7 @@ use crate::curve::rating::l1_ratio;
 use crate::curve::resample::interpolate;
 use crate::database::{Database, DatabaseError};
 use crate::dataset::TrainingSet;
+use crate::file;
 use crate::history::{EntityId, derivative};
 use crate::multibody::simulate;
 use crate::nsdm;
@@ -79,7 +80,7 @@ impl FeTrain {
         if fastest < 0.0 {
             velocities.iter_mut().for_each(|(_, v)| v.iter_mut().for_each(|v| *v = -*v));
         }
-        let case = std::fs::read_to_string(file.with_file_name("case.json")).ok();
+        let case = file::read_text(&file.with_file_name("case.json"), 1 << 20).ok();
         let wall_time_s = case
             .and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok())
             .and_then(|case| case.get("engine_wall_time_s")?.as_f64());

@@ -1,12 +1,15 @@
 //! Layout of the database file: `/group/case` with attributes and datasets.
 
+use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use hdf5_pure::{AttrValue, File, FileBuilder, Group, GroupBuilder};
+use hdf5_pure::{AttrValue, Dataset, File, FileBuilder, Group};
 
 use super::{Database, DatabaseError, damaged_curve};
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, Source};
+use crate::file;
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
@@ -14,22 +17,196 @@ pub const FORMAT: &str = "crumple curve database";
 /// Layout version this program writes; it reads this and every older one.
 pub const VERSION: i64 = 2;
 
+/// Attributes of the root that are this layout's.
+pub const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
+/// Attribute of a group that lists its cases in order of speed.
+pub const CASES: &str = "cases";
+/// Group of a case with the curve at the solver's rate.
+pub const ORIGINAL: &str = "original";
+/// Attribute of a case with the BLAKE3 hashes of what it holds.
+pub const HASHES: &str = "hashes";
+/// Name, among the hashes, of the one over the attributes.
+pub const ATTRIBUTES: &str = "attributes";
+
+/// Everything that is written of a case, before it is anywhere.
+pub struct Content<'a> {
+    /// In the order in which they are written and hashed.
+    pub attributes: Vec<(&'static str, AttrValue)>,
+    /// By their paths in the case.
+    pub datasets: Vec<(Cow<'static, str>, &'a [f64])>,
+}
+
+/// Every attribute that a case can have; what else it has is others'.
+pub const CASE_ATTRIBUTES: [&str; 22] = [
+    "study",
+    "speed_m_per_s",
+    "speed_kind",
+    "mass_kg",
+    "other_mass_kg",
+    "parameters",
+    "force_kind",
+    "contact_time_s",
+    "solver_wall_time_s",
+    "loading_end",
+    "max_deflection_m",
+    "truncated",
+    "unloading_stiffness_N_per_m",
+    "work_J",
+    "kinetic_energy_J",
+    "work_over_energy",
+    "recipe",
+    "fingerprint",
+    "sources",
+    "notes",
+    "warnings",
+    HASHES,
+];
+
+impl<'a> Content<'a> {
+    pub fn of(case: &'a Case) -> Result<Self, DatabaseError> {
+        let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
+        content.describe(case)?;
+        content.curve("", &case.sampled);
+        content.dataset("closing_speed_m_per_s", &case.closing_speed_m_per_s);
+        content.curve("original/", &case.original);
+        Ok(content)
+    }
+
+    fn describe(&mut self, case: &Case) -> Result<(), DatabaseError> {
+        let text = |s: &str| AttrValue::VarLenString(s.into());
+        let json = |value: Result<String, serde_json::Error>| {
+            let value = value.map_err(|e| DatabaseError::Encode { detail: e.to_string() });
+            value.map(AttrValue::VarLenString)
+        };
+        self.attr("study", text(&case.study));
+        self.attr("speed_m_per_s", AttrValue::F64(case.speed.m_per_s));
+        self.attr("speed_kind", text(case.speed.kind.name()));
+        self.attr("mass_kg", AttrValue::F64(case.masses.body_kg));
+        if let Some(other) = case.masses.other_kg {
+            self.attr("other_mass_kg", AttrValue::F64(other));
+        }
+        self.attr("parameters", json(serde_json::to_string(&case.parameters))?);
+        self.attr("force_kind", text(case.force_kind.name()));
+        self.attr("contact_time_s", AttrValue::F64(case.contact_time_s));
+        if let Some(time_s) = case.solver_wall_time_s {
+            self.attr("solver_wall_time_s", AttrValue::F64(time_s));
+        }
+        self.attr("loading_end", AttrValue::I64(case.loading_end() as i64));
+        self.attr("max_deflection_m", AttrValue::F64(case.max_deflection_m()));
+        self.attr("truncated", AttrValue::U8(case.is_truncated().into()));
+        if let Some(stiffness) = case.unloading_stiffness_n_per_m {
+            self.attr("unloading_stiffness_N_per_m", AttrValue::F64(stiffness));
+        }
+        self.attr("work_J", AttrValue::F64(case.audit.work_j));
+        self.attr("kinetic_energy_J", AttrValue::F64(case.audit.kinetic_j));
+        self.attr("work_over_energy", AttrValue::F64(case.audit.ratio()));
+        self.attr("recipe", text(&case.recipe));
+        self.attr("fingerprint", text(&case.fingerprint));
+        self.attr("sources", json(serde_json::to_string(&case.sources))?);
+        self.attr("notes", json(serde_json::to_string(&case.notes))?);
+        self.attr("warnings", json(serde_json::to_string(&case.warnings))?);
+        Ok(())
+    }
+
+    fn curve(&mut self, folder: &str, curve: &'a Curve) {
+        let mut put = |name: &str, values| {
+            self.datasets.push((format!("{folder}{name}").into(), values));
+        };
+        put("time_s", curve.time_s());
+        put("deflection_m", curve.deflection_m());
+        put("force_N", curve.force_n());
+    }
+
+    fn attr(&mut self, name: &'static str, value: AttrValue) {
+        self.attributes.push((name, value));
+    }
+
+    fn dataset(&mut self, name: &'static str, values: &'a [f64]) {
+        self.datasets.push((name.into(), values));
+    }
+
+    /// BLAKE3 of each dataset's values (doubles, little endian) by its path, and of all
+    /// attributes: name, zero byte, value (text, or little endian), zero byte, each.
+    pub fn hashes(&self) -> BTreeMap<String, String> {
+        let mut of_attributes = blake3::Hasher::new();
+        for (name, value) in &self.attributes {
+            of_attributes.update(name.as_bytes()).update(b"\0");
+            match value {
+                AttrValue::F64(number) => of_attributes.update(&number.to_le_bytes()),
+                AttrValue::I64(number) => of_attributes.update(&number.to_le_bytes()),
+                AttrValue::U8(number) => of_attributes.update(&[*number]),
+                other => of_attributes.update(other.as_str().unwrap_or_default().as_bytes()),
+            };
+            of_attributes.update(b"\0");
+        }
+        let mut hashes: BTreeMap<String, String> = self
+            .datasets
+            .iter()
+            .map(|(path, values)| (path.to_string(), hash_of(values)))
+            .collect();
+        hashes.insert(ATTRIBUTES.into(), of_attributes.finalize().to_hex().to_string());
+        hashes
+    }
+}
+
+pub fn hash_of(values: &[f64]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for value in values {
+        hasher.update(&value.to_le_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+/// The attributes of a case as they are written, its hashes among them: those it was read with
+/// if they are not its own, so that damage is not made good by writing it again.
+pub fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Content<'a>, DatabaseError> {
+    let mut content = Content::of(case)?;
+    let key = (case.group.clone(), case.name.clone());
+    let hashes = database.altered.get(&key).cloned().unwrap_or_else(|| content.hashes());
+    let hashes = serde_json::to_string(&hashes);
+    let hashes = hashes.map_err(|e| DatabaseError::Encode { detail: e.to_string() })?;
+    content.attr("hashes", AttrValue::VarLenString(hashes));
+    Ok(content)
+}
+
+/// The root's attributes.
+pub fn root_attributes() -> [(&'static str, AttrValue); 3] {
+    let written_by = concat!("crumple ", env!("CARGO_PKG_VERSION"));
+    [
+        ("format", AttrValue::VarLenString(FORMAT.into())),
+        ("layout_version", AttrValue::I64(VERSION)),
+        ("written_by", AttrValue::VarLenString(written_by.into())),
+    ]
+}
+
+/// The value of a group's attribute `cases`.
+pub fn case_names(cases: &[Case]) -> AttrValue {
+    AttrValue::VarLenStringArray(cases.iter().map(|c| c.name.clone()).collect())
+}
+
 /// Encodes a database as the bytes of an HDF5 file.
 pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     let mut file = FileBuilder::new();
-    file.set_attr("format", AttrValue::VarLenString(FORMAT.into()));
-    file.set_attr("layout_version", AttrValue::I64(VERSION));
-    file.set_attr(
-        "written_by",
-        AttrValue::VarLenString(concat!("crumple ", env!("CARGO_PKG_VERSION")).into()),
-    );
+    for (name, value) in root_attributes() {
+        file.set_attr(name, value);
+    }
     for (name, cases) in &database.groups {
         let mut group = file.create_group(name);
-        let names = cases.iter().map(|c| c.name.clone()).collect();
-        group.set_attr("cases", AttrValue::VarLenStringArray(names));
+        group.set_attr(CASES, case_names(cases));
         for case in cases {
+            let content = with_hashes(database, case)?;
             let mut builder = group.create_group(&case.name);
-            encode_case(case, &mut builder)?;
+            for (name, value) in content.attributes {
+                builder.set_attr(name, value);
+            }
+            let mut original = builder.create_group(ORIGINAL);
+            for (path, values) in content.datasets {
+                match path.strip_prefix("original/") {
+                    Some(name) => original.create_dataset(name).with_f64_data(values),
+                    None => builder.create_dataset(&path).with_f64_data(values),
+                };
+            }
+            builder.add_group(original.finish());
             group.add_group(builder.finish());
         }
         file.add_group(group.finish());
@@ -37,61 +214,34 @@ pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     file.finish().map_err(|e| DatabaseError::Encode { detail: e.to_string() })
 }
 
-fn encode_case(case: &Case, group: &mut GroupBuilder) -> Result<(), DatabaseError> {
-    let text = |s: &str| AttrValue::VarLenString(s.into());
-    let json = |value: Result<String, serde_json::Error>| {
-        value.map_err(|e| DatabaseError::Encode { detail: e.to_string() })
-    };
-    group.set_attr("study", text(&case.study));
-    group.set_attr("speed_m_per_s", AttrValue::F64(case.speed.m_per_s));
-    group.set_attr("speed_kind", text(case.speed.kind.name()));
-    group.set_attr("mass_kg", AttrValue::F64(case.masses.body_kg));
-    if let Some(other) = case.masses.other_kg {
-        group.set_attr("other_mass_kg", AttrValue::F64(other));
-    }
-    group.set_attr("parameters", text(&json(serde_json::to_string(&case.parameters))?));
-    group.set_attr("force_kind", text(case.force_kind.name()));
-    group.set_attr("contact_time_s", AttrValue::F64(case.contact_time_s));
-    if let Some(time_s) = case.solver_wall_time_s {
-        group.set_attr("solver_wall_time_s", AttrValue::F64(time_s));
-    }
-    group.set_attr("loading_end", AttrValue::I64(case.loading_end() as i64));
-    group.set_attr("max_deflection_m", AttrValue::F64(case.max_deflection_m()));
-    group.set_attr("truncated", AttrValue::U8(case.is_truncated().into()));
-    if let Some(stiffness) = case.unloading_stiffness_n_per_m {
-        group.set_attr("unloading_stiffness_N_per_m", AttrValue::F64(stiffness));
-    }
-    group.set_attr("work_J", AttrValue::F64(case.audit.work_j));
-    group.set_attr("kinetic_energy_J", AttrValue::F64(case.audit.kinetic_j));
-    group.set_attr("work_over_energy", AttrValue::F64(case.audit.ratio()));
-    group.set_attr("recipe", text(&case.recipe));
-    group.set_attr("fingerprint", text(&case.fingerprint));
-    group.set_attr("sources", text(&json(serde_json::to_string(&case.sources))?));
-    group.set_attr("notes", text(&json(serde_json::to_string(&case.notes))?));
-    group.set_attr("warnings", text(&json(serde_json::to_string(&case.warnings))?));
-    encode_curve(&case.sampled, group);
-    group.create_dataset("closing_speed_m_per_s").with_f64_data(&case.closing_speed_m_per_s);
-    let mut original = group.create_group("original");
-    encode_curve(&case.original, &mut original);
-    group.add_group(original.finish());
-    Ok(())
+/// A database file that was opened.
+pub struct Opened<'a> {
+    pub path: &'a Path,
+    pub file: File,
+    /// Bytes of values that datasets may still declare.
+    left: Cell<u64>,
 }
 
-fn encode_curve(curve: &Curve, group: &mut GroupBuilder) {
-    group.create_dataset("time_s").with_f64_data(curve.time_s());
-    group.create_dataset("deflection_m").with_f64_data(curve.deflection_m());
-    group.create_dataset("force_N").with_f64_data(curve.force_n());
-}
+/// What datasets may declare beside so many times the file's size. Compression is the reason
+/// for more than once: force histories shrink by less than this.
+const DECLARED_BYTES: u64 = 64 << 20;
+const DECLARED_PER_BYTE: u64 = 32;
 
-/// Decodes the bytes of a database file; `path` is for messages.
-pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<Database, DatabaseError> {
+/// Opens a database file; values are not read yet.
+///
+/// # Errors
+/// [`DatabaseError`] if it is no file, not HDF5, not a curve database, or of a newer layout.
+pub fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
+    let io = |source| DatabaseError::Io { path: path.into(), source };
+    let size = file::open(path).and_then(|file| file.metadata()).map_err(io)?.len();
     let not_hdf5 = |detail: String| DatabaseError::NotHdf5 { path: path.into(), detail };
-    if !hdf5_pure::is_hdf5_bytes(&bytes) {
-        return Err(not_hdf5("its signature is missing".into()));
+    match hdf5_pure::is_hdf5(path) {
+        Ok(true) => {}
+        Ok(false) => return Err(not_hdf5("its signature is missing".into())),
+        Err(error) => return Err(io(error)),
     }
-    let file = File::from_bytes(bytes).map_err(|e| not_hdf5(e.to_string()))?;
-    let root = file.root();
-    let attrs = root.attrs().map_err(|e| not_hdf5(e.to_string()))?;
+    let file = File::open_streaming(path).map_err(|e| not_hdf5(e.to_string()))?;
+    let attrs = file.root().attrs().map_err(|e| not_hdf5(e.to_string()))?;
     if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
         return Err(DatabaseError::NotOurs { path: path.into() });
     }
@@ -99,15 +249,104 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<Database, DatabaseError> {
     if !(1..=VERSION).contains(&found) {
         return Err(DatabaseError::Version { path: path.into(), found });
     }
+    let left = Cell::new(DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(size));
+    Ok(Opened { path, file, left })
+}
+
+/// A case that was read, and what it was read from.
+pub struct Found {
+    pub case: Case,
+    pub attributes: HashMap<String, AttrValue>,
+    /// The hashes that are stored with it, if there are.
+    pub hashes: Option<BTreeMap<String, String>>,
+}
+
+impl Opened<'_> {
+    fn damaged(&self, place: &str, detail: String) -> DatabaseError {
+        DatabaseError::Damaged { path: self.path.into(), place: place.into(), detail }
+    }
+
+    fn check<T>(
+        &self,
+        place: &str,
+        result: Result<T, hdf5_pure::Error>,
+    ) -> Result<T, DatabaseError> {
+        result.map_err(|e| self.damaged(place, e.to_string()))
+    }
+
+    /// Groups that hold cases, with the names of these. What others put beside them is none.
+    pub fn groups(&self) -> Result<Vec<(String, Vec<String>)>, DatabaseError> {
+        let mut groups = Vec::new();
+        for (name, group) in self.check("/", self.file.root().iter_groups())? {
+            let listed = self.listed(&name, &group)?;
+            let mut cases = Vec::new();
+            for (case, group) in self.check(&name, group.iter_groups())? {
+                let is_listed = listed.as_ref().is_some_and(|names| names.contains(&case));
+                if is_listed || self.is_case(&format!("{name}/{case}"), &group)? {
+                    cases.push(case);
+                }
+            }
+            if listed.is_some() || !cases.is_empty() {
+                groups.push((name, cases));
+            }
+        }
+        Ok(groups)
+    }
+
+    /// The names that a group's attribute `cases` lists.
+    pub fn listed(&self, name: &str, group: &Group) -> Result<Option<Vec<String>>, DatabaseError> {
+        let attributes = self.check(name, group.attrs())?;
+        Ok(attributes
+            .get(CASES)
+            .and_then(AttrValue::as_strings)
+            .map(|names| names.iter().map(|name| name.to_string()).collect()))
+    }
+
+    /// Whether a group has what every case has; one of it is enough, so that damage shows.
+    fn is_case(&self, place: &str, group: &Group) -> Result<bool, DatabaseError> {
+        let attributes = self.check(place, group.attrs())?;
+        Ok(["study", "speed_m_per_s", "fingerprint"].iter().any(|n| attributes.contains_key(*n)))
+    }
+
+    /// The values of one dataset of a case; why not, in words.
+    pub fn values(&self, group: &str, case: &str, path: &str) -> Result<Vec<f64>, String> {
+        let place = Place { opened: self, name: format!("{group}/{case}") };
+        let values = place.check(self.file.group(&place.name));
+        values.and_then(|found| numbers(&found, path, &place)).map_err(|e| match e {
+            DatabaseError::Damaged { detail, .. } => detail,
+            other => other.to_string(),
+        })
+    }
+
+    /// The hashes that are stored with a case, if they are there and can be read.
+    pub fn hashes(&self, group: &str, case: &str) -> Option<BTreeMap<String, String>> {
+        let attributes = self.file.group(&format!("{group}/{case}")).ok()?.attrs().ok()?;
+        serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
+    }
+
+    /// Reads one case.
+    pub fn case(&self, group: &str, case: &str) -> Result<Found, DatabaseError> {
+        let place = Place { opened: self, name: format!("{group}/{case}") };
+        let found = place.check(self.file.group(&place.name))?;
+        decode_case(group, case, &found, &place)
+    }
+}
+
+/// Reads all cases of the file at `path`.
+pub fn decode(path: &Path) -> Result<Database, DatabaseError> {
+    let opened = open(path)?;
     let mut database = Database::default();
-    let names = root.groups().map_err(|e| not_hdf5(e.to_string()))?;
-    for name in names {
-        let place = Place { path, name: name.clone() };
-        let group = place.check(root.group(&name))?;
-        for case in place.check(group.groups())? {
-            let place = Place { path, name: format!("{name}/{case}") };
-            let group = place.check(group.group(&case))?;
-            database.put(decode_case(&name, &case, &group, &place)?)?;
+    for (group, cases) in opened.groups()? {
+        for name in cases {
+            let Found { case, hashes, .. } = opened.case(&group, &name)?;
+            let altered = match hashes {
+                Some(hashes) => (Content::of(&case)?.hashes() != hashes).then_some(hashes),
+                None => None,
+            };
+            database.put(case)?;
+            if let Some(hashes) = altered {
+                database.altered.insert((group.clone(), name), hashes);
+            }
         }
     }
     Ok(database)
@@ -115,21 +354,17 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<Database, DatabaseError> {
 
 /// Where in the file something is read, for messages.
 struct Place<'a> {
-    path: &'a Path,
+    opened: &'a Opened<'a>,
     name: String,
 }
 
 impl Place<'_> {
     fn damaged(&self, detail: impl Into<String>) -> DatabaseError {
-        DatabaseError::Damaged {
-            path: self.path.into(),
-            place: self.name.clone(),
-            detail: detail.into(),
-        }
+        self.opened.damaged(&self.name, detail.into())
     }
 
     fn check<T>(&self, result: Result<T, hdf5_pure::Error>) -> Result<T, DatabaseError> {
-        result.map_err(|e| self.damaged(e.to_string()))
+        self.opened.check(&self.name, result)
     }
 }
 
@@ -180,7 +415,7 @@ fn decode_case(
     name: &str,
     group: &Group,
     place: &Place<'_>,
-) -> Result<Case, DatabaseError> {
+) -> Result<Found, DatabaseError> {
     let attrs = Attrs { map: place.check(group.attrs())?, place };
     let kind = match attrs.text("speed_kind")? {
         "wall" => SpeedKind::Wall,
@@ -194,18 +429,21 @@ fn decode_case(
     };
     let sampled = decode_curve(group, place)?;
     let closing_speed_m_per_s = numbers(group, "closing_speed_m_per_s", place)?;
-    if closing_speed_m_per_s.len() != sampled.time_s().len() {
-        return Err(place.damaged("closing_speed_m_per_s and time_s differ in length"));
+    let (speeds, times) = (closing_speed_m_per_s.len(), sampled.time_s().len());
+    if speeds != times {
+        return Err(place.damaged(format!(
+            "closing_speed_m_per_s and time_s differ in length: {speeds} and {times}"
+        )));
     }
     if let Some(i) = closing_speed_m_per_s.iter().position(|v| !v.is_finite()) {
         return Err(
             place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1))
         );
     }
-    let original_place = Place { path: place.path, name: format!("{}/original", place.name) };
-    let original = decode_curve(&place.check(group.group("original"))?, &original_place)?;
+    let original_place = Place { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
+    let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
     let sources: Vec<Source> = attrs.json("sources")?;
-    Ok(Case {
+    let case = Case {
         study: attrs.text("study")?.into(),
         group: group_name.into(),
         name: name.into(),
@@ -238,17 +476,46 @@ fn decode_case(
         sources,
         notes: attrs.json("notes")?,
         warnings: attrs.json("warnings")?,
-    })
+    };
+    // Databases of earlier programs have none.
+    let hashes = match attrs.map.contains_key(HASHES) {
+        true => Some(attrs.json(HASHES)?),
+        false => None,
+    };
+    Ok(Found { case, attributes: attrs.map, hashes })
 }
 
 fn decode_curve(group: &Group, place: &Place<'_>) -> Result<Curve, DatabaseError> {
     let time = numbers(group, "time_s", place)?;
     let deflection = numbers(group, "deflection_m", place)?;
     let force = numbers(group, "force_N", place)?;
-    Curve::new(time, deflection, force).map_err(|e| damaged_curve(place.path, &place.name, e))
+    Curve::new(time, deflection, force)
+        .map_err(|e| damaged_curve(place.opened.path, &place.name, e))
 }
 
 fn numbers(group: &Group, name: &str, place: &Place<'_>) -> Result<Vec<f64>, DatabaseError> {
-    let dataset = group.dataset(name).map_err(|e| place.damaged(format!("{name}: {e}")))?;
-    dataset.read_f64().map_err(|e| place.damaged(format!("{name}: {e}")))
+    let failed = |e: hdf5_pure::Error| place.damaged(format!("{name}: {e}"));
+    let dataset = group.dataset(name).map_err(failed)?;
+    let bytes = declared_bytes(&dataset).map_err(failed)?;
+    let left = &place.opened.left;
+    let Some(rest) = left.get().checked_sub(bytes) else {
+        return Err(place.damaged(format!(
+            "{name}: it declares {} values, more than a file of this size holds: the file is damaged, or was not made by crumple build",
+            bytes / 8
+        )));
+    };
+    left.set(rest);
+    // A reader that finds no memory ends the process; here it is only asked for.
+    let mut memory: Vec<u8> = Vec::new();
+    if memory.try_reserve_exact(bytes.saturating_mul(2) as usize).is_err() {
+        return Err(place.damaged(format!("{name}: {}", file::out_of_memory(bytes))));
+    }
+    drop(memory);
+    dataset.read_f64().map_err(failed)
+}
+
+/// Bytes of a dataset's values as doubles.
+pub fn declared_bytes(dataset: &Dataset) -> Result<u64, hdf5_pure::Error> {
+    let size = dataset.element_size()?.max(8);
+    Ok(dataset.shape()?.iter().fold(size, |bytes, &n| bytes.saturating_mul(n)))
 }

@@ -4,6 +4,8 @@
 //! `schemas/curve_database.md`. A file is always written whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 
+pub mod check;
+mod foreign;
 mod histories;
 mod layout;
 mod lock;
@@ -11,7 +13,6 @@ mod skeleton;
 pub mod table;
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,8 @@ pub use lock::{LockError, WriterLock};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Database {
     groups: BTreeMap<String, Vec<Case>>,
+    /// Group and name of cases whose content is not what their hashes are of, with these.
+    altered: BTreeMap<(String, String), BTreeMap<String, String>>,
 }
 
 /// Why a database cannot be read or written.
@@ -49,6 +52,14 @@ pub enum DatabaseError {
         "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": if the study was renamed, build into a new database; else name this run or group differently"
     )]
     OtherStudy { group: String, name: String, other: String },
+    #[error("{path} has several groups: choose one with --group: {known}")]
+    WhichGroup { path: PathBuf, known: String },
+    #[error("{path} has no groups: build a study into it")]
+    Empty { path: PathBuf },
+    #[error(
+        "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
+    )]
+    WouldDrop { path: PathBuf, what: String },
     #[error("cannot encode the database: {detail}")]
     Encode { detail: String },
     #[error(transparent)]
@@ -62,17 +73,55 @@ impl Database {
     /// [`DatabaseError`] if the file is missing, not HDF5, not a curve database, of a
     /// newer layout, or damaged; it names the case and dataset.
     pub fn read(path: &Path) -> Result<Self, DatabaseError> {
-        let bytes =
-            fs::read(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
-        layout::decode(path, bytes)
+        layout::decode(path)
     }
 
-    /// Writes the database to `path` as a whole.
+    /// Writes the database to `path` as a whole. What others have put into the file that is
+    /// there, attributes, datasets and groups, stays in it.
     ///
     /// # Errors
-    /// [`DatabaseError::Write`] if the target cannot be written; the old file is unchanged.
+    /// [`DatabaseError::Write`] if the target cannot be written, [`DatabaseError::WouldDrop`] if
+    /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), DatabaseError> {
+        if path.is_file() {
+            let foreign = foreign::found(&layout::open(path)?)?;
+            if !foreign.is_empty() {
+                return foreign::write_keeping(self, path, &foreign);
+            }
+        }
         Ok(write_whole(path, &layout::encode(self)?)?)
+    }
+
+    /// Whether a case is not what it was when it was written: its hashes are of something else.
+    pub fn is_altered(&self, group: &str, case: &str) -> bool {
+        self.altered.contains_key(&(group.to_string(), case.to_string()))
+    }
+
+    /// The group that was asked for, or the only one there is, with its cases in order of speed.
+    ///
+    /// # Errors
+    /// [`DatabaseError::NoGroup`] or [`DatabaseError::WhichGroup`] lists the groups there are;
+    /// `path` is for the message.
+    pub fn group_or_only<'a>(
+        &'a self,
+        path: &Path,
+        asked: Option<&str>,
+    ) -> Result<(&'a str, &'a [Case]), DatabaseError> {
+        let mut groups = self.groups.iter();
+        let (name, cases) = match (asked, groups.next(), groups.next()) {
+            (Some(asked), _, _) => {
+                let cases = self.group(path, asked)?;
+                let name = self.groups.get_key_value(asked).map_or("", |(name, _)| name);
+                return Ok((name, cases));
+            }
+            (None, Some(only), None) => only,
+            (None, Some(_), Some(_)) => {
+                let known = listed(self.groups());
+                return Err(DatabaseError::WhichGroup { path: path.into(), known });
+            }
+            (None, None, _) => return Err(DatabaseError::Empty { path: path.into() }),
+        };
+        Ok((name, cases))
     }
 
     /// Group names in alphabetical order.
@@ -127,6 +176,7 @@ impl Database {
             });
         }
         cases.retain(|c| c.name != case.name);
+        self.altered.remove(&(case.group.clone(), case.name.clone()));
         cases.push(case);
         cases.sort_by(|a, b| {
             a.speed.m_per_s.total_cmp(&b.speed.m_per_s).then_with(|| a.name.cmp(&b.name))
@@ -137,8 +187,10 @@ impl Database {
     /// Removes the cases of a group for which `keep` is false; returns their names.
     pub fn retain(&mut self, group: &str, keep: impl Fn(&Case) -> bool) -> Vec<String> {
         let Some(cases) = self.groups.get_mut(group) else { return Vec::new() };
-        let removed = cases.iter().filter(|c| !keep(c)).map(|c| c.name.clone()).collect();
+        let removed: Vec<String> =
+            cases.iter().filter(|c| !keep(c)).map(|c| c.name.clone()).collect();
         cases.retain(keep);
+        self.altered.retain(|(g, name), _| g != group || !removed.contains(name));
         if cases.is_empty() {
             self.groups.remove(group);
         }

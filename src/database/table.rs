@@ -11,8 +11,9 @@ use hdf5_pure::{
 };
 
 use super::DatabaseError;
+use super::layout::declared_bytes;
 use super::skeleton::{Skeleton, write_all_at};
-use crate::file::write_at;
+use crate::file::{self, write_at};
 
 /// What the values of a column are; all have a fixed number of bytes, little endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +68,10 @@ impl Values {
 
 /// Name of the dataset that lists the columns in their order.
 const COLUMNS: &str = "columns";
+/// Bounds of what is held of a file, whatever it declares: the columns' names, and what is read
+/// at once.
+const MAX_COLUMNS_BYTES: u64 = 1 << 24;
+const MAX_PIECE_BYTES: u64 = 1 << 30;
 /// Columns up to this size are held in memory.
 const SMALL_BYTES: u64 = 1 << 16;
 
@@ -180,7 +185,7 @@ impl Table {
     /// # Errors
     /// [`DatabaseError`] if it is not HDF5, or no such table.
     pub fn open(path: &Path, format: &str) -> Result<Self, DatabaseError> {
-        DiskFile::open(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
+        file::open(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
         let file = File::open_streaming(path)
             .map_err(|e| DatabaseError::NotHdf5 { path: path.into(), detail: e.to_string() })?;
         let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
@@ -188,8 +193,13 @@ impl Table {
             Some(Attribute::Text(found)) if found == format => {}
             _ => return Err(table.damaged("format", format!("this is no {format}"))),
         }
-        let names = table.file.dataset(COLUMNS).and_then(|d| d.read_string());
+        let names = table.file.dataset(COLUMNS).and_then(|d| {
+            let bytes = declared_bytes(&d)?;
+            (bytes <= MAX_COLUMNS_BYTES).then(|| d.read_string()).transpose()
+        });
+        let too_many = || table.damaged(COLUMNS, "it declares more names than a table has".into());
         let names = names.map_err(|e| table.damaged(COLUMNS, e.to_string()))?;
+        let names = names.ok_or_else(too_many)?;
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         table.datasets = dataset_names(&names);
         for (name, dataset) in names.iter().zip(&table.datasets) {
@@ -233,6 +243,10 @@ impl Table {
     /// [`DatabaseError::Damaged`] names the column.
     pub fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, DatabaseError> {
         let name = &self.columns[column].name;
+        let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);
+        if bytes > MAX_PIECE_BYTES {
+            return Err(self.damaged(name, format!("its texts have {bytes} bytes in {rows} rows")));
+        }
         let dataset = self.file.dataset(&self.datasets[column]);
         let bytes = dataset.and_then(|d| d.read_raw_rows(row, rows));
         let bytes = bytes.map_err(|e| self.damaged(name, e.to_string()))?;

@@ -1,12 +1,11 @@
 //! Curve as CSV: deflection and force under `#` header lines, written and read.
 
 use std::fmt::Write;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, Options, facts, nine_digits};
+use super::{ExportError, MAX_CURVE_BYTES, Options, facts, nine_digits};
 use crate::curve::{Envelope, EnvelopeError, ForceKind};
+use crate::file;
 use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
 use crate::unit::{Dimension, FORCE, LENGTH, SpeedKind, UnitSystem};
@@ -101,13 +100,14 @@ pub enum CsvError {
 pub fn read(path: &Path) -> Result<CurveTable, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
-    let mut file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
-    let facts = Facts::read(path, &mut file)?;
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(io)?;
+    let facts = Facts::read(path, &bytes)?;
+    let rest = &bytes[facts.bytes..];
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .delimiter(separator(file.fill_buf().map_err(io)?))
-        .from_reader(file);
+        .delimiter(separator(rest))
+        .from_reader(rest);
     let header = reader.headers().map_err(malformed)?.clone();
     let line_of =
         |position: Option<&csv::Position>| facts.lines + position.map_or(1, csv::Position::line);
@@ -151,26 +151,20 @@ pub fn read(path: &Path) -> Result<CurveTable, CsvError> {
 struct Facts {
     /// With an envelope that is still to come.
     table: CurveTable,
-    /// Lines read.
+    /// Lines and bytes of them.
     lines: u64,
+    bytes: usize,
 }
 
-/// No header line is longer.
-const LONGEST_LINE: u64 = 1 << 16;
-
 impl Facts {
-    fn read(path: &Path, file: &mut BufReader<File>) -> Result<Self, CsvError> {
-        let io = |source| CsvError::Io { path: path.into(), source };
+    fn read(path: &Path, bytes: &[u8]) -> Result<Self, CsvError> {
         let nothing = Envelope::new(vec![0.0, 1.0], vec![0.0, 0.0]);
         let nothing = nothing.map_err(|source| CsvError::Envelope { path: path.into(), source })?;
-        let mut facts = Self { table: CurveTable::bare(nothing), lines: 0 };
-        while file.fill_buf().map_err(io)?.first() == Some(&b'#') {
-            let mut line = Vec::new();
-            std::io::Read::take(&mut *file, LONGEST_LINE)
-                .read_until(b'\n', &mut line)
-                .map_err(io)?;
+        let mut facts = Self { table: CurveTable::bare(nothing), lines: 0, bytes: 0 };
+        for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|l| l.starts_with(b"#")) {
             facts.lines += 1;
-            let line = String::from_utf8_lossy(&line);
+            facts.bytes += line.len();
+            let line = String::from_utf8_lossy(line);
             if let Some((key, value)) = line.trim_start_matches('#').split_once(':') {
                 facts.note(path, key.trim(), value.trim())?;
             }

@@ -1,9 +1,9 @@
 //! Predicted curve as JSON: the master format of exports, written and read.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, Options};
+use super::{ExportError, MAX_CURVE_BYTES, Options};
+use crate::file;
 use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::PredictError;
 
@@ -34,8 +34,8 @@ pub enum CurveFileError {
 /// # Errors
 /// [`CurveFileError`] with line and column, or with the promise that is broken.
 pub fn read(path: &Path) -> Result<PredictedCurve, CurveFileError> {
-    let bytes =
-        fs::read(path).map_err(|source| CurveFileError::Io { path: path.into(), source })?;
+    let bytes = file::read(path, MAX_CURVE_BYTES)
+        .map_err(|source| CurveFileError::Io { path: path.into(), source })?;
     let curve: PredictedCurve = serde_json::from_slice(&bytes)
         .map_err(|source| CurveFileError::Json { path: path.into(), source })?;
     curve.envelope().map_err(|source| CurveFileError::Curve { path: path.into(), source })?;

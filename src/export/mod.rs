@@ -94,6 +94,9 @@ pub enum ExportError {
     Encode(#[from] serde_json::Error),
 }
 
+/// Most bytes of a file that holds a curve: a predicted one has some ten thousand.
+pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
+
 /// Fewest points that every target takes.
 pub const MIN_POINTS: usize = 4;
 

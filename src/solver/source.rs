@@ -9,6 +9,8 @@ use std::fs::File;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
+use crate::file;
+
 /// Bytes that can be read at any position, from several threads at once.
 pub trait Source: Send + Sync {
     /// Number of bytes; of a file those that it had when it was opened.
@@ -39,12 +41,9 @@ pub enum Access {
 /// # Errors
 /// Those of the operating system, and for a device, which may have no end.
 pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
+    let kind = file::kind(path)?;
     let mut file = File::open(path)?;
-    let kind = file.metadata()?.file_type();
-    if !kind.is_file() {
-        if !is_pipe(kind) {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no file and no pipe"));
-        }
+    if kind == file::Kind::Pipe {
         let mut copy = tempfile::tempfile()?;
         io::copy(&mut file, &mut copy)?;
         file = copy;
@@ -53,16 +52,6 @@ pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
         Access::Plain => Box::new(Opened::new(file)?),
         Access::Map => Box::new(Mapped::new(&file)?),
     })
-}
-
-#[cfg(unix)]
-fn is_pipe(kind: std::fs::FileType) -> bool {
-    std::os::unix::fs::FileTypeExt::is_fifo(&kind)
-}
-
-#[cfg(not(unix))]
-fn is_pipe(_: std::fs::FileType) -> bool {
-    false
 }
 
 /// A file with the size that it had when it was opened.

@@ -1,9 +1,9 @@
 //! The files that a recipe names in a run's folder: text, or section of a binary file.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::RunError;
+use crate::file;
 use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
 
 /// A source file of a run before it is read.
@@ -30,6 +30,10 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError
     let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
     for part in names.iter().filter(is_binary) {
         let path = folder.join(part);
+        // A pipe would wait for its writer.
+        if !path.is_file() {
+            continue;
+        }
         let sections = match solver::read_sections(&path, None, &names_only) {
             Ok(sections) => sections,
             // Only named like one; or broken, which matters where the text is not there.
@@ -73,7 +77,7 @@ pub(super) fn hashed_family(
     let mut hasher = blake3::Hasher::new();
     for part in parts {
         let io = |source| RunError::Io { path: part.clone(), source };
-        let file = File::open(part).map_err(io)?;
+        let file = file::open(part).map_err(io)?;
         hasher.update_reader(file).map_err(io)?;
     }
     Ok(Located {

@@ -14,6 +14,7 @@ use crate::curve::extract::{
 };
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
 use crate::curve::{Case, ForceKind, Masses, Parameter, Source};
+use crate::file;
 use crate::history::{EntityId, History, Side};
 use crate::manifest::{self, ManifestError};
 use crate::solver::decks::{self, Search};
@@ -579,11 +580,25 @@ impl LocatedRun<'_> {
         Ok(ContactForce { located, file, history })
     }
 
+    /// The problems of the run's files, found by reading all of them, each with its file's name.
+    pub fn problems(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        for file in &self.files {
+            let everything = Selection { section: file.section.clone(), ..Selection::nothing() };
+            let Ok(sections) = solver::read_sections(&file.path, None, &everything) else {
+                continue;
+            };
+            let problems = sections.iter().flat_map(|section| &section.problems);
+            let name = shown_name(&file.path);
+            found.extend(problems.map(|problem| format!("{name}: {problem}")));
+        }
+        found
+    }
+
     /// `engine_wall_time_s` of the case.json in the run's folder, if there is one.
     fn solver_wall_time_s(&self) -> Option<f64> {
-        let text =
-            std::fs::read_to_string(self.study.folder.join(&self.entry.path).join("case.json"))
-                .ok()?;
+        let path = self.study.folder.join(&self.entry.path).join("case.json");
+        let text = file::read_text(&path, MAX_CASE_BYTES).ok()?;
         let case: serde_json::Value = serde_json::from_str(&text).ok()?;
         case.get("engine_wall_time_s")?.as_f64().filter(|t| *t > 0.0 && t.is_finite())
     }
@@ -709,6 +724,9 @@ fn force_component(force: &ForceSource) -> &str {
         ForceSource::Contact { component, .. } | ForceSource::Body { component, .. } => component,
     }
 }
+
+/// Most bytes of a run's case.json, which has some hundred.
+const MAX_CASE_BYTES: u64 = 1 << 20;
 
 /// Displacements and, where the file has them, velocities of the recipe's nodes.
 fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {

@@ -1,6 +1,5 @@
 //! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -18,7 +17,7 @@ use super::registered::Registered;
 use super::{At, CaseCurve, Surrogate, Warning};
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, Force, TrainingCase, TrainingSet, grid, nearest};
-use crate::file::{WriteError, write_whole};
+use crate::file::{self, WriteError, write_whole};
 use crate::forest::ForestError;
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -26,6 +25,8 @@ use crate::unit::{SpeedKind, UnitSystem};
 const FORMAT: &str = "crumple model";
 /// Version of model files this program writes; it reads this and every older one.
 const VERSION: u32 = 2;
+/// Most bytes of a model file: a forest of 500 trees has some ten million.
+const MAX_BYTES: u64 = 1 << 30;
 /// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
 const STEPS: usize = 200;
 /// Forces and bands beyond these are damage, not measurement.
@@ -369,7 +370,8 @@ impl Model {
     /// # Errors
     /// [`ModelError`] with the place in the file where it is no model of ours.
     pub fn read(path: &Path) -> Result<Self, ModelError> {
-        let text = fs::read(path).map_err(|source| ModelError::Io { path: path.into(), source })?;
+        let text = file::read(path, MAX_BYTES)
+            .map_err(|source| ModelError::Io { path: path.into(), source })?;
         Self::parse(path, &text)
     }
 

@@ -8,12 +8,12 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::hdf5;
-use super::row::{Head, Line, Status, bad_row};
+use super::row::{Head, Line, MAX_HEAD_BYTES, Status, bad_row};
 use super::run::{self, Chunk, Written};
 use super::statistics::Statistics;
 use super::{Report, Shard, Sweep, SweepError};
 use crate::database::WriterLock;
-use crate::file::WriteError;
+use crate::file::{self, WriteError};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,9 @@ impl Default for Settings {
 pub(super) fn is_hdf5(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
 }
+
+/// Longer lines are no rows: the columns' names fit into as much.
+const MAX_LINE_BYTES: u64 = MAX_HEAD_BYTES as u64;
 
 fn beside(path: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(path.file_name().unwrap_or_default());
@@ -132,7 +135,7 @@ pub fn write_rows(
 }
 
 fn failed(path: &Path) -> impl Fn(io::Error) -> SweepError + '_ {
-    move |source| WriteError { path: path.into(), source }.into()
+    move |source| WriteError::new(path, source).into()
 }
 
 /// What a report needs, row by row.
@@ -240,8 +243,7 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepErr
             let mut end = length;
             let mut line = Vec::new();
             loop {
-                line.clear();
-                let read = reader.read_until(b'\n', &mut line).map_err(io)?;
+                let read = read_line(&mut reader, &mut line).map_err(io)?;
                 if read == 0 || !tally.see_line(&line) {
                     break end;
                 }
@@ -266,13 +268,19 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepErr
     Ok(file)
 }
 
+/// Reads the next line, or as much of it as a row can have; how many bytes.
+fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
+    line.clear();
+    reader.take(MAX_LINE_BYTES).read_until(b'\n', line)
+}
+
 /// Checks an output that is there: this sweep's, with all its rows.
 fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
     if is_hdf5(output) {
         return hdf5::complete(output, head, tally);
     }
     let io = |source| SweepError::Read { path: output.into(), source };
-    let mut reader = BufReader::new(File::open(output).map_err(io)?);
+    let mut reader = BufReader::new(file::open(output).map_err(io)?);
     let found = Head::read(&mut reader).map_err(io)?;
     let (found, _) = found.ok_or_else(|| SweepError::Foreign { path: output.into() })?;
     if let Some(differs) = found.differs_from(head) {
@@ -291,8 +299,7 @@ pub(super) fn each_line(
     let io = |source| SweepError::Read { path: path.into(), source };
     let mut line = Vec::new();
     for item in head.rows() {
-        line.clear();
-        if reader.read_until(b'\n', &mut line).map_err(io)? == 0 {
+        if read_line(reader, &mut line).map_err(io)? == 0 {
             let last = head.rows().end - 1;
             return Err(SweepError::Damaged {
                 path: path.into(),
@@ -303,8 +310,7 @@ pub(super) fn each_line(
         }
         see(&line).ok_or_else(|| bad_row(path, item))?;
     }
-    line.clear();
-    match reader.read_until(b'\n', &mut line).map_err(io)? {
+    match read_line(reader, &mut line).map_err(io)? {
         0 => Ok(()),
         _ => Err(SweepError::Damaged {
             path: path.into(),

@@ -1,6 +1,5 @@
 //! The rows as HDF5: a dataset per column, described in `schemas/sweep.md`.
 
-use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -9,6 +8,7 @@ use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
 use super::{Shard, SweepError};
 use crate::database::DatabaseError;
 use crate::database::table::{Attribute, Column, Put, Table, Values, write_table};
+use crate::file;
 
 /// Number of a row's message; 0 is the empty one.
 const MESSAGE_NUMBER: &str = "message_number";
@@ -69,7 +69,7 @@ pub fn convert(files: &[(PathBuf, Head)], head: &Head, output: &Path) -> Result<
     let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), SweepError> {
         for (path, head) in files {
             let io = |source| SweepError::Read { path: path.clone(), source };
-            let mut reader = BufReader::new(File::open(path).map_err(io)?);
+            let mut reader = BufReader::new(file::open(path).map_err(io)?);
             Head::read(&mut reader).map_err(io)?;
             let mut item = head.rows().start;
             let see = |bytes: &[u8]| {

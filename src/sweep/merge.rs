@@ -1,6 +1,5 @@
 //! Joining the files of all shards.
 
-use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use super::hdf5::{self, Shelf};
 use super::row::Head;
 use super::{Report, Shard, SweepError};
 use crate::database::WriterLock;
-use crate::file::{WriteError, write_at};
+use crate::file::{self, write_at};
 
 /// First bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
@@ -81,7 +80,7 @@ pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
     });
     match (failure, written) {
         (Some(error), _) => Err(error),
-        (None, Err(WriteError { path, source })) => Err(WriteError { path, source }.into()),
+        (None, Err(error)) => Err(error.into()),
         (None, Ok(_)) => Ok(tally.close()),
     }
 }
@@ -93,13 +92,13 @@ fn failed(message: String) -> SweepError {
 fn is_hdf5_file(path: &Path) -> Result<bool, SweepError> {
     let io = |source| SweepError::Read { path: path.into(), source };
     let mut first = Vec::new();
-    File::open(path).map_err(io)?.take(8).read_to_end(&mut first).map_err(io)?;
+    file::open(path).map_err(io)?.take(8).read_to_end(&mut first).map_err(io)?;
     Ok(first == HDF5_SIGNATURE)
 }
 
 fn read_head(path: &Path) -> Result<Head, SweepError> {
     let io = |source| SweepError::Read { path: path.into(), source };
-    let mut reader = BufReader::new(File::open(path).map_err(io)?);
+    let mut reader = BufReader::new(file::open(path).map_err(io)?);
     let head = Head::read(&mut reader).map_err(io)?;
     head.map(|(head, _)| head).ok_or_else(|| {
         let path = path.display();
@@ -109,7 +108,7 @@ fn read_head(path: &Path) -> Result<Head, SweepError> {
 
 fn lines(path: &Path, head: &Head, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
     let io = |source: io::Error| SweepError::Read { path: path.into(), source };
-    let mut reader = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let mut reader = BufReader::with_capacity(1 << 16, file::open(path).map_err(io)?);
     Head::read(&mut reader).map_err(io)?;
     each_line(path, &mut reader, see, head)
 }

@@ -13,14 +13,13 @@ mod run;
 mod statistics;
 mod variables;
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use crate::database::{DatabaseError, LockError};
-use crate::file::WriteError;
+use crate::file::{self, WriteError};
 use crate::manifest::{self, ManifestError};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
@@ -139,7 +138,7 @@ impl Sweep {
     /// # Errors
     /// [`SweepError`] names file and key.
     pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, SweepError> {
-        let text = read_text(path)?;
+        let text = manifest::read_text(path)?;
         let mut scenario = scenario::parse(path, &text)?;
         let plan_path = plan.unwrap_or(path);
         let of_file = match plan {
@@ -198,12 +197,6 @@ impl Sweep {
     }
 }
 
-fn read_text(path: &Path) -> Result<String, SweepError> {
-    // The checks of size and kind are those of every TOML file.
-    manifest::load::<toml::Table>(path)?;
-    fs::read_to_string(path).map_err(|source| SweepError::Read { path: path.into(), source })
-}
-
 fn results(plan: &Plan) -> Result<Vec<ResultName>, String> {
     let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
@@ -258,9 +251,10 @@ fn hash(
     for curve in scenario.curves.values() {
         for file in [&curve.model, &curve.file, &curve.database].into_iter().flatten() {
             let file = folder.join(file);
-            let bytes = fs::read(&file)
-                .map_err(|source| SweepError::Read { path: file.clone(), source })?;
-            part(blake3::hash(&bytes).as_bytes());
+            let io = |source| SweepError::Read { path: file.clone(), source };
+            let mut hash = blake3::Hasher::new();
+            hash.update_reader(file::open(&file).map_err(io)?).map_err(io)?;
+            part(hash.finalize().as_bytes());
         }
     }
     Ok(hasher.finalize().to_hex().to_string())

@@ -131,7 +131,7 @@ pub struct Head {
 }
 
 /// Bounds of a header, so that no other file is read for long.
-const MAX_HEAD_BYTES: usize = 1 << 24;
+pub const MAX_HEAD_BYTES: usize = 1 << 24;
 
 impl Head {
     /// The head of a shard of `sweep`.

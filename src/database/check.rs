@@ -1,0 +1,388 @@
+//! Checking a database file: every dataset is read, and what is stored twice or follows from
+//! the curves is held against each other.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use hdf5_pure::AttrValue;
+use serde::Serialize;
+
+use super::layout::{self, ATTRIBUTES, Content, Found, Opened};
+use super::{Database, DatabaseError, listed};
+use crate::curve::resample::interpolate;
+use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
+use crate::history::time_gaps;
+
+/// Something to look at before a case is trusted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    pub group: String,
+    pub case: String,
+    pub code: &'static str,
+    /// Path of the dataset in the case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
+    /// Index of the value in it, counted from 0 as HDF5's tools do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub index: Option<usize>,
+    pub message: String,
+}
+
+/// What a check has found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Checked {
+    pub cases: usize,
+    /// Cases of earlier programs, whose values nothing vouches for.
+    pub without_hashes: usize,
+    pub findings: Vec<Finding>,
+}
+
+/// Checks the database file at `path`; damage of a case is a finding.
+///
+/// # Errors
+/// [`DatabaseError`] if it cannot be opened, or its groups not be listed.
+pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
+    // Each has its own bound of bytes, and every dataset is read twice.
+    let (raw, decoded) = (layout::open(path)?, layout::open(path)?);
+    let mut checked = Checked::default();
+    for (group, cases) in raw.groups()? {
+        let mut readable = Database::default();
+        for case in &cases {
+            checked.cases += 1;
+            let mut findings = Findings { group: &group, case, list: &mut checked.findings };
+            let hashes = findings.datasets(&raw);
+            if !hashes {
+                checked.without_hashes += 1;
+            }
+            let mut findings = Findings { group: &group, case, list: &mut checked.findings };
+            match decoded.case(&group, case) {
+                Ok(found) => {
+                    findings.case(&found)?;
+                    readable.put(found.case)?;
+                }
+                // Its datasets have said so already, with their indices.
+                Err(_) if findings.has_damage() => {}
+                Err(DatabaseError::Damaged { place, detail, .. }) => {
+                    let own = format!("{group}/{case}");
+                    let within = place.strip_prefix(&own).unwrap_or(&place).trim_matches('/');
+                    let colon = if within.is_empty() { "" } else { ": " };
+                    findings.add("damaged", None, None, format!("{within}{colon}{detail}"));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let stored = raw.file.group(&group).map_err(|e| DatabaseError::Damaged {
+            path: path.into(),
+            place: group.clone(),
+            detail: e.to_string(),
+        })?;
+        let stored = raw.listed(&group, &stored)?;
+        of_group(&group, &cases, stored, readable.cases(&group), &mut checked.findings);
+    }
+    Ok(checked)
+}
+
+/// Takes the findings of one case.
+struct Findings<'a> {
+    group: &'a str,
+    case: &'a str,
+    list: &'a mut Vec<Finding>,
+}
+
+/// Names of the datasets of a case, the times of each curve first.
+const DATASETS: [&str; 7] = [
+    "time_s",
+    "deflection_m",
+    "force_N",
+    "closing_speed_m_per_s",
+    "original/time_s",
+    "original/deflection_m",
+    "original/force_N",
+];
+
+/// Codes of findings without which a case could be decoded.
+const DAMAGE: [&str; 4] = ["unreadable", "not_finite", "length", "time_order"];
+
+impl Findings<'_> {
+    fn add(
+        &mut self,
+        code: &'static str,
+        dataset: Option<&str>,
+        index: Option<usize>,
+        message: String,
+    ) {
+        self.list.push(Finding {
+            group: self.group.into(),
+            case: self.case.into(),
+            code,
+            dataset: dataset.map(Into::into),
+            index,
+            message,
+        });
+    }
+
+    fn has_damage(&self) -> bool {
+        let own = |f: &&Finding| f.group == self.group && f.case == self.case;
+        self.list.iter().rev().take_while(own).any(|f| DAMAGE.contains(&f.code))
+    }
+
+    /// Looks at every value; whether the case has hashes.
+    fn datasets(&mut self, opened: &Opened<'_>) -> bool {
+        let hashes = opened.hashes(self.group, self.case);
+        let mut states = 0;
+        for path in DATASETS {
+            let values = match opened.values(self.group, self.case, path) {
+                Ok(values) => values,
+                Err(detail) => {
+                    self.add("unreadable", Some(path), None, detail);
+                    continue;
+                }
+            };
+            if path.ends_with("time_s") {
+                states = values.len();
+                if states < 2 {
+                    let message = format!("{path} has {states} values: expected at least 2");
+                    self.add("length", Some(path), None, message);
+                }
+                if let Some(i) = values.windows(2).position(|w| w[1] <= w[0]) {
+                    let message = format!(
+                        "{path}[{}] is {}, not after {path}[{i}] = {}",
+                        i + 1,
+                        values[i + 1],
+                        values[i]
+                    );
+                    self.add("time_order", Some(path), Some(i + 1), message);
+                }
+            } else if values.len() != states {
+                let times = if path.contains('/') { "original/time_s" } else { "time_s" };
+                let message = format!("{path} has {} values, {times} has {states}", values.len());
+                self.add("length", Some(path), None, message);
+            }
+            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                let message = format!("{path}[{i}] is {}: expected a finite number", values[i]);
+                self.add("not_finite", Some(path), Some(i), message);
+            }
+            if let Some(hashes) = &hashes
+                && hashes.get(path).is_none_or(|hash| *hash != layout::hash_of(&values))
+            {
+                let odd = least_like_neighbours(&values);
+                let which = odd.map_or(String::new(), |i| {
+                    format!("; the one least like its neighbours is {path}[{i}] = {}", values[i])
+                });
+                let message =
+                    format!("the values of {path} are not those that were written{which}");
+                self.add("altered", Some(path), odd, message);
+            }
+        }
+        hashes.is_some()
+    }
+
+    /// Holds what is stored against what follows from the curves.
+    fn case(&mut self, found: &Found) -> Result<(), DatabaseError> {
+        let Found { case, attributes, hashes } = found;
+        let content = Content::of(case)?;
+        if let Some(hashes) = hashes
+            && hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES)
+        {
+            let message = "its attributes are not those that were written".into();
+            self.add("altered", None, None, message);
+        }
+        self.attributes(&content, attributes);
+        self.audit(case);
+        let stiffness = loading::unloading_stiffness(&case.original);
+        let stored = case.unloading_stiffness_n_per_m;
+        if stored.is_some() != stiffness.is_some()
+            || stored.zip(stiffness).is_some_and(|(a, b)| !is_same(a, b))
+        {
+            let shown = |k: Option<f64>| k.map_or("absent".into(), |k| format!("{k} N/m"));
+            let message = format!(
+                "unloading_stiffness_N_per_m is {}, the curve's is {}",
+                shown(stored),
+                shown(stiffness)
+            );
+            self.add("attribute_differs", None, None, message);
+        }
+        self.sampled("deflection_m", case, Curve::deflection_m);
+        self.sampled("force_N", case, Curve::force_n);
+        for (path, curve) in [("time_s", &case.sampled), ("original/time_s", &case.original)] {
+            for gap in time_gaps(curve.time_s()) {
+                self.add("time_gap", Some(path), Some(gap.state), format!("{path}: {gap}"));
+            }
+        }
+        if case.is_truncated() {
+            self.add("truncated", None, None, "the run ended while loading".into());
+        }
+        if stiffness.is_none() {
+            let message = "the record does not hold the unloading branch".into();
+            self.add("no_unloading", None, None, message);
+        }
+        for warning in &case.warnings {
+            self.add("extraction", None, None, warning.clone());
+        }
+        Ok(())
+    }
+
+    /// Attributes that follow from others or from the curve.
+    fn attributes(&mut self, content: &Content<'_>, stored: &HashMap<String, AttrValue>) {
+        for (name, expected) in &content.attributes {
+            let Some(expected) = number(expected) else { continue };
+            match stored.get(*name).and_then(number) {
+                Some(found) if is_same(found, expected) => {}
+                Some(found) => {
+                    let message = format!("{name} is {found}, the curve's is {expected}");
+                    self.add("attribute_differs", None, None, message);
+                }
+                None => {
+                    let message = format!("attribute {name} is missing or no number");
+                    self.add("attribute_differs", None, None, message);
+                }
+            }
+        }
+    }
+
+    fn audit(&mut self, case: &Case) {
+        let audit = energy::audit(&case.original, case.masses, case.speed);
+        let ratio = audit.ratio();
+        if !POSSIBLE.contains(&ratio) {
+            let message = format!(
+                "W/E is {ratio:.4}, outside of {} to {}: mass, speed or units of the run are wrong",
+                POSSIBLE.start(),
+                POSSIBLE.end()
+            );
+            self.add("energy_impossible", None, None, message);
+        } else if (ratio - 1.0).abs() > EnergyAudit::TOLERANCE {
+            let message = format!("W/E is {ratio:.4}, off by more than 5 %");
+            self.add("energy_mismatch", None, None, message);
+        }
+        let pairs = [
+            ("work", case.audit.work_j, audit.work_j),
+            ("kinetic energy", case.audit.kinetic_j, audit.kinetic_j),
+        ];
+        for (what, stored, own) in pairs {
+            if !is_same(stored, own) {
+                let message = format!("the stored {what} {stored} J is not the curve's {own} J");
+                self.add("audit_differs", None, None, message);
+            }
+        }
+    }
+
+    /// The curve at the common interval is the original one, interpolated.
+    fn sampled(&mut self, name: &str, case: &Case, column: fn(&Curve) -> &[f64]) {
+        let (sampled, original) = (&case.sampled, &case.original);
+        let values = column(sampled);
+        let expected = interpolate(original.time_s(), column(original), sampled.time_s());
+        let Ok(expected) = expected else {
+            let message = "time_s goes beyond original/time_s".into();
+            return self.add("sampled_differs", Some("time_s"), None, message);
+        };
+        let scale = values.iter().chain(&expected).fold(0.0, |m: f64, v| m.max(v.abs()));
+        // One value 1e300 must not hide what is wrong of the others: the first is named.
+        let differs = |(a, b): (&f64, &f64)| {
+            (a - b).abs() > SAMPLED * a.abs().max(b.abs()).max(SAMPLED * scale)
+        };
+        if let Some(i) = values.iter().zip(&expected).position(differs) {
+            let message = format!(
+                "{name}[{i}] is {}, original/{name} has {} at this time",
+                values[i], expected[i]
+            );
+            self.add("sampled_differs", Some(name), Some(i), message);
+        }
+    }
+}
+
+/// Ratios of the energies beyond which no run is: more than fits errors of filter and output.
+const POSSIBLE: std::ops::RangeInclusive<f64> = 0.67..=1.5;
+
+/// Share by which a sampled value may differ from what its original gives.
+const SAMPLED: f64 = 1e-6;
+
+/// A number of either kind.
+fn number(value: &AttrValue) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_i64().map(|n| n as f64))
+}
+
+/// Equal but for rounding.
+fn is_same(a: f64, b: f64) -> bool {
+    a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
+}
+
+/// Index of the value that differs most from the mean of its neighbours.
+fn least_like_neighbours(values: &[f64]) -> Option<usize> {
+    let oddness = |i: usize| {
+        let before = i.checked_sub(1).map(|k| values[k]);
+        let behind = values.get(i + 1).copied();
+        let mean = match (before, behind) {
+            (Some(a), Some(b)) => 0.5 * a + 0.5 * b,
+            // One neighbour says less than two.
+            (Some(a), None) | (None, Some(a)) => return 0.75 * (values[i] - a).abs(),
+            (None, None) => 0.0,
+        };
+        (values[i] - mean).abs()
+    };
+    (0..values.len()).max_by(|&a, &b| oddness(a).total_cmp(&oddness(b)))
+}
+
+/// What concerns several cases of a group.
+fn of_group(
+    group: &str,
+    there: &[String],
+    listed_names: Option<Vec<String>>,
+    cases: &[Case],
+    list: &mut Vec<Finding>,
+) {
+    let mut add = |case: &str, code, message: String| {
+        Findings { group, case, list }.add(code, None, None, message);
+    };
+    for pair in cases.windows(2) {
+        if pair[0].speed == pair[1].speed && pair[0].parameters == pair[1].parameters {
+            let message = format!("has the same speed as {}", pair[0].name);
+            add(&pair[1].name, "equal_speeds", message);
+        }
+    }
+    if let Some(first) = cases.first() {
+        for case in cases.iter().filter(|case| case.speed.kind != first.speed.kind) {
+            let message = format!(
+                "has a {} speed, {} a {} speed: no model can be trained on both",
+                case.speed.kind.name(),
+                first.name,
+                first.speed.kind.name()
+            );
+            add(&case.name, "speed_kinds", message);
+        }
+    }
+    let names = listed_names.unwrap_or_default();
+    for name in names.iter().filter(|name| !there.contains(name)) {
+        add(name, "case_list", "is listed in the group's cases, but is not there".into());
+    }
+    for name in there.iter().filter(|name| !names.contains(name)) {
+        add(name, "case_list", "is not listed in the group's cases".into());
+    }
+    let in_list: Vec<&str> = names.iter().map(String::as_str).collect();
+    let by_speed: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+    if in_list.len() == by_speed.len() && in_list != by_speed {
+        let message = format!(
+            "the group's cases are listed as {}, by speed they are {}",
+            listed(in_list.into_iter()),
+            listed(by_speed.iter().copied())
+        );
+        add(by_speed[0], "case_order", message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_odd_value_is_found_anywhere() {
+        let smooth: Vec<f64> = (0..50).map(|i| f64::from(i) * 0.1).collect();
+        for i in [0, 1, 25, 48, 49] {
+            for odd in [1e300, -7.0] {
+                let mut values = smooth.clone();
+                values[i] = odd;
+                assert_eq!(least_like_neighbours(&values), Some(i));
+            }
+        }
+        assert_eq!(least_like_neighbours(&[]), None);
+    }
+}
