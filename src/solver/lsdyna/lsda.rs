@@ -166,7 +166,11 @@ pub fn walk(
                 let cut = resumed.is_none() && message.is_none();
                 each(match message {
                     None if cut => Event::Cut { at },
-                    message => Event::Damage { at, resumed, message: message.unwrap_or_default() },
+                    message => {
+                        let message =
+                            message.unwrap_or_else(|| "it is longer than the file".into());
+                        Event::Damage { at, resumed, message }
+                    }
                 });
                 let Some(resumed) = resumed else { return Ok(()) };
                 at = resumed;
