@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
+use crumple::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
 use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
@@ -203,23 +204,37 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
         output::table(out, &heading, &rows)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
-    if let Some(band) = &validation.band {
-        let coverage = match band.coverage {
-            Some(share) => {
-                format!("covers {} of the points of the others left out", percent(share))
-            }
-            None => "one curve cannot be checked against others".into(),
-        };
-        writeln!(
-            out,
-            "{group}: band ±{} of the local force, empirical range for {:.0} %, from {} curve{}; {coverage}",
-            percent(band.pointwise_share),
-            band.level * 100.0,
-            band.curves,
-            if band.curves == 1 { "" } else { "s" }
-        )?;
+    for band in [&validation.band, &validation.band_outside].into_iter().flatten() {
+        writeln!(out, "{group}: {}", band_line(band))?;
     }
     Ok(())
+}
+
+/// A band of the validation, with the span that it is stated for.
+fn band_line(band: &Band) -> String {
+    let span = km_per_h(band.span_m_per_s.unwrap_or_default());
+    let (of, place) = match band.left_out {
+        LeftOutSpeeds::Inner => (
+            "curve",
+            format!(
+                "in a gap of {span} between training speeds, in others by its power {POWER_OF_GAP}"
+            ),
+        ),
+        LeftOutSpeeds::Ends => {
+            ("end", format!("{span} outside the training speeds, elsewhere in proportion"))
+        }
+    };
+    let coverage = match band.coverage {
+        Some(share) => format!("covers {} of the points of the others left out", percent(share)),
+        None => format!("one {of} cannot be checked against others"),
+    };
+    format!(
+        "band ±{} of the local force {place}; empirical range for {:.0} %, from {} {of}{}; {coverage}",
+        percent(band.pointwise_share),
+        band.level * 100.0,
+        band.curves,
+        if band.curves == 1 { "" } else { "s" }
+    )
 }
 
 fn means(means: &Means, chosen: &str) -> Vec<String> {

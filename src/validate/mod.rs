@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::curve::rating::{l1_ratio, matched_peaks};
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{DatasetError, OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
-use crate::surrogate::band::{self, Band, Residuals};
+use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
@@ -151,17 +151,19 @@ pub fn validate(
         let model = options.name();
         let own: Vec<&Trial> = trials.iter().filter(|t| t.model == model).collect();
         let Some(rule) = best_rule(options, &own) else { continue };
-        let own_residuals: Vec<Residuals> =
-            own.iter().filter(|t| t.inner).filter_map(|t| t.residuals(rule)).collect();
-        let mut inner = 0;
         let mut own_rows = Vec::new();
+        let mut own_residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>> = BTreeMap::new();
         for trial in &own {
-            let Some(mut row) = trial.row(rule) else { continue };
-            if trial.inner {
-                row.coverage = band::coverage(&own_residuals, inner);
-                inner += 1;
-            }
+            let (Some(row), Some(of)) = (trial.row(rule), trial.residuals(rule)) else { continue };
             own_rows.push(row);
+            own_residuals.entry(trial.left_out()).or_default().push(of);
+        }
+        let mut index: BTreeMap<LeftOutSpeeds, usize> = BTreeMap::new();
+        for row in &mut own_rows {
+            let left_out = LeftOutSpeeds::of(row.inner);
+            let i = index.entry(left_out).or_default();
+            row.coverage = band::coverage(left_out, &own_residuals[&left_out], *i);
+            *i += 1;
         }
         means.extend(mean(model, rule, &own_rows));
         residuals.insert(model, own_residuals);
@@ -171,8 +173,12 @@ pub fn validate(
         Some(model) => (model.to_string(), "asked for".into()),
         None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
     };
-    let band = residuals.get(chosen.as_str()).and_then(|r| Band::of(r));
-    Ok(Validation { group: group.into(), chosen, reason, rows, means, floors, band, notes })
+    let band_of = |left_out: LeftOutSpeeds| {
+        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?)
+    };
+    let (band, band_outside) = (band_of(LeftOutSpeeds::Inner), band_of(LeftOutSpeeds::Ends));
+    let group = group.into();
+    Ok(Validation { group, chosen, reason, rows, means, floors, band, band_outside, notes })
 }
 
 /// Adds the rows and means of `auto` itself: with every inner speed left out, model and rule
@@ -231,7 +237,13 @@ pub fn query_of(case: &Case, model: &Model) -> Query {
     if let Some(other) = case.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
-    Query { mass_kg: Some(case.masses.body_kg), parameters, ..Query::at(case.speed.m_per_s) }
+    Query {
+        mass_kg: Some(case.masses.body_kg),
+        parameters,
+        // Ends that are left out are judged however far away the others lie.
+        extrapolate: true,
+        ..Query::at(case.speed.m_per_s)
+    }
 }
 
 /// A case that is left out, and what is left.
@@ -240,6 +252,8 @@ struct Held<'a> {
     case: &'a Case,
     rest: TrainingSet,
     inner: bool,
+    /// Over which it is predicted: the gap it leaves, or an end's distance to the others.
+    span_m_per_s: f64,
     reference: Reference,
 }
 
@@ -274,7 +288,12 @@ impl<'a> Held<'a> {
         let mut rest = set.clone();
         rest.cases.retain(|c| !is_same_speed(c.speed_m_per_s, v));
         let inner = speeds[0] < v && v < speeds[speeds.len() - 1];
-        Some(Self { own, case, rest, inner, reference })
+        let others = rest.speeds_m_per_s();
+        let span_m_per_s = match inner {
+            true => band::gap_m_per_s(&others, v)?,
+            false => band::distance_outside_m_per_s(&others, v),
+        };
+        Some(Self { own, case, rest, inner, span_m_per_s, reference })
     }
 
     /// FE's own curves in the multi-body model.
@@ -370,7 +389,8 @@ impl<'a> Held<'a> {
                 // Up to its first point a prediction rises from 0, which FE does not.
                 let first = curve.deflection_m[1];
                 let from = along.iter().position(|&d| d >= first).unwrap_or(0);
-                band::residuals(&reference, &predicted).split_off(from)
+                let ratios = band::ratios(&reference, &predicted).split_off(from);
+                Residuals { span_m_per_s: self.span_m_per_s, ratios }
             },
             body: driven(curve.driving_envelope()?)?,
             contact: match curve.body_force_n {
@@ -402,6 +422,10 @@ struct Trial {
 }
 
 impl Trial {
+    fn left_out(&self) -> LeftOutSpeeds {
+        LeftOutSpeeds::of(self.inner)
+    }
+
     fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
         Some(self.predictions.get(&rule)?.residuals.clone())
     }
