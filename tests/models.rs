@@ -709,6 +709,101 @@ fn validate_prints_and_tells_what_to_run_next() {
     assert!(String::from_utf8(output.stderr).unwrap().contains("there is no group \"x\""));
 }
 
+/// A database of made cases.
+fn database_of(path: &std::path::Path, groups: &[(&str, Vec<Case>)]) {
+    let mut database = Database::default();
+    for (group, cases) in groups {
+        for case in cases {
+            database.put(Case { group: (*group).into(), ..case.clone() }).unwrap();
+        }
+    }
+    database.write(path).unwrap();
+}
+
+/// No row goes missing without its reason.
+#[test]
+fn a_speed_without_an_answer_is_named() {
+    // Crush goes with the root of the speed, so the reference method's parabola through the three
+    // slower ones is far below 0 at 30 m/s.
+    let hardening = |d: f64, _: f64| 3e8 * d.powi(3);
+    let speeds = [3.0, 5.0, 6.0, 30.0];
+    let cases: Vec<Case> = speeds.map(|v| case(&format!("v{v}"), v, 8e3, &hardening)).to_vec();
+    let options = [Options::Nearest, Options::Linear, Options::Forest(ForestOptions::paper())];
+    let found = validate("made", &cases, &options, None).unwrap();
+    let mut missing = 0;
+    for options in &options {
+        for case in &cases {
+            let is_there = |r: &crumple::surrogate::leave_one_out::LeftOut| {
+                r.model == options.name() && r.case == case.name
+            };
+            let speed = format!("{} km/h", (case.speed.m_per_s * 360.0).round() / 100.0);
+            let said = format!("{} at {speed}: no row: ", options.name());
+            let noted = found.notes.iter().any(|n| n.starts_with(&said));
+            assert_ne!(found.rows.iter().any(is_there), noted, "{said}{:?}", found.notes);
+            missing += usize::from(noted);
+        }
+    }
+    assert_eq!(missing, 1, "{:?}", found.notes);
+    let said = found.notes.iter().find(|n| n.starts_with("forest at 108 km/h: no row: ")).unwrap();
+    assert!(said.contains("the maximal crush by the spline rule is -"), "{said}");
+}
+
+/// With three speeds there is nothing to choose by without one of them.
+#[test]
+fn nested_validation_says_why_it_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for n in [2, 3] {
+        database_of(&here.join("c.h5"), &[("made", family(&[8.0, 12.0, 16.0][..n]))]);
+        let output = crumple_in(here, &["validate", "c.h5", "--nested", "--strict", "--json"]);
+        assert_eq!(output.status.code(), Some(3));
+        let said = format!(
+            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {n}"
+        );
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains(&said), "{error}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let notes = report["groups"][0]["notes"].as_array().unwrap();
+        assert!(notes.contains(&said.into()), "{notes:?}");
+    }
+}
+
+/// Wall and closing speeds in one group: whoever uses the group says so, with cases.
+#[test]
+fn kinds_of_speed_in_one_group_are_named_by_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut mixed = family(&[8.0, 12.0, 16.0]);
+    mixed[1].speed.kind = SpeedKind::Closing;
+    mixed[1].masses.other_kg = Some(24e3);
+    database_of(&here.join("c.h5"), &[("good", family(&[8.0, 12.0, 16.0])), ("mixed", mixed)]);
+    let said = "cases \"v8\" and \"v12\" mix wall and closing speeds: keep one kind per group";
+    for command in [
+        &["validate", "c.h5", "--group", "mixed"][..],
+        &["compare", "c.h5", "--group", "mixed"],
+        &["train", "c.h5", "--group", "mixed", "-o", "m"],
+    ] {
+        assert!(crumple_fails(here, 1, command).contains(said), "{command:?}");
+    }
+    let list = crumple_in(here, &["db", "ls", "c.h5", "--strict"]);
+    assert_eq!(list.status.code(), Some(3));
+    let error = String::from_utf8(list.stderr).unwrap();
+    assert!(error.contains(&format!("group mixed: {said}")), "{error}");
+    let list: Value =
+        serde_json::from_str(&crumple_ok(here, &["db", "ls", "c.h5", "--json"])).unwrap();
+    assert_eq!(list["warnings"], serde_json::json!([format!("group mixed: {said}")]));
+    assert_eq!(list["groups"].as_object().unwrap().len(), 2);
+    // The other group is validated all the same.
+    let output = crumple_in(here, &["validate", "c.h5", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains(&format!("error: mixed: {said}")), "{error}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["groups"][0]["group"], "good");
+    assert!(!report["groups"][0]["rows"].as_array().unwrap().is_empty());
+    assert_eq!(report["groups"][1], serde_json::json!({"group": "mixed", "error": said}));
+}
+
 /// Starts at 0, pushes, and no point stands alone as none of a training curve does.
 #[test]
 fn predicted_curves_are_physically_sound() {
