@@ -435,9 +435,9 @@ fn items_that_fail_are_rows_with_their_reason() {
     assert!(error.contains("item 1: the mass of A1 is 0 kg: expected more than 0"), "{error}");
     let (_, rows) = rows(&folder.text("out.csv"));
     let status: Vec<&str> = rows.iter().map(|r| r[r.len() - 2].as_str()).collect();
-    // The whole ones end while the wall still brakes them.
+    // The others end while the trains still load each other.
     assert_eq!(status, ["warned", "failed", "warned", "failed", "failed", "failed"]);
-    assert!(rows[0].last().unwrap().contains("while the contact still loads A1"), "{rows:?}");
+    assert!(rows[0].last().unwrap().contains("while the contact still loads A2, A1, B1, B2"));
     let message = rows[3].last().unwrap();
     assert!(
         message.starts_with("train \"A\" at 36 km/h never meets what is in front"),
