@@ -258,6 +258,27 @@ pub fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
     speeds_m_per_s.enumerate().fold((0, f64::INFINITY), closer).0
 }
 
+/// Whether all cases have one kind of speed and of force.
+///
+/// # Errors
+/// [`DatasetError::Mixed`] names two that differ.
+pub fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Result<(), DatasetError> {
+    let mut cases = cases.into_iter();
+    let Some(first) = cases.next() else { return Ok(()) };
+    for other in cases {
+        let what = if first.speed.kind != other.speed.kind {
+            "wall and closing speeds"
+        } else if first.force_kind != other.force_kind {
+            "contact and body forces"
+        } else {
+            continue;
+        };
+        let (first, second) = (first.name.clone(), other.name.clone());
+        return Err(DatasetError::Mixed { first, second, what });
+    }
+    Ok(())
+}
+
 impl TrainingSet {
     /// Checks the cases of a group.
     ///
@@ -269,18 +290,8 @@ impl TrainingSet {
     ) -> Result<Self, DatasetError> {
         let mut cases: Vec<&Case> = cases.into_iter().collect();
         let first = *cases.first().ok_or(DatasetError::Empty)?;
+        of_one_kind(cases.iter().copied())?;
         cases.sort_by(|a, b| a.name.cmp(&b.name));
-        for other in &cases {
-            let mixed = if first.speed.kind != other.speed.kind {
-                "wall and closing speeds"
-            } else if first.force_kind != other.force_kind {
-                "contact and body forces"
-            } else {
-                continue;
-            };
-            let (first, second) = (first.name.clone(), other.name.clone());
-            return Err(DatasetError::Mixed { first, second, what: mixed });
-        }
         let features = features(&cases)?;
         let mut training = cases
             .iter()

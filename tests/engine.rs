@@ -537,7 +537,10 @@ fn warnings_and_errors_name_the_interface() {
     assert!(deflection_m > 0.2);
     assert_eq!(
         run.warnings,
-        [RunWarning::BeyondEnd { interface, what: "crushed", deflection_m, end_m: 0.2 }]
+        [
+            RunWarning::BeyondEnd { interface, what: "crushed", deflection_m, end_m: 0.2 },
+            RunWarning::StillLoaded { end_s: 0.15, bodies: "car".into() }
+        ]
     );
     let stiff = against_wall(Interface::new("buffer", linear(1e4 * MEGA), 0.0));
     match &simulate(&stiff, &long).unwrap().warnings[..] {

@@ -238,10 +238,7 @@ fn schemas_are_those_of_the_types() {
         ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
         ("plan.schema.json", schemars::schema_for!(crumple::plan::PlanFile)),
         ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
-        (
-            "validation.schema.json",
-            schemars::schema_for!(crumple::surrogate::leave_one_out::Validation),
-        ),
+        ("validation.schema.json", schemars::schema_for!(crumple::validate::Report)),
         ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
     ];
     for (name, schema) in schemas {

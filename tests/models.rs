@@ -105,8 +105,9 @@ fn databases() -> &'static Database {
     })
 }
 
+/// The curve at any speed, far outside the training speeds too.
 fn curve(model: &Model, v: f64) -> PredictedCurve {
-    predict(model, &Query::at(v)).unwrap()
+    predict(model, &Query { extrapolate: true, ..Query::at(v) }).unwrap()
 }
 
 /// The choice on the bundled FE runs, with the real candidates. The README's table, which a test
@@ -138,6 +139,135 @@ fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
             velocities.iter().sum::<f64>() / velocities.len() as f64
         };
         assert!(floor("body") < 0.01 && floor("contact") > 0.01, "{group}");
+    }
+}
+
+/// A query finds a narrower gap than the speeds that were left out, and its band is narrower;
+/// outside the training speeds it rests on the ends, and grows.
+#[test]
+fn the_band_knows_where_it_is() {
+    let speeds = [7.0, 10.0, 13.0, 17.0, 20.0];
+    // Beside the law a part that no model can know, alike at all speeds.
+    let cases: Vec<Case> = speeds
+        .map(|v| {
+            let odd = move |d: f64, u: f64| law(d, u) * (1.0 + 0.03 * (17.0 * d + v * v).sin());
+            case(&format!("v{v}"), v, 24e3, &odd)
+        })
+        .to_vec();
+    let model = train("made", &cases, Choice::Options(Options::Linear)).unwrap();
+    let validation = model.leave_one_out.as_ref().unwrap();
+    let (inner, ends) = (validation.band.unwrap(), validation.band_outside.unwrap());
+    assert_eq!((inner.curves, ends.curves), (3, 2));
+    // Left out, 10, 13 and 17 leave gaps of 6, 7 and 7; 7 and 20 lie 3 from the others.
+    assert!((inner.span_m_per_s.unwrap() - 20.0 / 3.0).abs() < 1e-12);
+    assert!((ends.span_m_per_s.unwrap() - 3.0).abs() < 1e-12);
+    let at = |v: f64| curve(&model, v).provenance.band.unwrap();
+    for (v, gap) in [(8.0, 3.0), (12.9, 3.0), (13.0, 4.0), (15.0, 4.0), (17.5, 3.0), (20.0, 3.0)] {
+        let expected = inner.pointwise_share * (gap * 3.0 / 20.0_f64).powf(0.65);
+        assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
+        assert_eq!(at(v).span_m_per_s, Some(gap));
+    }
+    let edge = at(20.0).pointwise_share;
+    for (v, distance) in [(6.0, 1.0), (22.0, 2.0), (24.0, 4.0), (60.0, 40.0)] {
+        let expected = (ends.pointwise_share * distance / 3.0).max(edge);
+        assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
+    }
+    // The drawn edges are those of the share.
+    let found = curve(&model, 24.0);
+    let low = found.force_low_n.as_ref().unwrap();
+    let near = curve(&model, 19.9);
+    let width = |c: &PredictedCurve, i: usize| {
+        (c.force_high_n.as_ref().unwrap()[i] - c.force_n[i]) / c.force_n[i]
+    };
+    assert!(low.iter().all(|f| *f >= 0.0) && width(&found, 200) > 2.0 * width(&near, 200));
+    // Other parameters than speed: nothing was left out outside of them.
+    let with_angle: Vec<Case> = cases
+        .iter()
+        .enumerate()
+        .map(|(i, c)| {
+            let mut c = c.clone();
+            c.parameters.insert("angle_deg".into(), Parameter::Number((i % 2) as f64 * 10.0));
+            c
+        })
+        .collect();
+    let model = train("made", &with_angle, Choice::Options(Options::Gp)).unwrap();
+    let ask = |angle: f64| {
+        let parameters = BTreeMap::from([("angle_deg".to_string(), Parameter::Number(angle))]);
+        predict(&model, &Query { parameters, ..Query::at(12.0) }).unwrap()
+    };
+    assert!(ask(5.0).provenance.band.is_some());
+    let outside = ask(20.0);
+    assert!(outside.provenance.band.is_none() && outside.force_low_n.is_none());
+    let said = outside.warnings.iter().find(|w| w.code.name() == "no_band").unwrap();
+    assert!(said.message.contains("outside the training cases' angle_deg"), "{said}");
+}
+
+/// 500 km/h of a model trained to 72 was answered as if it were 50.
+#[test]
+fn far_outside_the_training_speeds_nothing_is_answered_unasked() {
+    let model =
+        train("made", &family(&[10.0, 13.0, 16.0]), Choice::Options(Options::Rate)).unwrap();
+    // A third of the range is 2 m/s.
+    for (v, refused) in [(8.0, false), (7.99, true), (18.0, false), (18.01, true), (140.0, true)] {
+        let answer = predict(&model, &Query::at(v));
+        assert_eq!(answer.is_err(), refused, "{v}");
+        let asked = curve(&model, v);
+        let said = asked.warnings.iter().find(|w| w.code.name() == "out_of_range").unwrap();
+        assert_eq!(said.message.contains("more than a third of the range"), refused, "{said}");
+    }
+    let one = train("made", &family(&[10.0]), Choice::Options(Options::Nearest)).unwrap();
+    predict(&one, &Query::at(10.0)).unwrap();
+    let error = predict(&one, &Query::at(11.0)).unwrap_err().to_string();
+    assert!(
+        error.contains("39.6 km/h is 3.6 km/h from 36 km/h, the one training speed"),
+        "{error}"
+    );
+
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    crumple_ok(here, &["train", "curves.h5", "--group", "lead-car-wall", "-o", "m"]);
+    let far = ["predict", "m", "--speed", "500km/h", "-o", "far.csv"];
+    let error = crumple_fails(here, 1, &far);
+    assert!(
+        error.contains("500 km/h is 428 km/h above the highest training speed (")
+            && error.contains("further outside than a third of the range")
+            && error.contains("--extrapolate"),
+        "{error}"
+    );
+    assert!(!here.join("far.csv").exists());
+    let text = crumple_ok(here, &[&far[..], &["--extrapolate"]].concat());
+    assert!(
+        text.contains("outside the training speeds, from 2 ends of the range left out"),
+        "{text}"
+    );
+    let text = crumple_ok(here, &["predict", "m", "--speed", "50km/h"]);
+    assert!(text.contains("for 90 % between training speeds, from "), "{text}");
+}
+
+/// Their band holds nowhere in particular.
+#[test]
+fn bands_of_earlier_model_files_are_not_used() {
+    let model = train("made", &family(&[7.0, 10.0, 13.0]), Choice::Options(Options::Rate)).unwrap();
+    let mut json: Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
+    assert_eq!(json["version"], 3);
+    let path = std::path::Path::new("old.model");
+    let read = |json: &Value| Model::parse(path, &serde_json::to_vec(json).unwrap());
+    assert!(curve(&read(&json).unwrap(), 9.0).provenance.band.is_some());
+    json["version"] = 2.into();
+    let validation = json["leave_one_out"].as_object_mut().unwrap();
+    validation.remove("band_outside");
+    let band = validation["band"].as_object_mut().unwrap();
+    band.remove("span_m_per_s");
+    band.remove("left_out");
+    let old = curve(&read(&json).unwrap(), 9.0);
+    assert!(old.provenance.band.is_none() && old.force_low_n.is_none());
+    let said = old.warnings.iter().find(|w| w.code.name() == "no_band").unwrap();
+    assert!(said.message.contains("train the model again"), "{said}");
+    for damaged in [serde_json::json!(0.0), serde_json::json!(-1.0)] {
+        json["leave_one_out"]["band"]["span_m_per_s"] = damaged;
+        let error = read(&json).unwrap_err().to_string();
+        assert!(error.contains("the widths or the span of its band"), "{error}");
     }
 }
 
@@ -418,7 +548,7 @@ fn absurd_speeds_and_masses_end() {
     for options in all_options() {
         let model = train("made", &family(&[8.0, 12.0, 16.0]), Choice::Options(options)).unwrap();
         for (v, mass_kg) in [(1e-7, 24e3), (1e7, 24e3), (10.0, 1e-9), (10.0, 1e12)] {
-            let query = Query { mass_kg: Some(mass_kg), ..Query::at(v) };
+            let query = Query { mass_kg: Some(mass_kg), extrapolate: true, ..Query::at(v) };
             if let Ok(curve) = predict(&model, &query) {
                 assert!(!curve.warnings.is_empty());
                 assert!(curve.force_n.iter().all(|f| f.is_finite() && *f >= 0.0));
@@ -577,6 +707,101 @@ fn validate_prints_and_tells_what_to_run_next() {
     let output = crumple_in(here, &["validate", "curves.h5", "--group", "x"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stderr).unwrap().contains("there is no group \"x\""));
+}
+
+/// A database of made cases.
+fn database_of(path: &std::path::Path, groups: &[(&str, Vec<Case>)]) {
+    let mut database = Database::default();
+    for (group, cases) in groups {
+        for case in cases {
+            database.put(Case { group: (*group).into(), ..case.clone() }).unwrap();
+        }
+    }
+    database.write(path).unwrap();
+}
+
+/// No row goes missing without its reason.
+#[test]
+fn a_speed_without_an_answer_is_named() {
+    // Crush goes with the root of the speed, so the reference method's parabola through the three
+    // slower ones is far below 0 at 30 m/s.
+    let hardening = |d: f64, _: f64| 3e8 * d.powi(3);
+    let speeds = [3.0, 5.0, 6.0, 30.0];
+    let cases: Vec<Case> = speeds.map(|v| case(&format!("v{v}"), v, 8e3, &hardening)).to_vec();
+    let options = [Options::Nearest, Options::Linear, Options::Forest(ForestOptions::paper())];
+    let found = validate("made", &cases, &options, None).unwrap();
+    let mut missing = 0;
+    for options in &options {
+        for case in &cases {
+            let is_there = |r: &crumple::surrogate::leave_one_out::LeftOut| {
+                r.model == options.name() && r.case == case.name
+            };
+            let speed = format!("{} km/h", (case.speed.m_per_s * 360.0).round() / 100.0);
+            let said = format!("{} at {speed}: no row: ", options.name());
+            let noted = found.notes.iter().any(|n| n.starts_with(&said));
+            assert_ne!(found.rows.iter().any(is_there), noted, "{said}{:?}", found.notes);
+            missing += usize::from(noted);
+        }
+    }
+    assert_eq!(missing, 1, "{:?}", found.notes);
+    let said = found.notes.iter().find(|n| n.starts_with("forest at 108 km/h: no row: ")).unwrap();
+    assert!(said.contains("the maximal crush by the spline rule is -"), "{said}");
+}
+
+/// With three speeds there is nothing to choose by without one of them.
+#[test]
+fn nested_validation_says_why_it_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for n in [2, 3] {
+        database_of(&here.join("c.h5"), &[("made", family(&[8.0, 12.0, 16.0][..n]))]);
+        let output = crumple_in(here, &["validate", "c.h5", "--nested", "--strict", "--json"]);
+        assert_eq!(output.status.code(), Some(3));
+        let said = format!(
+            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {n}"
+        );
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains(&said), "{error}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let notes = report["groups"][0]["notes"].as_array().unwrap();
+        assert!(notes.contains(&said.into()), "{notes:?}");
+    }
+}
+
+/// Wall and closing speeds in one group: whoever uses the group says so, with cases.
+#[test]
+fn kinds_of_speed_in_one_group_are_named_by_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut mixed = family(&[8.0, 12.0, 16.0]);
+    mixed[1].speed.kind = SpeedKind::Closing;
+    mixed[1].masses.other_kg = Some(24e3);
+    database_of(&here.join("c.h5"), &[("good", family(&[8.0, 12.0, 16.0])), ("mixed", mixed)]);
+    let said = "cases \"v8\" and \"v12\" mix wall and closing speeds: keep one kind per group";
+    for command in [
+        &["validate", "c.h5", "--group", "mixed"][..],
+        &["compare", "c.h5", "--group", "mixed"],
+        &["train", "c.h5", "--group", "mixed", "-o", "m"],
+    ] {
+        assert!(crumple_fails(here, 1, command).contains(said), "{command:?}");
+    }
+    let list = crumple_in(here, &["db", "ls", "c.h5", "--strict"]);
+    assert_eq!(list.status.code(), Some(3));
+    let error = String::from_utf8(list.stderr).unwrap();
+    assert!(error.contains(&format!("group mixed: {said}")), "{error}");
+    let list: Value =
+        serde_json::from_str(&crumple_ok(here, &["db", "ls", "c.h5", "--json"])).unwrap();
+    assert_eq!(list["warnings"], serde_json::json!([format!("group mixed: {said}")]));
+    assert_eq!(list["groups"].as_object().unwrap().len(), 2);
+    // The other group is validated all the same.
+    let output = crumple_in(here, &["validate", "c.h5", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains(&format!("error: mixed: {said}")), "{error}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["groups"][0]["group"], "good");
+    assert!(!report["groups"][0]["rows"].as_array().unwrap().is_empty());
+    assert_eq!(report["groups"][1], serde_json::json!({"group": "mixed", "error": said}));
 }
 
 /// Starts at 0, pushes, and no point stands alone as none of a training curve does.

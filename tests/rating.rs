@@ -45,6 +45,25 @@ fn assert_close(value: &Value, expected: f64, tolerance: f64) {
     assert!((value - expected).abs() < tolerance, "{value} against {expected}");
 }
 
+/// What ends in the pulse has the mean of a part of it.
+#[test]
+fn signals_that_end_while_decelerated_are_said() {
+    let folder = folder();
+    let both = [&["a.csv", "b.csv"][..], &COLUMNS].concat();
+    for (to, is_cut) in [("60ms", true), ("190ms", false)] {
+        let of = rate(folder.path(), &[&both[..], &["--to", to]].concat());
+        let warnings = of["warnings"].as_array().unwrap();
+        for who in ["reference", "prediction"] {
+            assert_eq!(of["deceleration"][who]["is_cut"], is_cut, "{who} to {to}");
+            let said = format!("the {who} is still decelerated at 0.06 s, where the interval ends");
+            let is_said = warnings.iter().any(|w| w.as_str().unwrap().starts_with(&said));
+            assert_eq!(is_said, is_cut, "{warnings:?}");
+        }
+    }
+    let all = [&["rate"], &both[..], &["--to", "60ms", "--strict"]].concat();
+    assert!(crumple_fails(folder.path(), 3, &all).contains("still decelerated"));
+}
+
 #[test]
 fn a_scaled_acceleration_by_hand() {
     let folder = folder();

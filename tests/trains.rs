@@ -329,6 +329,39 @@ fn mean_decelerations_are_those_of_the_histories() {
     assert!((g - 10.7).abs() < 0.5, "{g} g from 50 km/h");
 }
 
+/// A run that is too short for its mean deceleration says so, by every method.
+#[test]
+fn a_run_that_ends_while_loading_is_said() {
+    let nose =
+        "nose = { stages = [ { stroke = \"2m\", from = \"1MN\" } ], unloading = \"80MN/m\" }";
+    let cars = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]\n[wall]";
+    for method in ["verlet", "fourth_order", "reference"] {
+        let at = |duration: &str| {
+            let text = scenario(nose, cars, "").replace("300ms", duration);
+            run(&text.replace("[curves]", &format!("method = \"{method}\"\n[curves]")))
+        };
+        // 10 m/s end after 240 ms at 1 MN, and 3 ms more of unloading.
+        for (duration, is_cut) in [("30ms", true), ("239.25ms", true), ("300ms", false)] {
+            let result = at(duration);
+            let body = &result["summary"]["bodies"][0];
+            assert_eq!(body["still_loaded_at_end"], is_cut, "{method} {duration}: {body}");
+            let said = format!(
+                "the run ends at {} s while the contact still loads A1",
+                duration.trim_end_matches("ms").parse::<f64>().unwrap() / 1e3
+            );
+            let warnings = result["warnings"].as_array().unwrap();
+            let is_said = warnings.iter().any(|w| w.as_str().unwrap().starts_with(&said));
+            assert_eq!(is_said, is_cut, "{method} {duration}: {warnings:?}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let text = scenario(nose, cars, "").replace("300ms", "30ms");
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    crumple_fails(folder.path(), 3, &["simulate", "s.toml", "--strict"]);
+    let text = crumple_ok(folder.path(), &["simulate", "s.toml", "-q"]);
+    assert!(text.contains(" g so far"), "{text}");
+}
+
 /// No command writes over what its scenario reads.
 #[test]
 fn inputs_of_a_scenario_are_kept() {

@@ -294,13 +294,13 @@ fn files_that_are_not_ours() {
     );
     fs::write(
         here.join("m2.model"),
-        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":2", "\"version\":9"),
+        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":3", "\"version\":9"),
     )
     .unwrap();
     t(
         here,
         &["predict", "m2.model", "--speed", "50km/h"],
-        "version 9 is newer than this program reads (2)",
+        "version 9 is newer than this program reads (3)",
     );
 }
 

@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::arguments;
 use super::output;
+use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome};
 
 /// Compare FE with FDRM, NSDM, DDTCM and the best model, each in the same multi-body model
@@ -105,10 +106,13 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         Some(speed) => vec![speed],
         None => compare::inner_speeds(group, cases)?,
     };
+    let bar = Bar::new(manners, "comparing");
     let mut comparisons = Vec::new();
     for speed in speeds {
+        bar.step(&format!("comparing at {}", km_per_h(speed)));
         comparisons.push(compare::compare(group, cases, speed, &settings)?);
     }
+    bar.end();
     let inner = comparisons.iter().all(|c| c.inner);
     if !inner {
         manners.warn("the left-out speed is an end of the range: the models extrapolate");
@@ -282,7 +286,9 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
 /// `compare --train`.
 fn train(path: &Path, settings: &Settings, manners: Manners) -> CommandResult {
     let scenario = scenario::read(path)?;
+    let bar = Bar::new(manners, "comparing in the train");
     let comparison = compare_train(path, &scenario, settings)?;
+    bar.end();
     let mut warned = false;
     for row in &comparison.rows {
         for warning in &row.warnings {

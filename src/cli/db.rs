@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crumple::curve::{Case, Parameter, Source};
 use crumple::database::Database;
 use crumple::database::check::{self, Checked};
+use crumple::dataset::of_one_kind;
 use crumple::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
 
@@ -188,17 +189,26 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
 #[derive(Serialize)]
 struct Groups<T> {
     groups: BTreeMap<String, Vec<T>>,
+    /// What no command can use a group for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<String>,
 }
 
 fn ls(database: &Database, manners: Manners) -> CommandResult {
     let rows = |group: &str| database.cases(group).iter().map(CaseRow::of).collect::<Vec<_>>();
+    let mixed = |g: &str| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
+    let warnings: Vec<String> = database.groups().filter_map(mixed).collect();
+    for warning in &warnings {
+        manners.warn(warning);
+    }
+    let outcome = if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned };
     if manners.json {
         let groups = database.groups().map(|g| (g.to_string(), rows(g))).collect();
-        output::print_json(&Groups { groups })?;
-        return Ok(Outcome::Clean);
+        output::print_json(&Groups { groups, warnings })?;
+    } else {
+        output::print(|out| database.groups().try_for_each(|g| print_group(out, g, &rows(g))))?;
     }
-    output::print(|out| database.groups().try_for_each(|g| print_group(out, g, &rows(g))))?;
-    Ok(Outcome::Clean)
+    Ok(outcome)
 }
 
 fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
@@ -218,7 +228,7 @@ fn show(shown: &BTreeMap<String, Vec<&Case>>, manners: Manners) -> CommandResult
                 Ok((group.clone(), cases?))
             })
             .collect::<Result<_, Failure>>()?;
-        output::print_json(&Groups { groups })?;
+        output::print_json(&Groups { groups, warnings: Vec::new() })?;
         return Ok(Outcome::Clean);
     }
     output::print(|out| {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
+use crumple::surrogate::band::{Band, LeftOutSpeeds};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, PredictedCurve, Query, predict};
 use crumple::unit::km_per_h;
@@ -40,6 +41,9 @@ pub struct Args {
     /// Scale the force so that the curve takes up the impact's kinetic energy (by 0.8 to 1.25)
     #[arg(long)]
     energy_correct: bool,
+    /// Answer further outside the training speeds than a third of their range
+    #[arg(long)]
+    extrapolate: bool,
     /// File to write, its format told by the extension or by --to; may be repeated
     #[arg(short, long)]
     output: Vec<PathBuf>,
@@ -69,6 +73,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         rule,
         parameters: args.parameter.iter().cloned().collect(),
         energy_correct: args.energy_correct,
+        extrapolate: args.extrapolate,
     };
     let curve = predict(&model, &query)?;
     // All files are encoded before the first is written.
@@ -93,6 +98,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         })?;
     }
     Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+/// Where a band's curve lies, and what the band comes from.
+fn rests_on(band: &Band, in_range: bool) -> String {
+    let place = if in_range { "between training speeds" } else { "outside the training speeds" };
+    let s = if band.curves == 1 { "" } else { "s" };
+    let speeds = match band.left_out {
+        LeftOutSpeeds::Inner => "curve{s} left out between others, for the width of the gap here",
+        LeftOutSpeeds::Ends => "end{s} of the range left out, growing with the distance",
+    };
+    format!("{place}, from {} {}", band.curves, speeds.replace("{s}", s))
 }
 
 fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
@@ -149,10 +165,10 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     if let Some(band) = &provenance.band {
         writeln!(
             out,
-            "  band                 ±{:.1} % of the local force: empirical range for {:.0} %, from {} curves that were left out",
+            "  band                 ±{:.1} % of the local force: empirical range for {:.0} % {}",
             band.pointwise_share * 100.0,
             band.level * 100.0,
-            band.curves
+            rests_on(band, provenance.in_range)
         )?;
     }
     writeln!(

@@ -27,8 +27,13 @@ impl Bar {
         }
     }
 
-    pub fn end(self) {
-        if let Some(bar) = self.0 {
+    pub fn end(self) {}
+}
+
+/// Also where an error ends the work.
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
     }

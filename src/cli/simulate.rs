@@ -59,6 +59,8 @@ struct BodySummary {
     final_v_m_per_s: f64,
     mean_deceleration_m_per_s2: f64,
     mean_deceleration_g: f64,
+    /// The run ended before the contact of that mean did: it is the mean of a part.
+    still_loaded_at_end: bool,
     /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
     moving_mean_deceleration_g: Option<f64>,
 }
@@ -208,6 +210,7 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
         final_v_m_per_s: run.bodies[i].final_v_m_per_s,
         mean_deceleration_m_per_s2: run.bodies[i].mean_deceleration_m_per_s2,
         mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
+        still_loaded_at_end: run.bodies[i].is_loaded_at_end,
         moving_mean_deceleration_g: run.bodies[i]
             .moving_mean_deceleration_m_per_s2
             .map(|a| a / STANDARD_GRAVITY_M_PER_S2),
@@ -283,7 +286,11 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
             vec![
                 b.name.clone(),
                 format!("{:.6} m/s", b.final_v_m_per_s),
-                format!("{:.4} g", b.mean_deceleration_g),
+                format!(
+                    "{:.4} g{}",
+                    b.mean_deceleration_g,
+                    if b.still_loaded_at_end { " so far" } else { "" }
+                ),
                 b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.4} g")),
             ]
         })

@@ -13,6 +13,7 @@ use crumple::validate::{self, Choice};
 use serde::Serialize;
 
 use super::output;
+use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome, keep_input};
 
 /// Fit a model to the curves of a group and save it
@@ -166,7 +167,10 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     keep_input(&args.database, &args.output)?;
     let database = Database::read(&args.database)?;
     let (group, cases) = database.group_or_only(&args.database, args.group.as_deref())?;
+    let bar = Bar::new(manners, "training");
+    bar.step(&format!("training {group}, with every speed left out"));
     let model = validate::train(group, cases, choice)?;
+    bar.end();
     model.write(&args.output)?;
     let truncated: Vec<&str> =
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();

@@ -3,16 +3,18 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
+use crumple::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
 use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
 use crumple::validate::choose::{NextRun, next_run};
-use crumple::validate::{add_nested, candidates, validate};
-use serde::Serialize;
+use crumple::validate::{GroupReport, Report, ValidateError, add_nested, candidates, validate};
 
 use super::output;
+use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome};
 
 /// Leave every speed out in turn, predict it by every model, and compare with FE
@@ -45,19 +47,6 @@ pub struct Args {
     seed: u64,
 }
 
-#[derive(Serialize)]
-struct Document {
-    groups: Vec<GroupDocument>,
-}
-
-#[derive(Serialize)]
-struct GroupDocument {
-    #[serde(flatten)]
-    validation: Validation,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    next_run: Option<NextRun>,
-}
-
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let database = Database::read(&args.database)?;
     let groups: Vec<&str> = match &args.group {
@@ -70,45 +59,74 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             args.database.display()
         )));
     }
-    let mut document = Document { groups: Vec::new() };
-    for group in groups {
+    let bar = Bar::new(manners, "validating");
+    let mut report = Report { groups: Vec::new() };
+    let mut outcome = Outcome::Clean;
+    for &group in &groups {
+        bar.step(&format!("validating {group}"));
         let cases = database.group(&args.database, group)?;
-        let mut validation = validate(group, cases, &candidates(args.seed), None)?;
-        if args.nested {
-            add_nested(&mut validation, cases, args.seed)?;
-        }
-        let next_run = match args.next {
-            true => {
-                let next = next_run(&TrainingSet::new(group, cases)?, &validation);
-                if next.is_none() {
-                    manners.warn(&format!(
-                        "{group}: there is no gap to run in: a second speed, far from the first, comes first"
-                    ));
+        report.groups.push(match validated(args, group, cases) {
+            Ok((validation, next_run)) => {
+                if !validation.notes.is_empty() && outcome == Outcome::Clean {
+                    outcome = Outcome::Warned;
                 }
-                next
+                GroupReport::Validated { validation: Box::new(validation), next_run }
             }
-            false => None,
-        };
-        for note in &validation.notes {
-            manners.warn(&format!("{group}: {note}"));
-        }
-        document.groups.push(GroupDocument { validation, next_run });
+            Err(error) if groups.len() == 1 => return Err(error.into()),
+            // The others can be validated all the same.
+            Err(error) => {
+                outcome = Outcome::Partly;
+                GroupReport::Failed { group: group.into(), error: error.to_string() }
+            }
+        });
     }
-    let warned = document.groups.iter().any(|g| !g.validation.notes.is_empty());
+    bar.end();
+    for group in &report.groups {
+        match group {
+            GroupReport::Validated { validation, .. } => {
+                for note in &validation.notes {
+                    manners.warn(&format!("{}: {note}", validation.group));
+                }
+            }
+            GroupReport::Failed { group, error } => eprintln!("error: {group}: {error}"),
+        }
+    }
     if manners.json {
-        output::print_json(&document)?;
+        output::print_json(&report)?;
     } else {
         output::print(|out| {
-            for (i, group) in document.groups.iter().enumerate() {
-                if i > 0 {
+            let mut first = true;
+            for group in &report.groups {
+                let GroupReport::Validated { validation, next_run } = group else { continue };
+                if !std::mem::take(&mut first) {
                     writeln!(out)?;
                 }
-                print_group(out, group)?;
+                print_group(out, validation, next_run.as_ref())?;
             }
             Ok(())
         })?;
     }
-    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+    Ok(outcome)
+}
+
+fn validated(
+    args: &Args,
+    group: &str,
+    cases: &[Case],
+) -> Result<(Validation, Option<NextRun>), ValidateError> {
+    let mut validation = validate(group, cases, &candidates(args.seed), None)?;
+    if args.nested {
+        add_nested(&mut validation, cases, args.seed)?;
+    }
+    let mut next = None;
+    if args.next {
+        next = next_run(&TrainingSet::new(group, cases)?, &validation);
+        if next.is_none() {
+            let note = "there is no gap to run in: a second speed, far from the first, comes first";
+            validation.notes.push(note.into());
+        }
+    }
+    Ok((validation, next))
 }
 
 fn percent(error: f64) -> String {
@@ -119,8 +137,11 @@ fn signed(error: f64) -> String {
     format!("{:+.1} %", error * 100.0)
 }
 
-fn print_group(out: &mut dyn Write, group: &GroupDocument) -> io::Result<()> {
-    let validation = &group.validation;
+fn print_group(
+    out: &mut dyn Write,
+    validation: &Validation,
+    next: Option<&NextRun>,
+) -> io::Result<()> {
     print_means(out, validation)?;
     for (inner, title) in [
         (true, "every inner speed left out"),
@@ -142,7 +163,7 @@ fn print_group(out: &mut dyn Write, group: &GroupDocument) -> io::Result<()> {
             output::table(out, &heading, &rows)?;
         }
     }
-    match &group.next_run {
+    match next {
         Some(next) => {
             writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)
         }
@@ -203,23 +224,37 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
         output::table(out, &heading, &rows)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
-    if let Some(band) = &validation.band {
-        let coverage = match band.coverage {
-            Some(share) => {
-                format!("covers {} of the points of the others left out", percent(share))
-            }
-            None => "one curve cannot be checked against others".into(),
-        };
-        writeln!(
-            out,
-            "{group}: band ±{} of the local force, empirical range for {:.0} %, from {} curve{}; {coverage}",
-            percent(band.pointwise_share),
-            band.level * 100.0,
-            band.curves,
-            if band.curves == 1 { "" } else { "s" }
-        )?;
+    for band in [&validation.band, &validation.band_outside].into_iter().flatten() {
+        writeln!(out, "{group}: {}", band_line(band))?;
     }
     Ok(())
+}
+
+/// A band of the validation, with the span that it is stated for.
+fn band_line(band: &Band) -> String {
+    let span = km_per_h(band.span_m_per_s.unwrap_or_default());
+    let (of, place) = match band.left_out {
+        LeftOutSpeeds::Inner => (
+            "curve",
+            format!(
+                "in a gap of {span} between training speeds, in others by its power {POWER_OF_GAP}"
+            ),
+        ),
+        LeftOutSpeeds::Ends => {
+            ("end", format!("{span} outside the training speeds, elsewhere in proportion"))
+        }
+    };
+    let coverage = match band.coverage {
+        Some(share) => format!("covers {} of the points of the others left out", percent(share)),
+        None => format!("one {of} cannot be checked against others"),
+    };
+    format!(
+        "band ±{} of the local force {place}; empirical range for {:.0} %, from {} {of}{}; {coverage}",
+        percent(band.pointwise_share),
+        band.level * 100.0,
+        band.curves,
+        if band.curves == 1 { "" } else { "s" }
+    )
 }
 
 fn means(means: &Means, chosen: &str) -> Vec<String> {

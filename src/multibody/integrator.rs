@@ -107,6 +107,8 @@ pub struct BodyHistory {
     /// changes its sign. Up to 1 kN, longer than a look of 0.25 ms, it does not act; contacts that
     /// change the speed by less than 0.5 % of the largest change do not count.
     pub mean_deceleration_m_per_s2: f64,
+    /// That net contact force still acts when the run ends: the mean is of a part.
+    pub is_loaded_at_end: bool,
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,
@@ -159,6 +161,10 @@ pub enum RunWarning {
         "interface {interface} is {what} {deflection_m:.4} m, beyond the end of its curve at {end_m:.4} m"
     )]
     BeyondEnd { interface: String, what: &'static str, deflection_m: f64, end_m: f64 },
+    #[error(
+        "the run ends at {end_s} s while the contact still loads {bodies}: the mean deceleration is that up to there, and what comes may be more; lengthen duration"
+    )]
+    StillLoaded { end_s: f64, bodies: String },
 }
 
 /// Why a run has no result.
@@ -247,6 +253,14 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
                 run.warnings.push(RunWarning::BeyondEnd { interface, what, deflection_m, end_m });
             }
         }
+    }
+    let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| b.is_loaded_at_end);
+    let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
+    if !bodies.is_empty() {
+        let end_s = outputs as f64 * settings.output_interval_s;
+        // Without the rounding of a product.
+        let (end_s, bodies) = ((end_s * 1e9).round() / 1e9, bodies.join(", "));
+        run.warnings.push(RunWarning::StillLoaded { end_s, bodies });
     }
     Ok(run)
 }

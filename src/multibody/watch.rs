@@ -61,6 +61,8 @@ struct Span {
     sign: f64,
     /// The force was too small to count at the last look.
     fades: bool,
+    /// The run ended before the force did.
+    is_cut: bool,
 }
 
 #[derive(Clone, Default)]
@@ -301,8 +303,12 @@ impl Watch {
         for i in 0..self.bodies.len() {
             let place = self.places.of(i);
             let mut end = (self.present.time_s, self.present.v[place]);
-            if let Some(span) = self.bodies[i].open.filter(|span| span.fades) {
-                end = (span.end_s, span.end_v);
+            if let Some(span) = &mut self.bodies[i].open {
+                // A force that was never looked at is none that counts.
+                span.is_cut = !span.fades && span.sign != 0.0;
+                if span.fades {
+                    end = (span.end_s, span.end_v);
+                }
             }
             self.close_span(i, place, end.0, end.1);
             run.bodies[i].final_v_m_per_s = self.present.v[place];
@@ -326,7 +332,10 @@ impl Watch {
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
             }
-            history.mean_deceleration_m_per_s2 = phase.mean_deceleration();
+            if let Some(contact) = phase.first() {
+                history.mean_deceleration_m_per_s2 = contact.mean_deceleration();
+                history.is_loaded_at_end = contact.is_cut;
+            }
         }
     }
 }
@@ -335,6 +344,10 @@ impl Span {
     /// Magnitude of the change of speed.
     fn change(&self) -> f64 {
         (self.begin_v - self.end_v).abs()
+    }
+
+    fn mean_deceleration(&self) -> f64 {
+        (self.begin_v - self.end_v) / (self.end_s - self.begin_s)
     }
 }
 
@@ -352,12 +365,9 @@ impl Phase {
         span.change() >= LEAST_SHARE * self.most && span.end_s > span.begin_s
     }
 
-    /// Over the first contact that counts; 0 without one.
-    fn mean_deceleration(&self) -> f64 {
-        self.closed
-            .iter()
-            .find(|span| self.counts(span))
-            .map_or(0.0, |s| (s.begin_v - s.end_v) / (s.end_s - s.begin_s))
+    /// The first contact that counts.
+    fn first(&self) -> Option<&Span> {
+        self.closed.iter().find(|span| self.counts(span))
     }
 }
 

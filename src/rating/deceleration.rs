@@ -21,6 +21,9 @@ pub struct Deceleration {
     pub from_s: Option<f64>,
     /// Time at which it ends, in s.
     pub to_s: Option<f64>,
+    /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean is then
+    /// of a part of the deceleration.
+    pub is_cut: bool,
     /// Largest mean of −a over 120 ms; null if the interval is shorter.
     pub largest_120ms_mean: Option<f64>,
 }
@@ -37,6 +40,7 @@ impl Deceleration {
             mean: phase.map(|p| p.mean),
             from_s: phase.map(|p| p.from_s),
             to_s: phase.map(|p| p.to_s),
+            is_cut: phase.is_some_and(|p| p.is_cut),
             largest_120ms_mean: largest_moving_mean(time_s, &deceleration, MOVING_MEAN_S),
         }
     }
@@ -47,6 +51,7 @@ struct Phase {
     mean: f64,
     from_s: f64,
     to_s: f64,
+    is_cut: bool,
 }
 
 fn phase(time_s: &[f64], deceleration: &[f64]) -> Option<Phase> {
@@ -67,7 +72,8 @@ fn phase(time_s: &[f64], deceleration: &[f64]) -> Option<Phase> {
     }
     let from_s = time_s[first];
     let mean = if to_s > from_s { area / (to_s - from_s) } else { deceleration[first] };
-    Some(Phase { mean, from_s, to_s })
+    let is_cut = after == deceleration.len() && above(&deceleration[last]);
+    Some(Phase { mean, from_s, to_s, is_cut })
 }
 
 /// Largest mean of `values` over any `length_s` that begins at a sample; equal intervals.
@@ -125,6 +131,15 @@ mod tests {
         assert!((of.mean.unwrap() - (3.0 + 3.0 + 0.5) / 2.5).abs() < 1e-12);
         assert!((of.to_s.unwrap() - 3.5e-3).abs() < 1e-12);
         assert_eq!(of.largest_120ms_mean, None);
+    }
+
+    #[test]
+    fn an_interval_that_ends_in_the_pulse_is_said() {
+        let cut = |a: &[f64]| Deceleration::of(&times(a.len()), a).is_cut;
+        assert!(cut(&[0.0, -2.0, -40.0, -20.0]));
+        assert!(!cut(&[0.0, -2.0, -40.0, -20.0, 1.0]));
+        assert!(!cut(&[0.0, -2.0, -40.0, -1.9]), "what remains is below 5 %");
+        assert!(!cut(&[0.0, -40.0, 1.0, -40.0]), "a second pulse is not in the mean");
     }
 
     #[test]

@@ -234,6 +234,12 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &Settings) -> Vec<Stri
                 "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the other sign"
             ));
         }
+        if of.is_cut {
+            warnings.push(format!(
+                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration is that up to there",
+                rating.to_s
+            ));
+        }
     }
     warnings
 }

@@ -116,6 +116,9 @@ fn from_model(
         mass_kg: Some(slot.mass_kg),
         rule: table.max_crush,
         parameters: table.parameters.clone(),
+        // Inside a train interfaces close far more slowly than any run by itself; that is warned
+        // of, but a train without their curves could not run at all.
+        extrapolate: true,
         ..Query::at(speed_m_per_s)
     };
     let driven = match force {

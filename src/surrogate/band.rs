@@ -3,15 +3,54 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::is_same_speed;
+
 /// The level that bands are made for.
 pub const LEVEL: f64 = 0.9;
 /// Half width, as a share of the curve's end, over which the force's level is averaged.
 const WINDOW: f64 = 0.05;
+/// Between training speeds errors grow with this power of the gap.
+pub const POWER_OF_GAP: f64 = 0.65;
+/// Bands wider than this are damage, not measurement.
+const WIDEST: f64 = 1e6;
+
+/// The left-out speeds that a band rests on.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum LeftOutSpeeds {
+    /// Speeds between others: they tell of queries between training speeds.
+    #[default]
+    Inner,
+    /// The lowest and the highest: they tell of queries outside the training speeds.
+    Ends,
+}
+
+impl LeftOutSpeeds {
+    /// Those of a speed that lies between others, or does not.
+    pub fn of(inner: bool) -> Self {
+        if inner { Self::Inner } else { Self::Ends }
+    }
+
+    /// Power of the span with which errors grow.
+    ///
+    /// Between training speeds a curve twice as far apart from its neighbours is not twice as
+    /// wrong, since part of what a fold does has nothing to do with the distance. Nothing holds a
+    /// curve outside of them, so there the error grows in proportion.
+    fn power(self) -> f64 {
+        match self {
+            Self::Inner => POWER_OF_GAP,
+            Self::Ends => 1.0,
+        }
+    }
+}
 
 /// An empirical range around a predicted force, from the residuals of left-out speeds.
 ///
-/// Residuals are taken in ratio to the local level of the force. With a handful of curves no
-/// level can be guaranteed; the range is the one that a further residual of the same kind
+/// Residuals are taken in ratio to the local level of the force, and to the span over which each
+/// was predicted: a left-out speed opens a wider gap than a query finds. With a handful of curves
+/// no level can be guaranteed; the range is the one that a further residual of the same kind
 /// would keep to: their root mean square times Student's t for as many curves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Band {
@@ -19,23 +58,63 @@ pub struct Band {
     pub level: f64,
     /// Left-out curves it rests on.
     pub curves: usize,
+    /// Which speeds these were.
+    #[serde(default)]
+    pub left_out: LeftOutSpeeds,
+    /// What the half widths below hold for. `inner`: distance of the two training speeds that a
+    /// query lies between, and the widths go with its power 0.65; `ends`: distance to the
+    /// nearest training speed, and they are in proportion to it. Absent in files of earlier
+    /// versions, whose widths hold nowhere in particular.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub span_m_per_s: Option<f64>,
     /// Half width at any one deflection, as a share of the local level of the force.
     pub pointwise_share: f64,
     /// Half width that the whole curve keeps to.
     pub simultaneous_share: f64,
-    /// Share of the left-out points inside the band that the other curves give; `None` with
-    /// fewer than two curves.
+    /// Share of the left-out points inside the band that the other curves give over the same
+    /// span; `None` with fewer than two curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
 }
 
 /// Residuals of one left-out curve in ratio to the local level of the prediction.
-pub type Residuals = Vec<f64>;
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residuals {
+    /// Over which it was predicted, as of [`Band::span_m_per_s`].
+    pub span_m_per_s: f64,
+    pub ratios: Vec<f64>,
+}
 
-/// The residuals `(FE − prediction) / level` at even deflections.
-pub fn residuals(reference_n: &[f64], predicted_n: &[f64]) -> Residuals {
-    let residual = |((r, p), level): ((&f64, &f64), f64)| (r - p) / level;
-    reference_n.iter().zip(predicted_n).zip(level(predicted_n)).map(residual).collect()
+/// The ratios `(FE − prediction) / level` at even deflections.
+pub fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
+    let ratio = |((r, p), level): ((&f64, &f64), f64)| (r - p) / level;
+    reference_n.iter().zip(predicted_n).zip(level(predicted_n)).map(ratio).collect()
+}
+
+/// Distance of the two neighbouring training speeds that `v` lies between, of the outermost two
+/// outside of all; `None` for fewer than two speeds. `speeds` do not fall.
+///
+/// At a training speed it is the wider of the gaps that end there: left-out speeds lie in the
+/// middle of their gaps and do not tell how fast the error falls towards the ends of one.
+pub fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
+    let mut speeds = speeds.to_vec();
+    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    let gaps = || speeds.windows(2);
+    let width = |gap: &[f64]| gap[1] - gap[0];
+    let is_around = |gap: &&[f64]| {
+        (gap[0] <= v || is_same_speed(gap[0], v)) && (v <= gap[1] || is_same_speed(gap[1], v))
+    };
+    let outermost = if v < *speeds.first()? { gaps().next() } else { gaps().next_back() };
+    gaps().filter(is_around).map(width).reduce(f64::max).or(outermost.map(width))
+}
+
+/// How far `v` lies outside of training speeds, which do not fall; 0 between them.
+pub fn distance_outside_m_per_s(speeds: &[f64], v: f64) -> f64 {
+    let (Some(&low), Some(&high)) = (speeds.first(), speeds.last()) else { return 0.0 };
+    match is_same_speed(low, v) || is_same_speed(high, v) {
+        true => 0.0,
+        false => (low - v).max(v - high).max(0.0),
+    }
 }
 
 /// Local level of a force at even deflections: its mean over ±5 % of the curve.
@@ -53,29 +132,59 @@ fn level(force_n: &[f64]) -> Vec<f64> {
 
 impl Band {
     /// The band that left-out curves give; `None` without any.
-    pub fn of(curves: &[Residuals]) -> Option<Self> {
-        let mut band = Self::without_coverage(&curves.iter().collect::<Vec<_>>())?;
-        let covered: Vec<f64> = (0..curves.len()).filter_map(|i| coverage(curves, i)).collect();
+    pub fn of(left_out: LeftOutSpeeds, curves: &[Residuals]) -> Option<Self> {
+        let mut band = Self::without_coverage(left_out, &curves.iter().collect::<Vec<_>>())
+            .filter(Self::is_sound)?;
+        let covered: Vec<f64> =
+            (0..curves.len()).filter_map(|i| coverage(left_out, curves, i)).collect();
         if !covered.is_empty() {
             band.coverage = Some(covered.iter().sum::<f64>() / covered.len() as f64);
         }
         Some(band)
     }
 
-    fn without_coverage(curves: &[&Residuals]) -> Option<Self> {
+    fn without_coverage(left_out: LeftOutSpeeds, curves: &[&Residuals]) -> Option<Self> {
         let t = student_t(curves.len())?;
-        let mean = |of: &dyn Fn(&Residuals) -> f64| {
-            curves.iter().map(|r| of(r)).sum::<f64>() / curves.len() as f64
+        let n = curves.len() as f64;
+        let span_m_per_s = curves.iter().map(|r| r.span_m_per_s).sum::<f64>() / n;
+        let over_span = |of: &dyn Fn(&[f64]) -> f64| {
+            let of = |r: &&Residuals| {
+                of(&r.ratios) / (r.span_m_per_s / span_m_per_s).powf(2.0 * left_out.power())
+            };
+            t * (curves.iter().map(of).sum::<f64>() / n).sqrt()
         };
-        let squares = |r: &Residuals| r.iter().map(|x| x * x).sum::<f64>() / r.len().max(1) as f64;
-        let largest = |r: &Residuals| r.iter().fold(0.0_f64, |m, x| m.max(x.abs())).powi(2);
+        let squares = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>() / r.len().max(1) as f64;
+        let largest = |r: &[f64]| r.iter().fold(0.0_f64, |m, x| m.max(x.abs())).powi(2);
         Some(Self {
             level: LEVEL,
             curves: curves.len(),
-            pointwise_share: t * mean(&squares).sqrt(),
-            simultaneous_share: t * mean(&largest).sqrt(),
+            left_out,
+            span_m_per_s: Some(span_m_per_s),
+            pointwise_share: over_span(&squares),
+            simultaneous_share: over_span(&largest),
             coverage: None,
         })
+    }
+
+    /// The same band over another span; `None` if that is nothing to hold on to, or if the band is
+    /// of an earlier version, which does not say its own.
+    pub fn over(self, span_m_per_s: f64) -> Option<Self> {
+        let factor = (span_m_per_s / self.span_m_per_s?).powf(self.left_out.power());
+        let band = Self {
+            span_m_per_s: Some(span_m_per_s),
+            pointwise_share: factor * self.pointwise_share,
+            simultaneous_share: factor * self.simultaneous_share,
+            ..self
+        };
+        band.is_sound().then_some(band)
+    }
+
+    /// Whether its widths are numbers that a fit gives.
+    pub fn is_sound(&self) -> bool {
+        let sound = |share: f64| (0.0..=WIDEST).contains(&share);
+        sound(self.pointwise_share)
+            && sound(self.simultaneous_share)
+            && self.span_m_per_s.is_none_or(|span| span > 0.0 && span.is_finite())
     }
 
     /// Lowest and highest force at each of a curve's even deflections, in N; never below 0.
@@ -85,13 +194,31 @@ impl Band {
     }
 }
 
-/// Share of curve `i`'s points inside the band that the other curves give.
-pub fn coverage(curves: &[Residuals], i: usize) -> Option<f64> {
+/// The band at speed `v` of a model of these training speeds, which do not fall.
+///
+/// Outside of them it is what the ends tell, growing with the distance, but never narrower than
+/// just inside; `None` where nothing that was left out tells of it.
+pub fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Option<Band> {
+    let inside = inner.zip(gap_m_per_s(speeds, v)).and_then(|(band, gap)| band.over(gap));
+    let distance = distance_outside_m_per_s(speeds, v);
+    if distance == 0.0 {
+        return inside;
+    }
+    let outside = ends?.over(distance)?;
+    Some(match inside {
+        Some(inside) if inside.pointwise_share > outside.pointwise_share => inside,
+        _ => outside,
+    })
+}
+
+/// Share of curve `i`'s points inside the band that the other curves give over its span.
+pub fn coverage(left_out: LeftOutSpeeds, curves: &[Residuals], i: usize) -> Option<f64> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
-    let band = Band::without_coverage(&others)?;
-    let inside = curves[i].iter().filter(|r| r.abs() <= band.pointwise_share).count();
-    Some(inside as f64 / curves[i].len().max(1) as f64)
+    let Residuals { span_m_per_s, ratios } = &curves[i];
+    let band = Band::without_coverage(left_out, &others)?.over(*span_m_per_s)?;
+    let inside = ratios.iter().filter(|r| r.abs() <= band.pointwise_share).count();
+    Some(inside as f64 / ratios.len().max(1) as f64)
 }
 
 /// Two-sided 90 % quantile of Student's t with `n` degrees of freedom.
@@ -116,24 +243,80 @@ fn student_t(n: usize) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::LeftOutSpeeds::{Ends, Inner};
     use super::*;
+
+    fn curve(span_m_per_s: f64, ratios: &[f64]) -> Residuals {
+        Residuals { span_m_per_s, ratios: ratios.to_vec() }
+    }
 
     #[test]
     fn few_curves_give_wide_bands() {
-        let curve = vec![0.1, -0.1, 0.1, -0.1];
-        let band = |n: usize| Band::of(&vec![curve.clone(); n]).unwrap();
+        let one = curve(4.0, &[0.1, -0.1, 0.1, -0.1]);
+        let band = |n: usize| Band::of(Inner, &vec![one.clone(); n]).unwrap();
         assert!((band(1).pointwise_share - 0.63138).abs() < 1e-12);
         assert!((band(3).pointwise_share - 0.23534).abs() < 1e-12);
+        assert_eq!(band(3).span_m_per_s, Some(4.0));
         assert_eq!(band(1).coverage, None);
         assert_eq!(band(2).coverage, Some(1.0));
-        assert!(Band::of(&[]).is_none());
+        assert!(Band::of(Inner, &[]).is_none());
     }
 
     #[test]
     fn coverage_counts_points_outside() {
-        let curves = vec![vec![0.01, 0.01], vec![0.01, 0.5]];
-        assert_eq!(coverage(&curves, 1), Some(0.5));
-        assert_eq!(coverage(&curves, 0), Some(1.0));
+        let curves = [curve(4.0, &[0.01, 0.01]), curve(4.0, &[0.01, 0.5])];
+        assert_eq!(coverage(Inner, &curves, 1), Some(0.5));
+        assert_eq!(coverage(Inner, &curves, 0), Some(1.0));
+    }
+
+    /// Errors that follow the span are one error at one span, and each lies on the edge of what
+    /// the other gives, divided by Student's t.
+    #[test]
+    fn residuals_are_compared_over_one_span() {
+        let grown = 0.1 * 2.0_f64.powf(0.65);
+        let curves = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[grown, grown])];
+        let band = Band::of(Inner, &curves).unwrap();
+        let share = |band: Band, span: f64| band.over(span).unwrap().pointwise_share;
+        assert!((share(band, 3.0) - 2.92 * 0.1).abs() < 1e-12);
+        assert!((share(band, 6.0) - 2.92 * grown).abs() < 1e-12);
+        assert!((share(band, 1.5) - 2.92 * 0.1 / 2.0_f64.powf(0.65)).abs() < 1e-12);
+        // 0.7 of a gap of 6 is within the band that 0.1 of a gap of 3 gives there (t of one: 6.3),
+        // and outside of the one that it gives at 3.
+        let wide = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[0.7, 1.1])];
+        assert_eq!(coverage(Inner, &wide, 1), Some(0.5));
+        // Outside in proportion.
+        let ends = Band::of(Ends, &curves[..1]).unwrap();
+        assert!((share(ends, 9.0) - 3.0 * 6.3138 * 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gap_is_that_of_the_neighbouring_training_speeds() {
+        let speeds = [5.0, 8.0, 8.0, 12.0, 13.0];
+        let gap = |v: f64| gap_m_per_s(&speeds, v).unwrap();
+        assert_eq!([gap(5.0), gap(6.0), gap(7.9), gap(9.0), gap(12.5)], [3.0, 3.0, 3.0, 4.0, 1.0]);
+        assert_eq!([gap(8.0), gap(8.0000001), gap(12.0)], [4.0; 3], "the wider at a speed itself");
+        assert_eq!([gap(1.0), gap(13.0), gap(99.0)], [3.0, 1.0, 1.0], "outermost");
+        assert_eq!(gap_m_per_s(&[5.0, 5.0], 5.0), None);
+        let outside = |v: f64| distance_outside_m_per_s(&speeds, v);
+        assert_eq!([outside(3.0), outside(5.0), outside(9.0), outside(15.0)], [2.0, 0.0, 0.0, 2.0]);
+        assert_eq!(outside(13.000001), 0.0, "rounding is no extrapolation");
+    }
+
+    #[test]
+    fn outside_the_band_grows_from_the_one_inside() {
+        let inner = Band::of(Inner, &[curve(4.0, &[0.1; 2]), curve(4.0, &[0.1; 2])]);
+        let ends = Band::of(Ends, &[curve(2.0, &[0.2; 2]), curve(2.0, &[0.2; 2])]);
+        let speeds = [5.0, 7.0, 9.0];
+        let share = |v: f64| at(inner, ends, &speeds, v).map(|b| (b.left_out, b.pointwise_share));
+        let (kind, inside) = share(8.0).unwrap();
+        assert!(kind == Inner && (inside - 0.292 * 0.5_f64.powf(0.65)).abs() < 1e-12);
+        assert_eq!(share(9.1), Some((Inner, inside)), "never narrower than inside");
+        let (kind, outside) = share(12.0).unwrap();
+        assert!(kind == Ends && (outside - 0.584 * 1.5).abs() < 1e-12);
+        assert_eq!(at(inner, None, &speeds, 12.0), None);
+        assert_eq!(at(None, ends, &speeds, 8.0), None);
+        let old = Band { span_m_per_s: None, ..inner.unwrap() };
+        assert_eq!(at(Some(old), None, &speeds, 8.0), None, "does not know its gaps");
     }
 
     #[test]
@@ -144,7 +327,7 @@ mod tests {
 
     #[test]
     fn bands_follow_the_level_of_the_force() {
-        let band = Band::of(&[vec![0.1; 4], vec![0.1; 4]]).unwrap();
+        let band = Band::of(Inner, &[curve(4.0, &[0.1; 4]), curve(4.0, &[0.1; 4])]).unwrap();
         let force: Vec<f64> = (0..200).map(|i| if i < 100 { 1e6 } else { 2e6 }).collect();
         let (low, high) = band.around(&force);
         let width = |i: usize| high[i] - low[i];

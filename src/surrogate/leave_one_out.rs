@@ -40,7 +40,8 @@ pub struct LeftOut {
     pub contact_velocity_l1: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_acceleration_l1: Option<f64>,
-    /// Share of the FE curve's points inside the band that the other left-out speeds give.
+    /// Share of the FE curve's points inside the band that the other left-out speeds give over
+    /// the same gap; of an end, the other end over the same distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
 }
@@ -98,9 +99,12 @@ pub struct Validation {
     pub rows: Vec<LeftOut>,
     pub means: Vec<Means>,
     pub floors: Vec<Floor>,
-    /// Of the chosen model, from its residuals at the inner speeds.
+    /// Between training speeds, of the chosen model, from its residuals at the inner speeds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
+    /// Outside the training speeds, from its residuals at the ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band_outside: Option<Band>,
     /// What was left out of the table, with the reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,

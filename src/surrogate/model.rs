@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::band::{self, Band};
 use super::forest::{ForestOptions, ForestSurrogate};
 use super::gp::Gp;
 use super::kept::Kept;
@@ -24,14 +25,13 @@ use crate::unit::{SpeedKind, UnitSystem};
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
 /// Version of model files this program writes; it reads this and every older one.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Most bytes of a model file: a forest of 500 trees has some ten million.
 const MAX_BYTES: u64 = 1 << 30;
 /// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
 const STEPS: usize = 200;
-/// Forces and bands beyond these are damage, not measurement.
+/// Forces beyond this are damage, not measurement.
 const LARGEST_N: f64 = 1e15;
-const WIDEST: f64 = 1e6;
 /// A nearest training speed further away than this share of the speed needs a word.
 const FAR: f64 = 0.25;
 
@@ -437,10 +437,9 @@ impl Model {
         if self.fitted_body.is_some() && self.force_kind == ForceKind::Body {
             return Err("it holds two forces, but its force is the body's".into());
         }
-        let band = self.leave_one_out.as_ref().and_then(|v| v.band);
-        let wide = |share: f64| !(0.0..=WIDEST).contains(&share);
-        if band.is_some_and(|b| wide(b.pointwise_share) || wide(b.simultaneous_share)) {
-            return Err(format!("its band is not between 0 and {WIDEST} times the force"));
+        let bands = self.leave_one_out.iter().flat_map(|v| [v.band, v.band_outside]);
+        if !bands.flatten().all(|band| band.is_sound()) {
+            return Err("the widths or the span of its band are no measurement".into());
         }
         let masses = [Some(self.mass_kg), self.other_mass_kg];
         if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {
@@ -489,6 +488,43 @@ impl Model {
     /// Lowest and highest training speed, in m/s.
     pub fn range_m_per_s(&self) -> (f64, f64) {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
+    }
+
+    /// The band at a query's place, or why there is none although speeds were left out.
+    pub(super) fn band(&self, at: &At<'_>) -> Result<Option<Band>, Warning> {
+        let Some(of) = &self.leave_one_out else { return Ok(None) };
+        if of.band.or(of.band_outside).is_none() {
+            return Ok(None);
+        }
+        if of.band.is_some_and(|band| band.span_m_per_s.is_none()) {
+            let why = "that of the model file, of an earlier version, does not know the gaps that it holds for: train the model again";
+            return Err(Warning::no_band(why));
+        }
+        if let Some((feature, ..)) = self.features_outside(at).next() {
+            let name = feature.name();
+            let why = format!("no case outside the training cases' {name} was left out");
+            return Err(Warning::no_band(&why));
+        }
+        let speeds: Vec<f64> = self.cases.iter().map(|c| c.speed_m_per_s).collect();
+        match band::at(of.band, of.band_outside, &speeds, at.speed_m_per_s) {
+            Some(band) => Ok(Some(band)),
+            None => Err(Warning::no_band(
+                "no speed that was left out tells how far FE may lie from a curve here",
+            )),
+        }
+    }
+
+    /// Numbers among the parameters that lie outside the training cases', as feature, value,
+    /// lowest and highest.
+    fn features_outside(&self, at: &At<'_>) -> impl Iterator<Item = (&Feature, f64, f64, f64)> {
+        let numbers = self.features.iter().enumerate().filter(|(_, f)| f.category.is_none());
+        numbers.filter_map(|(k, feature)| {
+            let known = || self.cases.iter().map(|c| c.features[k]);
+            let (low, high) =
+                (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+            let asked = at.features[k];
+            (!(low..=high).contains(&asked)).then_some((feature, asked, low, high))
+        })
     }
 
     /// The declared forces in N at increasing deflections.
@@ -547,15 +583,9 @@ impl Model {
         } else if (nearest / v - 1.0).abs() > FAR {
             warnings.push(Warning::far_from_training(v, nearest));
         }
-        for (k, feature) in self.features.iter().enumerate().filter(|(_, f)| f.category.is_none()) {
-            let known = || self.cases.iter().map(|c| c.features[k]);
-            let (low, high) =
-                (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-            let asked = at.features[k];
-            if !(low..=high).contains(&asked) {
-                warnings.push(Warning::parameter_out_of_range(&feature.name(), asked, low, high));
-            }
-        }
+        warnings.extend(self.features_outside(at).map(|(feature, asked, low, high)| {
+            Warning::parameter_out_of_range(&feature.name(), asked, low, high)
+        }));
         for &(below, above) in &self.mode_switches_m_per_s {
             if below < v && v < above {
                 warnings.push(Warning::mode_switch(below, above));

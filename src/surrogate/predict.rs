@@ -9,7 +9,7 @@ use super::band::{self, Band};
 use super::curves::interpolate_held;
 use super::max_crush::{self, MaxCrushRule};
 use super::model::{Fitted, ModelCase};
-use super::warning::Warning;
+use super::warning::{Warning, is_far_outside, outside_of};
 use super::{At, Model};
 use crate::curve::{EnergyAudit, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
 use crate::dataset::{DatasetError, MASS, OTHER_MASS, feature_values, grid, nearest};
@@ -42,6 +42,8 @@ pub struct Query {
     pub parameters: BTreeMap<String, Parameter>,
     /// Scale the force so that the curve takes up the impact's energy.
     pub energy_correct: bool,
+    /// Answer further outside the training speeds than a third of their range.
+    pub extrapolate: bool,
 }
 
 impl Query {
@@ -53,6 +55,7 @@ impl Query {
             rule: None,
             parameters: BTreeMap::new(),
             energy_correct: false,
+            extrapolate: false,
         }
     }
 
@@ -163,7 +166,7 @@ pub struct Provenance {
     /// The same for the body force, where it is another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_energy_over_kinetic: Option<f64>,
-    /// What the band around the force rests on.
+    /// The band around the force at this speed, and what it rests on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
     /// Values of the model's further parameters.
@@ -189,6 +192,10 @@ pub struct MaxCrush {
 pub enum PredictError {
     #[error("the speed must be above 0, found {speed_m_per_s} m/s")]
     Speed { speed_m_per_s: f64 },
+    #[error(
+        "{outside}: further outside than a third of the range, where nothing tells how wrong a curve is: run FE at such a speed, or ask for it all the same with --extrapolate"
+    )]
+    FarOutside { outside: String },
     #[error(
         "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}"
     )]
@@ -221,7 +228,7 @@ pub enum PredictError {
 /// The curve of `model` at the speed of `query`, with its audit and warnings.
 ///
 /// # Errors
-/// [`PredictError`] if the speed is not above 0, a parameter is missing, the rule gives no
+/// [`PredictError`] if the speed is not above 0 or far outside the training speeds, a parameter is missing, the rule gives no
 /// maximal crush, or an energy correction is out of bounds.
 pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictError> {
     predict_beyond(model, query).map(|(curve, _)| curve)
@@ -253,6 +260,10 @@ impl<'a> Asked<'a> {
         let v = query.speed_m_per_s;
         if !(v > 0.0 && v.is_finite()) {
             return Err(PredictError::Speed { speed_m_per_s: v });
+        }
+        let (low, high) = model.range_m_per_s();
+        if !query.extrapolate && is_far_outside(v, low, high) {
+            return Err(PredictError::FarOutside { outside: outside_of(v, low, high) });
         }
         let mut parameters = query.parameters.clone();
         let other = match parameters.get(OTHER_MASS) {
@@ -469,7 +480,10 @@ pub fn predict_beyond(
     let rebound = asked.rebound(body.as_ref().unwrap_or(&envelope).force_at(end));
     let nearest =
         model.cases[nearest(model.cases.iter().map(|c| c.speed_m_per_s), v)].speed_m_per_s;
-    let band = model.leave_one_out.as_ref().and_then(|v| v.band);
+    let band = model.band(&at).unwrap_or_else(|warning| {
+        warnings.push(warning);
+        None
+    });
     let (force_low_n, force_high_n) = band.map(|b| b.around(envelope.force_n())).unzip();
     let mut parameters = asked.parameters.clone();
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));

@@ -38,6 +38,36 @@ pub enum WarningCode {
     TooFewCurves,
     /// The force was scaled so that the curve takes up the impact's energy.
     EnergyCorrected,
+    /// Nothing that was left out tells how far FE may lie from this curve.
+    NoBand,
+}
+
+/// Speeds further outside the training speeds than this share of their range are not answered
+/// without asking for it.
+const FAR_OUTSIDE: f64 = 1.0 / 3.0;
+
+/// Whether a speed lies further outside `low` to `high` than a third of that range.
+pub(super) fn is_far_outside(speed_m_per_s: f64, low: f64, high: f64) -> bool {
+    let outside = (low - speed_m_per_s).max(speed_m_per_s - high);
+    // A third of a range of km/h is no number of m/s.
+    outside > 0.0 && outside > FAR_OUTSIDE * (high - low) * (1.0 + 1e-9)
+}
+
+/// `9 km/h is 16 km/h below the lowest training speed (25 km/h to 72 km/h)`.
+pub(super) fn outside_of(speed_m_per_s: f64, low: f64, high: f64) -> String {
+    let (side, by) = match speed_m_per_s < low {
+        true => ("below the lowest", low - speed_m_per_s),
+        false => ("above the highest", speed_m_per_s - high),
+    };
+    let (speed, by) = (km_per_h(speed_m_per_s), km_per_h(by));
+    match low == high {
+        true => format!("{speed} is {by} from {}, the one training speed", km_per_h(low)),
+        false => format!(
+            "{speed} is {by} {side} training speed ({} to {})",
+            km_per_h(low),
+            km_per_h(high)
+        ),
+    }
 }
 
 impl WarningCode {
@@ -54,6 +84,7 @@ impl WarningCode {
             Self::ModeSwitch => "mode_switch",
             Self::TooFewCurves => "too_few_curves",
             Self::EnergyCorrected => "energy_corrected",
+            Self::NoBand => "no_band",
         }
     }
 }
@@ -66,20 +97,21 @@ impl fmt::Display for Warning {
 
 impl Warning {
     pub fn out_of_range(speed_m_per_s: f64, low: f64, high: f64) -> Self {
-        let (side, by) = match speed_m_per_s < low {
-            true => ("below the lowest", low - speed_m_per_s),
-            false => ("above the highest", speed_m_per_s - high),
+        let far = match is_far_outside(speed_m_per_s, low, high) {
+            true => " by more than a third of the range",
+            false => "",
         };
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "{} is {} {side} training speed ({} to {}): this is extrapolation",
-                km_per_h(speed_m_per_s),
-                km_per_h(by),
-                km_per_h(low),
-                km_per_h(high)
+                "{}: this is extrapolation{far}",
+                outside_of(speed_m_per_s, low, high)
             ),
         }
+    }
+
+    pub fn no_band(why: &str) -> Self {
+        Self { code: WarningCode::NoBand, message: format!("there is no band: {why}") }
     }
 
     pub fn parameter_out_of_range(name: &str, asked: f64, low: f64, high: f64) -> Self {

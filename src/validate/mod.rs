@@ -6,17 +6,20 @@ pub mod motion;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::curve::rating::{l1_ratio, matched_peaks};
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{DatasetError, OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
-use crate::surrogate::band::{self, Band, Residuals};
+use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::PredictError;
 use crate::surrogate::{Model, ModelError, Options, PredictedCurve, Query, predict};
-use choose::choose;
+use crate::unit::km_per_h;
+use choose::{NextRun, choose};
 use motion::{Driver, MotionError, MotionErrors, Reference};
 
 /// Fewest steps along FE's crush at which forces are compared.
@@ -33,6 +36,34 @@ pub enum ValidateError {
     Predict(#[from] PredictError),
     #[error(transparent)]
     Motion(#[from] MotionError),
+    #[error("without this speed: {0}")]
+    NotFitted(String),
+    #[error("its errors against FE are no finite numbers")]
+    NotFinite,
+}
+
+/// What `crumple validate --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// In the order of the database.
+    pub groups: Vec<GroupReport>,
+}
+
+/// One group: its table, or why there is none.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum GroupReport {
+    Validated {
+        #[serde(flatten)]
+        validation: Box<Validation>,
+        /// Absent if it was not asked for, or if there is no gap to run in.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        next_run: Option<NextRun>,
+    },
+    Failed {
+        group: String,
+        error: String,
+    },
 }
 
 /// The models that `auto` chooses among; `forest` is the reference method's.
@@ -102,8 +133,9 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Valid
 
 /// Leaves every speed out in turn and predicts it by every candidate.
 ///
-/// Models that cannot be fitted to the group are noted with the reason. `keep` names the
-/// model that counts as chosen, whatever its errors.
+/// A model that cannot be fitted to the group, or has no answer at a speed, is noted with the
+/// reason; one without an answer at every inner speed has no means and cannot be chosen. `keep`
+/// names the model that counts as chosen, whatever its errors.
 ///
 /// # Errors
 /// [`ValidateError`] if the cases are no training set.
@@ -134,36 +166,42 @@ pub fn validate(
             .filter_map(|i| Held::new(&set, cases, &speeds, i, &mut notes))
             .collect();
     }
-    let floors: Vec<Floor> =
-        left_out.iter().map(Held::floors).collect::<Result<Vec<_>, _>>()?.concat();
+    let mut floors = Vec::new();
+    for held in &left_out {
+        match held.floors() {
+            Ok(own) => floors.extend(own),
+            Err(error) => notes.push(format!("FE's own curves of \"{}\": {error}", held.own.name)),
+        }
+    }
     let pairs: Vec<(&Options, &Held)> =
         fitting.iter().flat_map(|o| left_out.iter().map(move |h| (o, h))).collect();
-    let trials: Vec<Trial> = pairs
-        .par_iter()
-        .map(|(options, held)| held.trial(options))
-        .collect::<Result<Vec<_>, ValidateError>>()?
-        .into_iter()
-        .flatten()
-        .collect();
+    let trials: Vec<Trial> = pairs.par_iter().map(|(options, held)| held.trial(options)).collect();
 
+    let inner_speeds = left_out.iter().filter(|held| held.inner).count();
     let (mut rows, mut means, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
     for options in &fitting {
         let model = options.name();
         let own: Vec<&Trial> = trials.iter().filter(|t| t.model == model).collect();
         let Some(rule) = best_rule(options, &own) else { continue };
-        let own_residuals: Vec<Residuals> =
-            own.iter().filter(|t| t.inner).filter_map(|t| t.residuals(rule)).collect();
-        let mut inner = 0;
+        notes.extend(own.iter().filter_map(|t| t.failure(rule)));
         let mut own_rows = Vec::new();
+        let mut own_residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>> = BTreeMap::new();
         for trial in &own {
-            let Some(mut row) = trial.row(rule) else { continue };
-            if trial.inner {
-                row.coverage = band::coverage(&own_residuals, inner);
-                inner += 1;
-            }
+            let (Some(row), Some(of)) = (trial.row(rule), trial.residuals(rule)) else { continue };
             own_rows.push(row);
+            own_residuals.entry(trial.left_out()).or_default().push(of);
         }
-        means.extend(mean(model, rule, &own_rows));
+        let mut index: BTreeMap<LeftOutSpeeds, usize> = BTreeMap::new();
+        for row in &mut own_rows {
+            let left_out = LeftOutSpeeds::of(row.inner);
+            let i = index.entry(left_out).or_default();
+            row.coverage = band::coverage(left_out, &own_residuals[&left_out], *i);
+            *i += 1;
+        }
+        match mean(model, rule, &own_rows) {
+            Some(of) if of.speeds < inner_speeds => notes.push(without_means(model)),
+            of => means.extend(of),
+        }
         residuals.insert(model, own_residuals);
         rows.extend(own_rows);
     }
@@ -171,15 +209,20 @@ pub fn validate(
         Some(model) => (model.to_string(), "asked for".into()),
         None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
     };
-    let band = residuals.get(chosen.as_str()).and_then(|r| Band::of(r));
-    Ok(Validation { group: group.into(), chosen, reason, rows, means, floors, band, notes })
+    let band_of = |left_out: LeftOutSpeeds| {
+        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?)
+    };
+    let (band, band_outside) = (band_of(LeftOutSpeeds::Inner), band_of(LeftOutSpeeds::Ends));
+    let group = group.into();
+    Ok(Validation { group, chosen, reason, rows, means, floors, band, band_outside, notes })
 }
 
 /// Adds the rows and means of `auto` itself: with every inner speed left out, model and rule
 /// are chosen anew by leaving out speeds of what remains.
 ///
 /// The errors of the chosen model are those that it was chosen by, and so a little too good;
-/// these are not. Speeds that leave fewer than three others have no row.
+/// these are not. Speeds that leave fewer than three others, or fail otherwise, have no row but a
+/// note.
 ///
 /// # Errors
 /// As [`validate`].
@@ -192,28 +235,52 @@ pub fn add_nested(
     let set = TrainingSet::new(&group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    if speeds.len() < 4 {
+        validation.notes.push(format!(
+            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {}",
+            speeds.len()
+        ));
+        return Ok(());
+    }
+    // Cases that cannot be left out have been noted.
     let held: Vec<Held> = (0..set.cases.len())
         .filter_map(|i| Held::new(&set, cases, &speeds, i, &mut Vec::new()))
-        .filter(|held| held.inner && held.rest.cases.len() >= 3)
+        .filter(|held| held.inner)
         .collect();
-    let trials = held
+    let trials: Vec<Trial> = held
         .par_iter()
         .map(|held| {
             let v = held.own.speed_m_per_s;
             let others: Vec<Case> =
                 cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
-            let model = train(&group, &others, Choice::Auto { seed, trees: None })?;
-            let curve = predict(&model, &query_of(held.case, &model))?;
-            let rule = curve.provenance.max_crush_rule;
-            let predictions = BTreeMap::from([(rule, held.judged(curve)?)]);
-            Ok((held.trial_of("auto", predictions), rule))
+            let predictions = train(&group, &others, Choice::Auto { seed, trees: None })
+                .and_then(|model| {
+                    let curve = predict(&model, &query_of(held.case, &model))?;
+                    Ok((curve.provenance.max_crush_rule, held.judged(curve)?))
+                })
+                .map_or_else(
+                    |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),
+                    |(rule, judged)| BTreeMap::from([(rule, Ok(judged))]),
+                );
+            held.trial_of("auto", predictions)
         })
-        .collect::<Result<Vec<_>, ValidateError>>()?;
-    let rows: Vec<LeftOut> = trials.iter().filter_map(|(trial, rule)| trial.row(*rule)).collect();
-    let rule = trials.first().map_or(MaxCrushRule::Motion, |(_, rule)| *rule);
-    validation.means.extend(mean("auto", rule, &rows));
+        .collect();
+    // Each has one rule.
+    let of = |trial: &Trial| trial.predictions.keys().next().copied();
+    let rows: Vec<LeftOut> = trials.iter().filter_map(|t| t.row(of(t)?)).collect();
+    validation.notes.extend(trials.iter().filter_map(|t| t.failure(of(t)?)));
+    let rule = trials.first().and_then(of).unwrap_or(MaxCrushRule::Motion);
+    match mean("auto", rule, &rows) {
+        Some(of) if of.speeds < held.len() => validation.notes.push(without_means("auto")),
+        of => validation.means.extend(of),
+    }
     validation.rows.extend(rows);
     Ok(())
+}
+
+/// Why a model is not among the means.
+fn without_means(model: &str) -> String {
+    format!("{model} has no means and cannot be chosen: it has no answer at every inner speed")
 }
 
 /// With too few speeds to leave one out.
@@ -231,7 +298,13 @@ pub fn query_of(case: &Case, model: &Model) -> Query {
     if let Some(other) = case.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
-    Query { mass_kg: Some(case.masses.body_kg), parameters, ..Query::at(case.speed.m_per_s) }
+    Query {
+        mass_kg: Some(case.masses.body_kg),
+        parameters,
+        // Ends that are left out are judged however far away the others lie.
+        extrapolate: true,
+        ..Query::at(case.speed.m_per_s)
+    }
 }
 
 /// A case that is left out, and what is left.
@@ -240,6 +313,8 @@ struct Held<'a> {
     case: &'a Case,
     rest: TrainingSet,
     inner: bool,
+    /// Over which it is predicted: the gap it leaves, or an end's distance to the others.
+    span_m_per_s: f64,
     reference: Reference,
 }
 
@@ -274,11 +349,16 @@ impl<'a> Held<'a> {
         let mut rest = set.clone();
         rest.cases.retain(|c| !is_same_speed(c.speed_m_per_s, v));
         let inner = speeds[0] < v && v < speeds[speeds.len() - 1];
-        Some(Self { own, case, rest, inner, reference })
+        let others = rest.speeds_m_per_s();
+        let span_m_per_s = match inner {
+            true => band::gap_m_per_s(&others, v)?,
+            false => band::distance_outside_m_per_s(&others, v),
+        };
+        Some(Self { own, case, rest, inner, span_m_per_s, reference })
     }
 
     /// FE's own curves in the multi-body model.
-    fn floors(&self) -> Result<Vec<Floor>, MotionError> {
+    fn floors(&self) -> Result<Vec<Floor>, ValidateError> {
         let contact = (ForceKind::Contact, &self.own.envelope);
         let body = (ForceKind::Body, &self.own.motion.force);
         let forces = match self.rest.force_kind {
@@ -300,7 +380,7 @@ impl<'a> Held<'a> {
                         self.own.unloading_stiffness_n_per_m,
                     )
                 });
-                let errors = self.reference.errors(&self.reference.run(&driver)?)?;
+                let errors = finite(self.reference.errors(&self.reference.run(&driver)?)?)?;
                 Ok(Floor {
                     force: kind.name().into(),
                     case: self.own.name.clone(),
@@ -314,33 +394,22 @@ impl<'a> Held<'a> {
             .collect()
     }
 
-    /// Predicts the case by one model; `None` if what is left is too little for it.
-    fn trial(&self, options: &Options) -> Result<Option<Trial>, ValidateError> {
-        let model = match Model::fit(&self.rest, *options) {
-            Ok(model) => model,
-            Err(ModelError::OneCurve { .. }) => return Ok(None),
-            Err(error) => return Err(error.into()),
+    /// Predicts the case by one model and every rule.
+    fn trial(&self, options: &Options) -> Trial {
+        let model = Model::fit(&self.rest, *options);
+        let by = |rule: MaxCrushRule| -> Result<Judged, ValidateError> {
+            let model = match &model {
+                Ok(model) => model,
+                Err(error) => return Err(ValidateError::NotFitted(error.to_string())),
+            };
+            self.judged(predict(model, &query_of(self.case, model).with_rule(rule))?)
         };
-        let mut predictions = BTreeMap::new();
-        for rule in MaxCrushRule::ALL {
-            match predict(&model, &query_of(self.case, &model).with_rule(rule)) {
-                Ok(curve) => {
-                    predictions.insert(rule, self.judged(curve)?);
-                }
-                // A rule or model may have no answer; a category may only be in the case left
-                // out.
-                Err(
-                    PredictError::MaxCrush { .. }
-                    | PredictError::NoAnswer { .. }
-                    | PredictError::Parameters(_),
-                ) => {}
-                Err(error) => return Err(error.into()),
-            }
-        }
-        Ok(Some(self.trial_of(options.name(), predictions)))
+        let predictions =
+            MaxCrushRule::ALL.map(|rule| (rule, by(rule).map_err(|e| e.to_string()))).into();
+        self.trial_of(options.name(), predictions)
     }
 
-    fn trial_of(&self, model: &'static str, predictions: BTreeMap<MaxCrushRule, Judged>) -> Trial {
+    fn trial_of(&self, model: &'static str, predictions: Predictions) -> Trial {
         Trial {
             model,
             case: self.own.name.clone(),
@@ -356,12 +425,12 @@ impl<'a> Held<'a> {
         let along = grid(end, STEPS);
         let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
         let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
-        let driven = |envelope: Envelope| -> Result<MotionErrors, MotionError> {
+        let driven = |envelope: Envelope| -> Result<MotionErrors, ValidateError> {
             let stiffness_n_per_m = Some(curve.stiffness_at_end(&envelope));
             let driver = Driver::new(envelope, stiffness_n_per_m);
-            self.reference.errors(&self.reference.run(&driver)?)
+            finite(self.reference.errors(&self.reference.run(&driver)?)?)
         };
-        Ok(Judged {
+        let judged = Judged {
             force_l1: l1_ratio(&reference, &predicted),
             energy_error: curve.energy_j / self.own.envelope.work() - 1.0,
             max_crush_error: curve.max_deflection_m / end - 1.0,
@@ -370,14 +439,29 @@ impl<'a> Held<'a> {
                 // Up to its first point a prediction rises from 0, which FE does not.
                 let first = curve.deflection_m[1];
                 let from = along.iter().position(|&d| d >= first).unwrap_or(0);
-                band::residuals(&reference, &predicted).split_off(from)
+                let ratios = band::ratios(&reference, &predicted).split_off(from);
+                Residuals { span_m_per_s: self.span_m_per_s, ratios }
             },
             body: driven(curve.driving_envelope()?)?,
             contact: match curve.body_force_n {
                 Some(_) => Some(driven(envelope)?),
                 None => None,
             },
-        })
+        };
+        let numbers = [judged.force_l1, judged.energy_error, judged.max_crush_error];
+        match numbers.iter().all(|n| n.is_finite()) {
+            true => Ok(judged),
+            false => Err(ValidateError::NotFinite),
+        }
+    }
+}
+
+/// Errors that can be compared.
+fn finite(errors: MotionErrors) -> Result<MotionErrors, ValidateError> {
+    let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
+    match [velocity_l1, acceleration_l1, acceleration_unfiltered_l1].iter().all(|e| e.is_finite()) {
+        true => Ok(errors),
+        false => Err(ValidateError::NotFinite),
     }
 }
 
@@ -392,23 +476,39 @@ struct Judged {
     contact: Option<MotionErrors>,
 }
 
-/// One model at one case, by every rule that has an answer.
+/// One model at one case by every rule, or why that has no answer.
+type Predictions = BTreeMap<MaxCrushRule, Result<Judged, String>>;
+
 struct Trial {
     model: &'static str,
     case: String,
     speed_m_per_s: f64,
     inner: bool,
-    predictions: BTreeMap<MaxCrushRule, Judged>,
+    predictions: Predictions,
 }
 
 impl Trial {
+    fn left_out(&self) -> LeftOutSpeeds {
+        LeftOutSpeeds::of(self.inner)
+    }
+
     fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
-        Some(self.predictions.get(&rule)?.residuals.clone())
+        Some(self.judged(rule)?.residuals.clone())
+    }
+
+    fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {
+        self.predictions.get(&rule)?.as_ref().ok()
+    }
+
+    /// Why there is no row.
+    fn failure(&self, rule: MaxCrushRule) -> Option<String> {
+        let error = self.predictions.get(&rule)?.as_ref().err()?;
+        Some(format!("{} at {}: no row: {error}", self.model, km_per_h(self.speed_m_per_s)))
     }
 
     fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
-        let by_rule = self.predictions.get(&rule)?;
-        let crush = |(rule, judged): (&MaxCrushRule, &Judged)| (*rule, judged.max_crush_error);
+        let by_rule = self.judged(rule)?;
+        let crush = |rule| Some((rule, self.judged(rule)?.max_crush_error));
         Some(LeftOut {
             model: self.model.into(),
             case: self.case.clone(),
@@ -417,7 +517,7 @@ impl Trial {
             force_l1: by_rule.force_l1,
             energy_error: by_rule.energy_error,
             max_crush_error: by_rule.max_crush_error,
-            max_crush_errors: self.predictions.iter().map(crush).collect(),
+            max_crush_errors: MaxCrushRule::ALL.into_iter().filter_map(crush).collect(),
             peaks: by_rule.peaks.clone(),
             velocity_l1: by_rule.body.velocity_l1,
             acceleration_l1: by_rule.body.acceleration_l1,
@@ -430,29 +530,32 @@ impl Trial {
 }
 
 /// The rule with the smallest mean error of crush and energy over the inner speeds, as the
-/// crush decides both; the reference method keeps its spline.
+/// crush decides both; the reference method keeps its spline. A rule with an answer at more speeds
+/// goes before; `None` without any trial.
 fn best_rule(options: &Options, trials: &[&Trial]) -> Option<MaxCrushRule> {
-    let mean = |rule: &MaxCrushRule| -> Option<f64> {
-        let inner = trials.iter().filter(|t| t.inner);
-        let errors: Vec<f64> = inner
-            .map(|t| {
-                let judged = t.predictions.get(rule)?;
-                Some(judged.max_crush_error.abs() + judged.energy_error.abs())
-            })
-            .collect::<Option<_>>()?;
-        (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
+    let errors = |rule: MaxCrushRule, of_inner: bool| -> Vec<f64> {
+        let of = trials.iter().filter(|t| t.inner == of_inner).filter_map(|t| t.judged(rule));
+        of.map(|j| j.max_crush_error.abs() + j.energy_error.abs()).collect()
     };
-    let is_paper = matches!(options, Options::Forest(f) if ForestOptions { seed: f.seed, ..ForestOptions::paper() } == *f);
-    if is_paper && mean(&MaxCrushRule::Spline).is_some() {
-        return Some(MaxCrushRule::Spline);
-    }
+    let missing = |rule: MaxCrushRule| {
+        let inner = errors(rule, true).len();
+        (trials.len() - inner, trials.len() - inner - errors(rule, false).len())
+    };
+    let mean = |rule: MaxCrushRule| {
+        let errors = errors(rule, true);
+        errors.iter().sum::<f64>() / errors.len().max(1) as f64
+    };
     // The spline is not monotone by construction: nobody gets it without asking.
-    MaxCrushRule::ALL
-        .into_iter()
-        .filter(|rule| *rule != MaxCrushRule::Spline)
-        .filter_map(|rule| Some((rule, mean(&rule)?)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(rule, _)| rule)
+    let best = (!trials.is_empty()).then_some(MaxCrushRule::ALL).and_then(|all| {
+        all.into_iter()
+            .filter(|rule| *rule != MaxCrushRule::Spline)
+            .min_by(|&a, &b| missing(a).cmp(&missing(b)).then(mean(a).total_cmp(&mean(b))))
+    })?;
+    let is_paper = matches!(options, Options::Forest(f) if ForestOptions { seed: f.seed, ..ForestOptions::paper() } == *f);
+    match is_paper && missing(MaxCrushRule::Spline).0 <= missing(best).0 {
+        true => Some(MaxCrushRule::Spline),
+        false => Some(best),
+    }
 }
 
 /// The first two peaks of FE's force and the predicted peaks nearest to them.

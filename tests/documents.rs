@@ -1,0 +1,219 @@
+//! What commands print with --json, and what users write, against the schemas; Python's jsonschema
+//! judges.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use common::{build_fixture, crumple_in, crumple_ok, fixture, python, root};
+use serde_json::{Value, json};
+
+/// Documents by name, each with its schema.
+type Documents = Vec<(&'static str, String, Value)>;
+
+/// Errors of each document, by its name; `None` (said) without the clients' Python.
+fn errors(documents: &Documents) -> Option<BTreeMap<String, Vec<String>>> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = python()?;
+    command.arg(root().join("tests/python/schemas.py"));
+    for (schema, name, document) in documents {
+        let path = folder.path().join(name);
+        std::fs::write(&path, document.to_string()).unwrap();
+        let schema = root().join("schemas").join(schema);
+        command.arg(format!("{}={}", schema.display(), path.display()));
+    }
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: BTreeMap<String, Vec<String>> = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found.len(), documents.len(), "every document is judged");
+    let named = |path: String| Path::new(&path).file_name().unwrap().to_str().unwrap().to_string();
+    Some(found.into_iter().map(|(path, errors)| (named(path), errors)).collect())
+}
+
+fn assert_valid(documents: &Documents) {
+    let Some(found) = errors(documents) else { return };
+    for (name, errors) in found {
+        assert!(errors.is_empty(), "{name}: {errors:#?}");
+    }
+}
+
+/// The JSON that a command prints, however it ends.
+fn printed(folder: &Path, arguments: &[&str]) -> Value {
+    let output = crumple_in(folder, &[arguments, &["--json"]].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{error}"))
+}
+
+/// A database with three groups that can be validated and two that hardly can: two runs, and a
+/// mixture of kinds of speed.
+fn databases(folder: &Path) {
+    for group in ["lead-car-wall", "lead-car-pair", "vehicle-pair"] {
+        build_fixture(folder, group);
+    }
+    let rebuilt = |source: &str, group: &str, name: &str, runs: usize| {
+        let study = fixture(&format!("fe/{source}/study.toml"));
+        let text = std::fs::read_to_string(&study).unwrap();
+        let text = text.replace(&format!("group = \"{source}\""), &format!("group = \"{group}\""));
+        let mut parts = text.split("[[run]]");
+        let mut text = parts.next().unwrap().to_string();
+        for (i, part) in parts.take(runs).enumerate() {
+            let path = format!("path  = \"{}/", study.parent().unwrap().display());
+            let part = part.replace("path  = \"", &path);
+            text += &format!("[[run]]\nname = \"{name}{i}\"{part}");
+        }
+        let path = folder.join("again.toml");
+        std::fs::write(&path, text).unwrap();
+        crumple_ok(folder, &["build", "again.toml", "-o", "curves.h5", "-q"]);
+    };
+    rebuilt("lead-car-wall", "two-runs", "w", 2);
+    rebuilt("lead-car-wall", "three-runs", "w", 3);
+    rebuilt("lead-car-wall", "mixed", "w", 2);
+    rebuilt("lead-car-pair", "mixed", "p", 2);
+}
+
+#[test]
+fn documents_are_those_of_the_schemas() {
+    if python().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    databases(here);
+    let mut documents: Documents = Vec::new();
+    let mut add = |schema: &'static str, name: &str, document: Value| {
+        documents.push((schema, format!("{name}.json"), document));
+    };
+
+    let validation = "validation.schema.json";
+    let all = printed(here, &["validate", "curves.h5", "--next"]);
+    let groups = all["groups"].as_array().unwrap();
+    assert_eq!(groups.len(), 6);
+    assert_eq!(groups.iter().filter(|g| g["error"].is_string()).count(), 1, "the mixture");
+    assert!(groups.iter().any(|g| g["rows"] == json!([])), "two runs");
+    assert!(groups.iter().any(|g| g["next_run"].is_object()));
+    add(validation, "validate", all.clone());
+    let nested =
+        |group: &str| printed(here, &["validate", "curves.h5", "--nested", "--group", group]);
+    let rows = |of: &Value| {
+        let rows = of["groups"][0]["rows"].as_array().unwrap();
+        rows.iter().filter(|r| r["model"] == "auto").count()
+    };
+    let (pair, three) = (nested("lead-car-pair"), nested("three-runs"));
+    assert_eq!((rows(&pair), rows(&three)), (2, 0));
+    add(validation, "nested", pair);
+    add(validation, "nested-of-three", three);
+    for (name, arguments) in [
+        ("train", &["--model", "linear"][..]),
+        ("train-two", &["--group", "two-runs"]),
+        ("train-paper", &["--paper"]),
+    ] {
+        let group: &[&str] = if name == "train-two" { &[] } else { &["--group", "lead-car-wall"] };
+        let train = ["train", "curves.h5", "-o", name];
+        let document = printed(here, &[&train[..], group, arguments].concat());
+        // A model's own validation is a group of the report.
+        add(validation, name, json!({ "groups": [document["validation"]] }));
+    }
+
+    let predicted = "predicted_curve.schema.json";
+    for (name, model, arguments) in [
+        ("inside", "train", &["--speed", "50km/h"][..]),
+        ("outside", "train", &["--speed", "80km/h"]),
+        ("far", "train", &["--speed", "500km/h", "--extrapolate"]),
+        ("corrected", "train", &["--speed", "50km/h", "--energy-correct"]),
+        ("without-band", "train-two", &["--speed", "30km/h"]),
+        ("forest", "train-paper", &["--speed", "42km/h", "--paper"]),
+    ] {
+        let document = printed(here, &[&["predict", model], arguments].concat());
+        assert_eq!(document["force_low_N"].is_array(), name != "without-band", "{name}");
+        add(predicted, name, document);
+    }
+
+    let rating = "rating.schema.json";
+    let run = |speed: &str| {
+        fixture(&format!("fe/lead-car-wall/{speed}/nodout")).to_str().unwrap().to_string()
+    };
+    let (a, b) = (run("36kmh"), run("48kmh"));
+    for component in ["x_acceleration", "x_velocity", "y_displacement"] {
+        let of = ["rate", &a, &b, "--id", "900001", "--component", component, "--to", "50ms"];
+        add(rating, component, printed(here, &of));
+    }
+    let zero = "time_s,a\n0,0\n0.01,0\n0.02,0\n0.03,0\n0.04,0\n0.05,0\n";
+    std::fs::write(here.join("zero.csv"), zero).unwrap();
+    let zeros = ["rate", "zero.csv", "zero.csv", "--quantity", "acceleration"];
+    add(rating, "zeros", printed(here, &zeros));
+
+    // What users write.
+    let read = |path: &Path| -> Value {
+        let table: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
+        serde_json::to_value(table).unwrap()
+    };
+    for group in ["lead-car-wall", "lead-car-pair", "vehicle-pair"] {
+        let study = fixture(&format!("fe/{group}/study.toml"));
+        add("study.schema.json", group, read(&study));
+    }
+    for entry in root().join("examples/trains").read_dir().unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let name = path.file_stem().unwrap().to_str().unwrap();
+            add("scenario.schema.json", name, read(&path));
+        }
+    }
+    assert!(documents.len() > 20);
+    assert_valid(&documents);
+
+    // The judge sees what is wrong.
+    let mut broken = all;
+    broken["groups"][0]["rows"][0]["force_l1"] = Value::Null;
+    let alone = broken["groups"][0].clone();
+    let wrong = vec![
+        (validation, "null.json".to_string(), broken),
+        (validation, "alone.json".to_string(), alone),
+    ];
+    let found = errors(&wrong).unwrap();
+    assert!(found.values().all(|errors| !errors.is_empty()), "{found:?}");
+}
+
+/// Work that takes long says on a terminal what it is at, and nothing elsewhere.
+#[test]
+fn long_work_shows_its_progress_on_a_terminal() {
+    let Some(mut python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let script = "import pty, sys; sys.exit(pty.spawn(sys.argv[1:]) >> 8)";
+    for (arguments, step) in [
+        (&["validate", "curves.h5"][..], "validating lead-car-wall"),
+        (&["train", "curves.h5", "--group", "lead-car-wall", "-o", "m"], "training lead-car-wall"),
+        (
+            &[
+                "compare",
+                "curves.h5",
+                "--group",
+                "lead-car-wall",
+                "--speed",
+                "48km/h",
+                "--nsdm-seeds",
+                "0",
+            ],
+            "comparing at 48 km/h",
+        ),
+    ] {
+        let mut on_a_terminal = |more: &[&str]| {
+            let command = std::mem::replace(&mut python, common::python().unwrap())
+                .args(["-c", script, env!("CARGO_BIN_EXE_crumple")])
+                .args(arguments)
+                .args(more)
+                .current_dir(here)
+                .stdin(std::process::Stdio::null())
+                .output()
+                .unwrap();
+            assert!(command.status.success(), "{command:?}");
+            String::from_utf8_lossy(&command.stdout).into_owned()
+        };
+        assert!(on_a_terminal(&[]).contains(step), "{arguments:?}");
+        assert!(!on_a_terminal(&["-q"]).contains(step), "{arguments:?} -q");
+        let elsewhere = crumple_in(here, arguments);
+        assert!(!String::from_utf8_lossy(&elsewhere.stderr).contains(step), "{arguments:?}");
+    }
+}
