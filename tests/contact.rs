@@ -70,7 +70,7 @@ impl Run {
         for history in
             [&mut self.displacement, &mut self.velocity, &mut self.acceleration, &mut self.force]
         {
-            let keep = |i: &usize| *i >= first && (*i - first) % n == 0;
+            let keep = |i: &usize| *i >= first && (*i - first).is_multiple_of(n);
             let kept = (0..history.values.len()).filter(keep);
             (history.time, history.values) = (
                 kept.clone().map(|i| history.time[i]).collect::<Vec<_>>().into(),

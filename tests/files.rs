@@ -141,12 +141,13 @@ fn pipes_in_a_runs_folder_do_not_hold_up_a_build() {
     let text = fs::read_to_string(source.join("study.toml")).unwrap();
     let one: Vec<&str> = text.splitn(3, "[[run]]").collect();
     fs::write(here.join("study.toml"), format!("{}[[run]]{}", one[0], one[1])).unwrap();
-    fs::create_dir(here.join("25kmh")).unwrap();
+    let run = one[1].split("path  = \"").nth(1).unwrap().split('"').next().unwrap();
+    fs::create_dir(here.join(run)).unwrap();
     for name in ["nodout", "rwforc"] {
-        fs::copy(source.join("25kmh").join(name), here.join("25kmh").join(name)).unwrap();
+        fs::copy(source.join(run).join(name), here.join(run).join(name)).unwrap();
     }
     for name in ["case.json", "binout0000", "main.k"] {
-        let path = here.join("25kmh").join(name);
+        let path = here.join(run).join(name);
         assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
     }
     let output = soon(here, &["build", "study.toml", "-o", "c.h5"]);
@@ -317,12 +318,7 @@ fn db_check_holds_attributes_against_the_curves() {
     t("mass_kg", number(12e3), "energy_impossible", "W/E is 2.04");
     t("speed_m_per_s", number(8.0), "energy_impossible", "W/E is 1.59");
     t("speed_m_per_s", number(f64::NAN), "damaged", "attribute speed_m_per_s is not finite");
-    t(
-        "speed_kind",
-        AttrValue::String("closing".into()),
-        "speed_kinds",
-        "has a closing speed, 25kmh a wall",
-    );
+    t("speed_kind", AttrValue::String("closing".into()), "speed_kinds", "has a closing speed, ");
     t("notes", AttrValue::String("[\"mine\"]".into()), "altered", "its attributes are not those");
 }
 
@@ -385,10 +381,12 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
     t(
         &|file| {
             let group = file.group(WALL).unwrap();
-            let cases = ["36kmh", "25kmh", "48kmh", "60kmh", "72kmh"].map(String::from);
-            group.set_attr("cases", AttrValue::VarLenStringArray(cases.into())).unwrap();
+            let mut cases = group.groups().unwrap();
+            cases.sort();
+            cases.reverse();
+            group.set_attr("cases", AttrValue::VarLenStringArray(cases)).unwrap();
         },
-        &[("case_order", "are listed as 36kmh, 25kmh")],
+        &[("case_order", "the group's cases are listed as 72kmh, 60kmh")],
     );
     t(
         &|file| file.group(WALL).unwrap().delete("48kmh").unwrap(),
@@ -410,7 +408,8 @@ fn a_database_without_hashes_is_read_and_said() {
     });
     assert!(crumple::database::Database::read(&path).unwrap() == before);
     let text = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
-    assert!(text.contains("note: 5 of 5 cases have no hashes"), "{text}");
+    let cases = before.cases(WALL).len();
+    assert!(text.contains(&format!("note: {cases} of {cases} cases have no hashes")), "{text}");
     // What follows from the curves is found all the same.
     edited(&path, |file| {
         let mut force = file.dataset("lead-car-wall/36kmh/original/force_N").unwrap();
@@ -443,9 +442,10 @@ fn an_altered_case_stays_altered_until_it_is_built_anew() {
         folder.path(),
         &["build", wall.to_str().unwrap(), "-o", "curves.h5", "--json"],
     ));
-    let outcomes: Vec<&str> =
-        report["runs"].as_array().unwrap().iter().map(|r| r["outcome"].as_str().unwrap()).collect();
-    assert_eq!(outcomes, ["unchanged", "built", "unchanged", "unchanged", "unchanged"]);
+    for run in report["runs"].as_array().unwrap() {
+        let expected = if run["name"] == "36kmh" { "built" } else { "unchanged" };
+        assert_eq!(run["outcome"], expected, "{run}");
+    }
     let now = crumple::database::Database::read(&path).unwrap();
     assert!(now.cases(WALL) == built.cases(WALL));
 }
@@ -600,7 +600,7 @@ fn build_keeps_what_h5py_put_into_the_database() {
         assert f['alias']['force_N'].shape == f['lead-car-wall/36kmh/force_N'].shape\n\
         assert f['mine'].get('elsewhere', getlink=True).filename == 'other.h5'\n\
         assert f['mine/same'] == f['mine/raw']\n\
-        assert len(f['lead-car-pair']) > 2 and len(f['lead-car-wall']) == 5\n";
+        assert '36kmh' in f['lead-car-pair'] and '72kmh' in f['lead-car-wall']\n";
     assert!(second.args(["-c", look]).current_dir(folder.path()).status().unwrap().success());
 }
 
@@ -655,7 +655,7 @@ fn text_of_files_is_printed_without_control_characters() {
         }
     }
     let shown = crumple_ok(here, &["db", "show", "curves.h5", "--group", WALL, "--case", "36kmh"]);
-    assert!(shown.contains("note: \\u{1b}]0;owned\\u{7}\\u{9b}31m\\r\n"), "{shown}");
+    assert!(shown.contains("note: \u{fffd}]0;owned\u{fffd}\u{fffd}31m\u{fffd}\n"), "{shown}");
 }
 
 /// Kills leave at most one file, under a name that the next run clears.

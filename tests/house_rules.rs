@@ -122,16 +122,6 @@ fn only_the_database_names_hdf5() {
     }
 }
 
-/// What takes control characters out of everything that is printed must be passed.
-#[test]
-fn only_one_module_prints() {
-    for path in files(&root().join("src/cli"), "rs") {
-        let text = fs::read_to_string(&path).unwrap();
-        let count = text.matches("print!(").count() + text.matches("println!(").count();
-        assert_eq!(count, usize::from(path.ends_with("output.rs")), "{}", path.display());
-    }
-}
-
 #[test]
 fn the_library_never_prints_and_holds_one_unsafe_block() {
     for path in files(&root().join("src"), "rs") {
@@ -147,7 +137,7 @@ fn the_library_never_prints_and_holds_one_unsafe_block() {
     }
 }
 
-/// What is printed goes through one place, which shows control characters instead of sending them.
+/// What takes control characters out of everything that is printed must be passed.
 #[test]
 fn only_the_output_prints() {
     for path in files(&root().join("src"), "rs") {

@@ -1,7 +1,6 @@
-//! Standard output and error: text, tables, data and JSON documents. The only file that prints.
-//!
-//! Text may hold what a file says of itself, and a terminal obeys control characters: they are
-//! shown and not sent. A closed pipe is not an error.
+//! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
+//! an error. Everything printed goes through here, where control characters are taken out:
+//! a title in a solver's file may hold an escape sequence, which a terminal would obey.
 
 use std::borrow::Cow;
 use std::error::Error;
@@ -11,29 +10,42 @@ use serde::Serialize;
 
 use super::Failure;
 
-/// Writes text to standard output, control characters shown.
+/// Writes text to standard output.
 pub fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    to_stdout(true, write)
+    print_with(|_| REPLACED.into(), write)
 }
 
-/// Writes data to standard output, byte for byte; to a terminal, which obeys some of them, as
-/// text.
+/// Writes data to standard output, byte for byte; to a terminal as text.
 pub fn print_data<T, E: Error + 'static>(
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
-    to_stdout(io::stdout().is_terminal(), write)
+    if io::stdout().is_terminal() {
+        return print_with(|_| REPLACED.into(), write);
+    }
+    let mut out = BufWriter::new(Named(io::stdout().lock()));
+    let written = write(&mut out)?;
+    out.flush()?;
+    Ok(written)
+}
+
+/// Prints one JSON document.
+pub fn print_json(document: &impl Serialize) -> Result<(), Failure> {
+    // JSON escapes the others itself; they stand within strings only.
+    let escaped = |code: u8| format!("\\u{code:04x}");
+    print_with(escaped, |out| {
+        serde_json::to_writer_pretty(&mut *out, document).map_err(io::Error::from)?;
+        writeln!(out)
+    })
 }
 
 /// Writes to standard output through a buffer and flushes it.
-fn to_stdout<T, E: Error + 'static>(
-    is_text: bool,
+fn print_with<T, E: Error + 'static>(
+    instead: impl Fn(u8) -> String,
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
-    let mut out = BufWriter::new(Named(io::stdout().lock()));
-    let written = match is_text {
-        true => write(&mut Plain::new(&mut out)),
-        false => write(&mut out),
-    }?;
+    let out = Named(io::stdout().lock());
+    let mut out = BufWriter::new(Plain { out, instead, held: false });
+    let written = write(&mut out)?;
     out.flush()?;
     Ok(written)
 }
@@ -58,68 +70,72 @@ impl Write for Named<'_> {
     }
 }
 
-/// Writes a line to standard error, control characters shown.
+/// Prints a line on standard error.
 pub fn say(line: &str) {
-    // With standard error closed there is nobody to tell.
+    // With standard error closed or full there is nobody to tell.
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
 
-/// Text as it may be sent to a terminal: control characters other than the line's end are
-/// written as `\u{1b}`.
+/// A text without control characters but line ends and tabs.
 pub fn plain(text: &str) -> Cow<'_, str> {
-    let is_hidden = |c: char| c.is_control() && c != '\n';
-    if !text.contains(is_hidden) {
-        return text.into();
-    }
-    let mut shown = String::with_capacity(text.len() + 8);
-    for c in text.chars() {
-        match is_hidden(c) {
-            true => shown.extend(c.escape_default()),
-            false => shown.push(c),
-        }
-    }
-    shown.into()
-}
-
-/// Hands on UTF-8 with control characters shown.
-struct Plain<'a> {
-    out: &'a mut dyn Write,
-    /// First byte of a character of two bytes, which may be a control character.
-    begun: Option<u8>,
-}
-
-impl<'a> Plain<'a> {
-    fn new(out: &'a mut dyn Write) -> Self {
-        Self { out, begun: None }
+    let is_control = |c: char| c.is_control() && c != '\n' && c != '\t';
+    match text.contains(is_control) {
+        true => Cow::Owned(text.replace(is_control, REPLACED)),
+        false => Cow::Borrowed(text),
     }
 }
 
-impl Write for Plain<'_> {
+/// What stands for a control character.
+const REPLACED: &str = "\u{fffd}";
+
+/// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
+/// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
+struct Plain<W, F> {
+    out: W,
+    /// What stands for a control character of that code.
+    instead: F,
+    /// Whether a `0xc2` waits for the byte behind it.
+    held: bool,
+}
+
+/// First byte of the characters from U+0080 to U+00BF.
+const LEAD: u8 = 0xc2;
+
+fn is_control(byte: u8) -> bool {
+    byte.is_ascii_control() && byte != b'\n' && byte != b'\t'
+}
+
+impl<W: Write, F: Fn(u8) -> String> Write for Plain<W, F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !self.held && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
+            self.out.write_all(bytes)?;
+            return Ok(bytes.len());
+        }
+        let mut passed = Vec::with_capacity(bytes.len());
         for &byte in bytes {
-            match (self.begun.take(), byte) {
-                // U+0080 to U+009F, which some terminals obey like an escape.
-                (Some(_), 0x80..=0x9f) => write!(self.out, "\\u{{{byte:x}}}")?,
-                (Some(first), _) => self.out.write_all(&[first, byte])?,
-                (None, 0xc2) => self.begun = Some(byte),
-                (None, b'\n' | 0x20..=0x7e | 0x80..) => self.out.write_all(&[byte])?,
-                (None, _) => write!(self.out, "{}", char::from(byte).escape_default())?,
+            if std::mem::take(&mut self.held) {
+                if (0x80..=0x9f).contains(&byte) {
+                    passed.extend((self.instead)(byte).bytes());
+                    continue;
+                }
+                passed.push(LEAD);
+            }
+            match byte {
+                LEAD => self.held = true,
+                _ if is_control(byte) => passed.extend((self.instead)(byte).bytes()),
+                _ => passed.push(byte),
             }
         }
+        self.out.write_all(&passed)?;
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
+        if std::mem::take(&mut self.held) {
+            self.out.write_all(&[LEAD])?;
+        }
         self.out.flush()
     }
-}
-
-/// Prints one JSON document.
-pub fn print_json(document: &impl Serialize) -> Result<(), Failure> {
-    print_data(|out| {
-        serde_json::to_writer_pretty(&mut *out, document).map_err(io::Error::from)?;
-        writeln!(out)
-    })
 }
 
 /// Whether an error only says that the reader of a pipe went away.
@@ -139,8 +155,8 @@ pub fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
 /// Prints rows under a heading with columns as wide as their content; the first
 /// column is set left, the others right.
 pub fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
-    // A name with a line's end in it is one cell all the same.
-    let shown = |cell: &str| plain(cell).replace('\n', "\\n");
+    // A name with a line's end or a tab in it is one cell all the same.
+    let shown = |cell: &str| plain(cell).replace(['\n', '\t'], REPLACED);
     let heading: Vec<String> = heading.iter().map(|h| shown(h)).collect();
     let rows: Vec<Vec<String>> =
         rows.iter().map(|row| row.iter().map(|cell| shown(cell)).collect()).collect();
@@ -167,23 +183,26 @@ pub fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io:
 mod tests {
     use super::*;
 
-    /// However the text is cut into pieces, the same is written.
+    fn passed(chunks: &[&[u8]], instead: impl Fn(u8) -> String) -> String {
+        let mut out = Vec::new();
+        let mut plain = Plain { out: &mut out, instead, held: false };
+        chunks.iter().for_each(|chunk| plain.write_all(chunk).unwrap());
+        plain.flush().unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
     #[test]
-    fn control_characters_are_shown() {
-        let t = |text: &str, expected: &str| {
-            assert_eq!(plain(text), expected);
-            for size in [1, 2, 3, 64] {
-                let mut out = Vec::new();
-                let mut plain = Plain::new(&mut out);
-                text.as_bytes().chunks(size).for_each(|piece| plain.write_all(piece).unwrap());
-                assert_eq!(String::from_utf8(out).unwrap(), expected, "in pieces of {size}");
-            }
-        };
-        t("36 km/h, \u{b5}s, \u{4f60}, \u{1f682}\n", "36 km/h, \u{b5}s, \u{4f60}, \u{1f682}\n");
-        t("a\u{1b}[2Jb\u{7}", "a\\u{1b}[2Jb\\u{7}");
-        t("\u{9b}31m \u{a0}", "\\u{9b}31m \u{a0}");
-        t("a\rb\tc\u{7f}\0", "a\\rb\\tc\\u{7f}\\u{0}");
-        t("two\nlines", "two\nlines");
+    fn control_characters_are_not_printed() {
+        let text = "a\x1b[31m\tb\x7f\u{9b}31m µ\r\n";
+        let expected = "a\u{fffd}[31m\tb\u{fffd}\u{fffd}31m µ\u{fffd}\n";
+        assert_eq!(plain(text), expected);
+        // However the text is divided.
+        for at in 0..=text.len() {
+            let (a, b) = text.as_bytes().split_at(at);
+            assert_eq!(passed(&[a, b], |_| REPLACED.into()), expected, "divided at {at}");
+        }
+        let json = passed(&["\u{9b}µ".as_bytes()], |code| format!("\\u{code:04x}"));
+        assert_eq!(json, "\\u009bµ");
     }
 
     #[test]
@@ -191,6 +210,6 @@ mod tests {
         let mut out = Vec::new();
         table(&mut out, &["name", "v"], &[vec!["a\nb\u{1b}[A".into(), "1".into()]]).unwrap();
         let text = String::from_utf8(out).unwrap();
-        assert_eq!(text, "name          v\na\\nb\\u{1b}[A  1\n");
+        assert_eq!(text, "name    v\na\u{fffd}b\u{fffd}[A  1\n");
     }
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Manners, output};
+use super::Manners;
+use super::output::plain;
 
 /// A spinner that names the step just done.
 pub struct Bar(Option<ProgressBar>);
@@ -22,18 +23,12 @@ impl Bar {
 
     pub fn step(&self, done: &str) {
         if let Some(bar) = &self.0 {
-            // Names come from files.
-            bar.set_message(output::plain(done).replace('\n', " "));
+            bar.set_message(plain(done).into_owned());
         }
     }
 
-    pub fn end(self) {}
-}
-
-/// Also where an error ends the work.
-impl Drop for Bar {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.0 {
+    pub fn end(self) {
+        if let Some(bar) = self.0 {
             bar.finish_and_clear();
         }
     }

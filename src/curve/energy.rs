@@ -17,7 +17,7 @@ fn work_to_end(curve: &Curve) -> f64 {
 }
 
 /// Energy or impulse outside these shares of what the impact asks for is an error of the input.
-const POSSIBLE: (f64, f64) = (0.67, 1.5);
+pub const POSSIBLE: (f64, f64) = (0.67, 1.5);
 /// Impulse that differs from the change of momentum by more than this deserves a warning.
 pub const IMPULSE_TOLERANCE: f64 = 0.05;
 /// No vehicle is faster, in m/s, is crushed by more, in m, or in less time, in s.

@@ -101,7 +101,7 @@ pub struct RunEntry {
     /// 1 or -1: the factor that makes the file's force positive in compression; found from its
     /// impulse if absent.
     pub sign: Option<Sign>,
-    /// As in [study], for this run.
+    /// As in the study's head, for this run.
     pub accept_energy: Option<bool>,
     /// Further parameters of the case, the same names in every run: numbers whose names carry
     /// their units (`angle_deg = 10`), or categories (`obstacle = "pole"`).
