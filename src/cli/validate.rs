@@ -88,7 +88,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
                     manners.warn(&format!("{}: {note}", validation.group));
                 }
             }
-            GroupReport::Failed { group, error } => eprintln!("error: {group}: {error}"),
+            GroupReport::Failed { group, error } => {
+                output::say(&format!("error: {group}: {error}"))
+            }
         }
     }
     if manners.json {
