@@ -884,10 +884,10 @@ fn contact_and_body_force_rebound_alike() {
 }
 
 /// FE's own body force, with its own unloading, gives FE's motion back at every speed: velocity
-/// within 1 %, acceleration (CFC 60) within 5 %, to 30 ms after the largest crush.
+/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the largest crush.
 #[test]
 fn the_recorded_force_gives_the_recorded_motion_back() {
-    for (group, speeds) in [("lead-car-wall", 5), ("vehicle-pair", 7)] {
+    for (group, speeds) in [("lead-car-wall", 7), ("vehicle-pair", 9)] {
         let folder = tempfile::tempdir().unwrap();
         let study = common::root().join("fixtures/fe").join(group).join("study.toml");
         let report = crumple::build::build(&study, &folder.path().join("c.h5"), |_| {}).unwrap();
@@ -898,7 +898,7 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
             let run =
                 reference.run(&crumple::validate::motion::Driver::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
-            assert!(errors.velocity_l1 < 0.01, "{group} {}: {errors:?}", case.name);
+            assert!(errors.velocity_l1 < 0.004, "{group} {}: {errors:?}", case.name);
             assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.name);
         }
     }

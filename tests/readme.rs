@@ -80,3 +80,27 @@ fn tables_of_the_methods_are_those_of_compare() {
         assert!(printed, "compare does not print: {line}\n{group}\n{train}");
     }
 }
+
+/// The errors of *auto*, chosen anew without each left-out speed, are those that validate prints.
+#[test]
+fn nested_errors_of_the_readme_are_those_of_validate() {
+    let folder = tempfile::tempdir().unwrap();
+    for group in ["lead-car-pair", "lead-car-wall", "vehicle-pair"] {
+        common::build_fixture(folder.path(), group);
+    }
+    let printed = crumple_ok(folder.path(), &["validate", "curves.h5", "--nested"]);
+    // The rows of means have no speed behind the name.
+    let means: Vec<Vec<&str>> = printed
+        .lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>())
+        .filter(|words| words.first() == Some(&"auto") && words[2] == "%")
+        .collect();
+    let column = |at: usize| -> Vec<&str> { means.iter().map(|words| words[at]).collect() };
+    let (force, velocity) = (column(1), column(8));
+    let sentence = format!(
+        "force errors of {}, {} and {} % and velocity errors of {}, {} and {} %",
+        force[0], force[1], force[2], velocity[0], velocity[1], velocity[2]
+    );
+    let text = readme().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains(&sentence), "the README does not say: {sentence}\n{printed}");
+}
