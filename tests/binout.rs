@@ -415,9 +415,9 @@ fn study(folder: &Path, files: &[(&str, Vec<u8>)]) -> PathBuf {
     let one: Vec<&str> = text.splitn(3, "[[run]]").take(2).collect();
     let manifest = folder.join("study.toml");
     fs::write(&manifest, one.join("[[run]]")).unwrap();
-    fs::create_dir_all(folder.join("25kmh")).unwrap();
+    fs::create_dir_all(folder.join("12kmh")).unwrap();
     for (name, bytes) in files {
-        fs::write(folder.join("25kmh").join(name), bytes).unwrap();
+        fs::write(folder.join("12kmh").join(name), bytes).unwrap();
     }
     manifest
 }
@@ -425,7 +425,7 @@ fn study(folder: &Path, files: &[(&str, Vec<u8>)]) -> PathBuf {
 /// One recipe works with either, says which, and says if both are there and differ.
 #[test]
 fn a_recipe_finds_text_or_binout() {
-    let run = fixture("fe/lead-car-wall/25kmh");
+    let run = fixture("fe/lead-car-wall/12kmh");
     let binout = binout_of(&run);
     let text = |name: &str| fs::read(run.join(name)).unwrap();
     let build = |files: &[(&str, Vec<u8>)]| -> serde_json::Value {
