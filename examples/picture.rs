@@ -19,7 +19,8 @@ const AREA: [f64; 4] = [60.0, 20.0, 700.0, 320.0];
 /// What the area spans.
 const END_M: f64 = 2.2;
 const END_MN: f64 = 5.0;
-const COLOURS: [&str; 5] = ["#9ecae1", "#6baed6", "#4292c6", "#2171b5", "#084594"];
+const COLOURS: [&str; 7] =
+    ["#c6dbef", "#9ecae1", "#6baed6", "#4292c6", "#2171b5", "#08519c", "#08306b"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
