@@ -121,7 +121,7 @@ fn documents_are_those_of_the_schemas() {
         ("outside", "train", &["--speed", "80km/h"]),
         ("far", "train", &["--speed", "500km/h", "--extrapolate"]),
         ("corrected", "train", &["--speed", "50km/h", "--energy-correct"]),
-        ("without-band", "train-two", &["--speed", "30km/h"]),
+        ("without-band", "train-two", &["--speed", "15km/h"]),
         ("forest", "train-paper", &["--speed", "42km/h", "--paper"]),
     ] {
         let document = printed(here, &[&["predict", model], arguments].concat());

@@ -192,7 +192,7 @@ fn fe_motion_is_fitted_at_its_own_speed_and_missed_at_others() {
         );
         assert_eq!(fit.model.stiffness.values().len(), 11);
         assert_eq!(fit.model.damping.values().len(), 6);
-        assert_eq!(fit.model.damping.end(), cases[2].speed.m_per_s);
+        assert_eq!(fit.model.damping.end(), cases[4].speed.m_per_s);
         let largest = target.displacement_m().iter().copied().fold(0.0, f64::max);
         assert_eq!(fit.model.stiffness.end(), largest);
     }

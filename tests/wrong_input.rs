@@ -8,6 +8,10 @@ use std::path::Path;
 
 use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
 
+/// The run of each group that is studied.
+const RUNS: [(&str, &str); 3] =
+    [("lead-car-wall", "25kmh"), ("lead-car-pair", "36kmh"), ("vehicle-pair", "6kmh")];
+
 /// A study of one run, changed by one replacement.
 struct Study {
     folder: tempfile::TempDir,
@@ -19,11 +23,13 @@ impl Study {
         let source = fixture(&format!("fe/{group}"));
         let text = fs::read_to_string(source.join("study.toml")).unwrap();
         assert!(text.contains(from), "{from} is in the manifest");
-        let parts: Vec<&str> = text.splitn(3, "[[run]]").collect();
-        let one_run = format!("{}[[run]]{}", parts[0], parts[1]);
+        let run = RUNS.iter().find(|(g, _)| *g == group).unwrap().1;
+        let mut parts = text.split("[[run]]");
+        let head = parts.next().unwrap();
+        let entry = parts.find(|entry| entry.contains(&format!("\"{run}\""))).unwrap();
+        let one_run = format!("{head}[[run]]{entry}");
         assert!(one_run.contains(from));
         fs::write(folder.path().join("study.toml"), one_run.replace(from, to)).unwrap();
-        let run = text.split("path  = \"").nth(1).unwrap().split('"').next().unwrap();
         fs::create_dir(folder.path().join(run)).unwrap();
         for entry in source.join(run).read_dir().unwrap() {
             let entry = entry.unwrap();

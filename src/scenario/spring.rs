@@ -61,7 +61,11 @@ pub(super) fn spring(
             ));
         }
         Source::Table(held) => from_table(held),
-        Source::Stages(envelope) => from_table(&CurveTable::bare(envelope.clone())).silent(),
+        // A device between two bodies moves these, and no mass is stopped in it.
+        Source::Stages(envelope) => from_table(&CurveTable {
+            force_kind: Some(ForceKind::Body),
+            ..CurveTable::bare(envelope.clone())
+        }),
         Source::Case(case) => from_case(case, force).map_err(SpringError::Message)?,
     };
     let only_contact = force == ForceName::Declared && spring.force == Some(ForceKind::Contact);
@@ -277,12 +281,6 @@ fn scaled(mut spring: Spring, factor: Option<f64>) -> Result<Spring, String> {
 }
 
 impl Spring {
-    /// Without what is said of files: a device's stages are no file's.
-    fn silent(mut self) -> Self {
-        self.warnings.clear();
-        self
-    }
-
     /// The force law that the curve's table asks for.
     pub fn law(&mut self, table: &Table) -> Result<ForceLaw, String> {
         let asked = table.unloading.map(|u| u.0);
