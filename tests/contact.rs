@@ -207,6 +207,32 @@ fn body_forces_find_the_contact_by_the_contact_force_or_say_that_they_cannot() {
 }
 
 #[test]
+fn a_long_weak_beginning_is_said() {
+    for (force_n, states) in [(3e4, 60), (2.5e4, 20), (3e4, 80)] {
+        let mut run = Run::read(48).after_flight(80);
+        run.force.values[80 - states..80].fill(force_n);
+        let found = run.extract();
+        let said =
+            found.warnings.iter().any(|w| w.contains("bring less than 0.3 % of the impulse"));
+        assert!(said, "{force_n} N over {states} states: {:?}", found.warnings);
+    }
+    for speed in [12, 18, 25, 36, 48, 60, 72] {
+        assert_eq!(Run::read(speed).extract().warnings, [""; 0], "{speed} km/h");
+    }
+}
+
+#[test]
+fn a_run_that_ends_while_loading_is_held_against_what_it_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), "truncate = \"60ms\"");
+    let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "c.h5"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("truncated: the largest deflection is the last state"), "{said}");
+    assert!(!said.contains("energy:") && !said.contains("short:"), "{said}");
+}
+
+#[test]
 fn a_wrong_state_does_not_turn_the_force() {
     let mut run = Run::read(36).after_flight(40);
     let expected = run.extract();

@@ -142,6 +142,9 @@ pub enum ExtractError {
 const SAME_TIME: f64 = 1e-5;
 /// Two speeds of one impact may differ by this share before it is said.
 const SAME_SPEED: f64 = 0.01;
+/// A beginning of the crush, as a share of it, that brings less than this share of the impulse
+/// is doubtful: light noses of real runs bring twice as much and more.
+const BEGINNING: (f64, f64) = (0.15, 0.003);
 /// A contact found within a step that closes more than this share of the crush is uncertain.
 const CERTAIN_SHARE: f64 = 0.01;
 
@@ -202,12 +205,14 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
         }
         Err(impossible) => return Err(impossible.into()),
     };
-    let (sampled, closing_speed_m_per_s) = sample(&original, &closing, setup, &mut warnings)?;
+    let (sampled, closing_speed_m_per_s) =
+        sample(&original, &closing, setup, &mut notes, &mut warnings)?;
     let audit = energy::audit(&original, setup.masses, speed);
-    if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
+    // Of a run that ended while loading: of what it had stopped by then.
+    if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         warnings.push(format!(
             "energy: the curve takes up {:.1} % of the kinetic energy",
-            audit.ratio() * 100.0
+            work * 100.0
         ));
     }
     if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
@@ -306,11 +311,13 @@ fn find_contact(
                 let key = "contact_time";
                 return Err(ExtractError::OutsideRecord { key, time_s, first_s, last_s });
             }
+            say_found(record, time_s, notes);
             return Ok(Start { time_s, by: StartBy::Manifest });
         }
         Some(StatedContact::Gap { m }) => {
             let time_s = closing_time(record, m)?;
             notes.push(format!("contact: the gap is closed at {}", milliseconds(time_s)));
+            say_found(record, time_s, notes);
             return Ok(Start { time_s, by: StartBy::Manifest });
         }
         None => {}
@@ -345,6 +352,18 @@ fn find_contact(
         None => StartBy::FirstState,
     };
     Ok(Start { time_s: onset.time_s, by })
+}
+
+/// Says when the force begins, if the manifest states another contact.
+fn say_found(record: &Record, stated_s: f64, notes: &mut Vec<String>) {
+    let Ok(found) = onset(&record.time_s, &record.force_n) else { return };
+    if (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0) {
+        notes.push(format!(
+            "contact: {} as the manifest has it; the force begins at {}",
+            milliseconds(stated_s),
+            milliseconds(found.time_s)
+        ));
+    }
 }
 
 fn onset(time_s: &[f64], force_n: &[f64]) -> Result<contact::Onset, ExtractError> {
@@ -450,6 +469,16 @@ impl Start {
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| closing_m_per_s[0].abs() * interval_s;
         match self.by {
+            StartBy::Crossing { .. } | StartBy::FirstState | StartBy::Body
+                if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
+            {
+                warnings.push(format!(
+                    "contact: the first {:.0} % of the crush ({:.0} mm) bring less than {} % of the impulse: if that is no contact yet, say contact_time or gap in the run",
+                    BEGINNING.0 * 100.0,
+                    BEGINNING.0 * crush_m * 1e3,
+                    BEGINNING.1 * 100.0
+                ));
+            }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 warnings.push(format!(
                     "contact: it lies in a step of {:.2} mm, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run says where)",
@@ -464,6 +493,16 @@ impl Start {
             StartBy::Crossing { .. } | StartBy::Manifest | StartBy::Body => {}
         }
     }
+}
+
+/// Share of the loading branch's impulse up to a deflection.
+fn impulse_share_to(curve: &Curve, deflection_m: f64) -> f64 {
+    let (t, d, f) = (curve.time_s(), curve.deflection_m(), curve.force_n());
+    let end = loading::loading_end(curve);
+    let steps = |to: usize| (1..=to).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1]));
+    let there = (0..=end).take_while(|&i| d[i] <= deflection_m).count().saturating_sub(1);
+    let whole: f64 = steps(end).sum();
+    if whole > 0.0 { steps(there + 1).sum::<f64>() / whole } else { 1.0 }
 }
 
 /// A history in SI with strictly increasing times.
@@ -743,6 +782,7 @@ fn sample(
     original: &Curve,
     closing: &[f64],
     setup: &Setup<'_>,
+    notes: &mut Vec<String>,
     warnings: &mut Vec<String>,
 ) -> Result<(Curve, Vec<f64>), ExtractError> {
     let sampling = setup.recipe.sampling;
@@ -756,11 +796,16 @@ fn sample(
         .map(|t| t.min(last_s))
         .collect();
     if times.len() < sampling.states {
-        warnings.push(format!(
+        let short = format!(
             "short: the record holds {} of {} states from contact on",
             times.len(),
             sampling.states
-        ));
+        );
+        // A record that was cut on purpose is as short as was asked for.
+        match setup.stated.truncate_s {
+            Some(_) => notes.push(short),
+            None => warnings.push(short),
+        }
     }
     let at_times =
         |values: &[f64]| interpolate(at, values, &times).map_err(|_| ExtractError::NoOverlap);

@@ -291,7 +291,7 @@ impl Spring {
                 let stiffness = asked.or(self.unloading_n_per_m).unwrap_or(steepest);
                 if asked.is_none() && self.unloading_n_per_m.is_none() && steepest > 0.0 {
                     self.warnings.push(format!(
-                        "it has no unloading stiffness: it unloads with its steepest rise, {:.4} MN/m, and so gives back little; say unloading = \"…MN/m\"",
+                        "it has no unloading stiffness: it unloads with its steepest rise, {:.4} MN/m; how much it gives back follows from that: say unloading = \"…MN/m\"",
                         steepest / 1e6
                     ));
                 }
