@@ -275,7 +275,9 @@ pub enum ReadError {
         "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
     )]
     Deck { path: PathBuf },
-    #[error("{path}: it has several sections: select one of {known} (--section)")]
+    #[error(
+        "{path}: it has several sections: select one of {known} (with --section; in a recipe the section's name is the file's)"
+    )]
     SeveralSections { path: PathBuf, known: String },
     #[error("{path}: it has no section \"{section}\": it has {known}")]
     NoSuchSection { path: PathBuf, section: String, known: String },
