@@ -1,11 +1,9 @@
 //! binout against the text files of the same runs, and damaged containers.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{crumple_fails, crumple_in, crumple_ok, fixture, samples, shared};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, samples, shared};
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read, read_sections};
 

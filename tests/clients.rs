@@ -5,13 +5,11 @@
 //! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, and
 //! CRUMPLE_PYTHON_ISOMME one with requirements-isomme.txt, as tests/run sets them.
 
-mod common;
-
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-use common::{build_fixture, crumple_ok, fixture, python, python_of, root};
+use crate::common::{build_fixture, crumple_ok, fixture, python, python_of, root};
 use crumple::curve::Envelope;
 use crumple::database::Database;
 use crumple::dataset::{TableKind, TrainingSet};
@@ -41,7 +39,7 @@ fn run_python_of(mut command: Command, script: &str, arguments: &[&str]) -> Opti
 /// Every value of every section that lasso-python reads, of every binout sample.
 #[test]
 fn lasso_reads_the_same_binout() {
-    let Some(files) = common::samples("binout") else { return };
+    let Some(files) = crate::common::samples("binout") else { return };
     let files: Vec<&str> = files
         .iter()
         .filter(|path| !path.display().to_string().contains("not_binout"))

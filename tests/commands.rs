@@ -1,10 +1,8 @@
 //! The commands as a user runs them, on the bundled FE runs.
 
-mod common;
-
 use std::path::Path;
 
-use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {
@@ -207,7 +205,7 @@ fn energy_audits_of_all_groups() {
 /// The full runs give the curves of the thinned ones, bit for bit.
 #[test]
 fn full_runs_and_bundled_runs_agree() {
-    let Some(full) = common::shared("fe") else { return };
+    let Some(full) = crate::common::shared("fe") else { return };
     let folder = tempfile::tempdir().unwrap();
     for group in [WALL, "lead-car-pair", "vehicle-pair"] {
         build_fixture(folder.path(), group);

@@ -1,11 +1,9 @@
 //! Contact and plausibility: where a curve begins, and which runs no crash can be.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
 use crumple::curve::Masses;
 use crumple::curve::extract::{
     ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract,

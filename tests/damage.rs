@@ -1,8 +1,6 @@
 //! Cut and damaged files: whole states are returned, what is missing is named, nothing panics.
 
-mod common;
-
-use common::{fixture, samples};
+use crate::common::{fixture, samples};
 use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
 use proptest::prelude::*;
 
@@ -103,7 +101,7 @@ fn a_missing_rotational_block_is_named() {
 #[test]
 fn the_other_formats_cut_at_every_byte_of_their_end() {
     for format in text_formats() {
-        let Some(folder) = common::shared("samples/lsdyna") else { return };
+        let Some(folder) = crate::common::shared("samples/lsdyna") else { return };
         if format == "nodout" || !folder.join(format).is_dir() {
             continue;
         }

@@ -1,12 +1,10 @@
 //! LS-DYNA decks: those of our own runs, and those of others.
 
-mod common;
-
 use std::fs;
 use std::io::{self, BufRead};
 use std::path::Path;
 
-use common::shared;
+use crate::common::shared;
 use crumple::solver::lsdyna::deck::{Deck, Interface, Named, read};
 use crumple::unit::UnitSystem;
 

@@ -1,12 +1,10 @@
 //! What commands print with --json, and what users write, against the schemas; Python's jsonschema
 //! judges.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{build_fixture, crumple_in, crumple_ok, fixture, python, root};
+use crate::common::{build_fixture, crumple_in, crumple_ok, fixture, python, root};
 use serde_json::{Value, json};
 
 /// Documents by name, each with its schema.
@@ -200,7 +198,7 @@ fn long_work_shows_its_progress_on_a_terminal() {
         ),
     ] {
         let mut on_a_terminal = |more: &[&str]| {
-            let command = std::mem::replace(&mut python, common::python().unwrap())
+            let command = std::mem::replace(&mut python, crate::common::python().unwrap())
                 .args(["-c", script, env!("CARGO_BIN_EXE_crumple")])
                 .args(arguments)
                 .args(more)

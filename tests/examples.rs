@@ -1,11 +1,9 @@
 //! Every example is run as a user would.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{fixture, root};
+use crate::common::{fixture, root};
 
 /// The example's program; cargo builds all examples before it runs the tests.
 fn example(name: &str, arguments: &[&str]) -> String {

@@ -1,14 +1,12 @@
 //! Files and databases: what is no file is refused, sizes are bounded, what is half-written or
 //! altered is found, and what others have put into a database stays.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
 use hdf5_pure::{AttrValue, File as Hdf5};
 use serde_json::Value;
 

@@ -1,8 +1,6 @@
 //! Files of a run that is still going: a writer appends to them while they are read. Every
 //! reading is the beginning of the whole file.
 
-mod common;
-
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use common::{fixture, shared};
+use crate::common::{fixture, shared};
 use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read_from, read_sections};
 
 /// Bytes appended at once: no divisor of any line's or record's length.

@@ -1,13 +1,11 @@
 //! House rules that the compiler does not know: layering, schemas, what a file says first,
 //! what a repository must not carry.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::root;
+use crate::common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
@@ -220,7 +218,7 @@ fn dependencies_have_fixed_minor_versions() {
 }
 
 /// Schemas are generated from the types. To write them again:
-/// CRUMPLE_WRITE_SCHEMAS=1 cargo test --test house_rules schemas
+/// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
 #[test]
 fn schemas_are_those_of_the_types() {
     let schemas = [

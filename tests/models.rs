@@ -1,10 +1,8 @@
 //! Models of the force over speed and deflection: few cases, many parameters, left-out speeds.
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, root};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, root};
 use crumple::curve::energy::audit;
 use crumple::curve::loading::unloading_stiffness;
 use crumple::curve::{Case, Curve, ForceKind, Masses, Parameter};
@@ -895,7 +893,7 @@ fn contact_and_body_force_rebound_alike() {
 fn the_recorded_force_gives_the_recorded_motion_back() {
     for (group, speeds) in [("lead-car-wall", 7), ("vehicle-pair", 9)] {
         let folder = tempfile::tempdir().unwrap();
-        let study = common::root().join("fixtures/fe").join(group).join("study.toml");
+        let study = crate::common::root().join("fixtures/fe").join(group).join("study.toml");
         let report = crumple::build::build(&study, &folder.path().join("c.h5"), |_| {}).unwrap();
         let cases = report.database.cases(group);
         assert_eq!(cases.len(), speeds);

@@ -1,8 +1,6 @@
 //! The nonlinear spring-damper: laws found again, FE's motion, seeds and threads, wrong input.
 
-mod common;
-
-use common::root;
+use crate::common::root;
 use crumple::curve::Case;
 use crumple::curve::rating::l1_ratio;
 use crumple::history::derivative;

@@ -1,11 +1,9 @@
 //! OpenRadioss T01 against the text of the same runs, and damaged files.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{crumple_ok, shared};
+use crate::common::{crumple_ok, shared};
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
 

@@ -1,12 +1,10 @@
 //! Files cut and overwritten at many places: what is returned is what the undamaged file
 //! has, or a problem says what was given up.
 
-mod common;
-
 use std::collections::HashMap;
 use std::path::Path;
 
-use common::{fixture, shared};
+use crate::common::{fixture, shared};
 use crumple::solver::{ProblemCode, Selection, SolverFile, read_from};
 
 /// Bytes of a sample that are used: the damage of a state shows on few states.

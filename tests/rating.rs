@@ -1,11 +1,9 @@
 //! `crumple rate` as a user runs it: what it reads, what it says, and how it refuses.
 
-mod common;
-
 use std::fmt::Write;
 use std::path::Path;
 
-use common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
 use serde_json::Value;
 
 /// Writes a table of `time` and `value` over samples of 1 ms.

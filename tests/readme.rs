@@ -1,11 +1,9 @@
 //! The README's commands do what it says, and its numbers are the program's.
 
-mod common;
-
 use std::path::PathBuf;
 use std::process::Command;
 
-use common::{crumple_ok, root};
+use crate::common::{crumple_ok, root};
 
 fn readme() -> String {
     std::fs::read_to_string(root().join("README.md")).unwrap()
@@ -86,7 +84,7 @@ fn tables_of_the_methods_are_those_of_compare() {
 fn nested_errors_of_the_readme_are_those_of_validate() {
     let folder = tempfile::tempdir().unwrap();
     for group in ["lead-car-pair", "lead-car-wall", "vehicle-pair"] {
-        common::build_fixture(folder.path(), group);
+        crate::common::build_fixture(folder.path(), group);
     }
     let printed = crumple_ok(folder.path(), &["validate", "curves.h5", "--nested"]);
     // The rows of means have no speed behind the name.

@@ -3,12 +3,10 @@
 //! The program reads fixed columns; the reading here knows no columns: it finds numbers by
 //! their grammar, so that the two cannot share a mistake about layout.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{crumple_in, crumple_ok, samples};
+use crate::common::{crumple_in, crumple_ok, samples};
 
 /// Columns of a CSV by name, and the times.
 type Table = BTreeMap<String, Vec<f64>>;
@@ -461,7 +459,7 @@ fn elout_and_eloutdet_values_are_the_files() {
 /// Every sample is read, or refused with the right reason.
 #[test]
 fn every_sample_is_read_or_refused() {
-    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    let Some(folder) = crate::common::shared("samples/lsdyna") else { return };
     let mut read = 0;
     let mut kinds: Vec<_> = folder.read_dir().unwrap().map(|e| e.unwrap().path()).collect();
     kinds.retain(|path| path.is_dir());
@@ -533,7 +531,7 @@ fn inspect_says_states_times_and_ids() {
         ("swforc/l2a_qd_r6.1.2_mpp_d_first20", 20, Some([0.0, 1.89984]), 26),
         ("swforc/pillars_r13.1.1_smp_d_beamweld", 1001, Some([0.0, 4.99989]), 1),
     ];
-    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    let Some(folder) = crate::common::shared("samples/lsdyna") else { return };
     for (name, states, time, entities) in cases {
         let path = folder.join(name);
         // --strict: exit code 0 says that no sample counts as damaged.
@@ -551,7 +549,7 @@ fn inspect_says_states_times_and_ids() {
 
 #[test]
 fn single_surface_contacts_are_named_and_have_no_histories() {
-    let Some(folder) = common::shared("samples/lsdyna") else { return };
+    let Some(folder) = crate::common::shared("samples/lsdyna") else { return };
     let path = folder.join("rcforc/pillars_r13.1.1_smp_d_slave_master");
     let path = path.to_str().unwrap();
     let report: serde_json::Value =

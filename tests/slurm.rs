@@ -1,10 +1,8 @@
 //! The Slurm example, really run on this machine: see `tests/slurm/one_machine`.
 
-mod common;
-
 use std::process::Command;
 
-use common::root;
+use crate::common::root;
 
 /// A job array of 1, 2 and 3 shards and its merge give the bytes of a run without shards.
 #[test]

@@ -1,14 +1,12 @@
 //! A nodout whose states are laid out evenly is read by leaps: the same values as line by
 //! line, few pages for few nodes, and the line reader at the first surprise.
 
-mod common;
-
 use std::collections::HashSet;
 use std::fs;
 use std::io;
 use std::sync::Mutex;
 
-use common::{crumple_fails, crumple_ok};
+use crate::common::{crumple_fails, crumple_ok};
 use crumple::solver::source::Source;
 use crumple::solver::{Access, Selection, SolverFile, blocks, read_from};
 

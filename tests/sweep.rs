@@ -1,15 +1,13 @@
 //! Sweeps: values of items, the same bytes on any number of threads, pieces and shards, runs
 //! that were killed, files that do not belong together, wrong plans.
 
-mod common;
-
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{crumple_fails, crumple_in, crumple_ok, python, root};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, python, root};
 use crumple::sweep::{Chunk, Settings, Shard, Sweep, SweepError, merge, write};
 use serde_json::Value;
 

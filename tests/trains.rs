@@ -1,12 +1,10 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
-mod common;
-
 use std::path::Path;
 use std::sync::OnceLock;
 
-use common::{crumple_fails, crumple_ok, root};
+use crate::common::{crumple_fails, crumple_ok, root};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {

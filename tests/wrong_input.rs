@@ -1,12 +1,10 @@
 //! Wrong input: the message names file, place and remedy, the exit code is 1 or 2, and
 //! nothing half-written stays behind.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture, python};
 
 /// The run of each group that is studied.
 const RUNS: [(&str, &str); 3] =
@@ -162,7 +160,7 @@ fn runs() {
 
 #[test]
 fn near_ids_come_first() {
-    let Some(folder) = common::shared("samples/lsdyna/nodout") else { return };
+    let Some(folder) = crate::common::shared("samples/lsdyna/nodout") else { return };
     let path = folder.join("mlp6_113151_smp_d_1000nodes");
     let error =
         crumple_fails(Path::new("."), 1, &["histories", path.to_str().unwrap(), "--id", "1004"]);

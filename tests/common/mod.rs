@@ -1,5 +1,4 @@
 //! What several tests share: where the real samples are, how the program is run.
-#![allow(dead_code, reason = "each test uses its part")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
