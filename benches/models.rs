@@ -5,10 +5,11 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use crumple::assess::validate::validate;
 use crumple::curve::Case;
 use crumple::dataset::TrainingSet;
-use crumple::surrogate::{Model, Options, Query, predict};
-use crumple::validate::{candidates, validate};
+use crumple::surrogate::{Model, ModelKind, Query, predict};
+
 use divan::{Bencher, black_box};
 
 const GROUP: &str = "lead-car-wall";
@@ -28,26 +29,26 @@ fn cases() -> &'static [Case] {
     })
 }
 
-fn options(name: &str) -> Options {
-    candidates(0).into_iter().find(|o| o.name() == name).expect("a model of that name")
+fn kind(name: &str) -> ModelKind {
+    ModelKind::named(name, 0).expect("a model of that name")
 }
 
-const MODELS: [&str; 7] = ["nearest", "linear", "rate", "registered", "gp", "forest", "extra"];
+const MODELS: [&str; 6] = ["nearest", "linear", "rate", "registered", "forest", "extra"];
 
 #[divan::bench(args = MODELS, sample_count = 5)]
 fn fit(bencher: Bencher, name: &str) {
     let set = TrainingSet::new(GROUP, cases()).expect("a training set");
-    bencher.bench(|| Model::fit(black_box(&set), options(name)));
+    bencher.bench(|| Model::fit(black_box(&set), kind(name)));
 }
 
 #[divan::bench(args = MODELS, sample_count = 5)]
 fn predict_one_curve(bencher: Bencher, name: &str) {
     let set = TrainingSet::new(GROUP, cases()).expect("a training set");
-    let model = Model::fit(&set, options(name)).expect("a model");
+    let model = Model::fit(&set, kind(name)).expect("a model");
     bencher.bench(|| predict(black_box(&model), &Query::at(13.9)));
 }
 
 #[divan::bench(sample_count = 3)]
 fn validate_all_models() {
-    black_box(validate(GROUP, cases(), &candidates(0), None).expect("a validation"));
+    black_box(validate(GROUP, cases(), &ModelKind::candidates(0), None).expect("a validation"));
 }

@@ -6,11 +6,11 @@
 use std::error::Error;
 use std::path::Path;
 
+use crumple::assess::validate::{Choice, train};
 use crumple::build::build;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::{Query, predict};
 use crumple::unit::km_per_h;
-use crumple::validate::{Choice, train};
 
 const GROUP: &str = "lead-car-wall";
 const SPEED_M_PER_S: f64 = 50.0 / 3.6;

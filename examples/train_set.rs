@@ -7,9 +7,9 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
+use crumple::assess::compare::Settings;
+use crumple::assess::train::compare_train;
 use crumple::build::build;
-use crumple::compare::Settings;
-use crumple::compare::train::compare_train;
 use crumple::scenario;
 
 /// Left, top, width and height of the plot area, in pixels.

@@ -344,16 +344,16 @@ impl TrainingSet {
     /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
     /// cases, of the declared force.
     pub fn table(&self, kind: TableKind) -> Dataset<f64, f64, ndarray::Ix1> {
-        self.table_of(kind, Force::Declared)
+        self.table_of(kind, self.force_kind)
     }
 
-    /// The same table of either force.
-    pub fn table_of(&self, kind: TableKind, force: Force) -> Dataset<f64, f64, ndarray::Ix1> {
+    /// The same table of the declared force or of the body's.
+    pub fn table_of(&self, kind: TableKind, force: ForceKind) -> Dataset<f64, f64, ndarray::Ix1> {
         let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();
         for case in &self.cases {
-            let (deflection_m, force_n) = case.points(kind, force);
+            let (deflection_m, force_n) = case.points(kind, force == self.force_kind);
             for (d, f) in deflection_m.into_iter().zip(force_n) {
                 records.extend([case.speed_m_per_s, d]);
                 records.extend(&case.features);
@@ -367,15 +367,6 @@ impl TrainingSet {
             names.into_iter().chain(self.features.iter().map(Feature::name)).collect(),
         )
     }
-}
-
-/// Which force of a case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Force {
-    /// The recipe's.
-    Declared,
-    /// That of the body's motion.
-    Body,
 }
 
 impl TrainingCase {
@@ -408,25 +399,15 @@ impl TrainingCase {
         (self.speed_m_per_s, &self.features)
     }
 
-    pub fn envelope_of(&self, force: Force) -> &Envelope {
-        match force {
-            Force::Declared => &self.envelope,
-            Force::Body => &self.motion.force,
-        }
-    }
-
-    fn points(&self, kind: TableKind, force: Force) -> (Vec<f64>, Vec<f64>) {
-        match (kind, force) {
-            (TableKind::Samples, Force::Declared) => {
-                (self.sampled.deflection_m().to_vec(), self.sampled.force_n().to_vec())
-            }
-            (TableKind::Samples, Force::Body) => {
-                let force = &self.motion.force;
-                (force.deflection_m().to_vec(), force.force_n().to_vec())
-            }
+    /// Deflections and forces of the table's rows, of the declared force or of the body's.
+    fn points(&self, kind: TableKind, declared: bool) -> (Vec<f64>, Vec<f64>) {
+        let columns = |e: &Envelope| (e.deflection_m().to_vec(), e.force_n().to_vec());
+        match (kind, declared) {
+            (TableKind::Samples, true) => columns(&self.sampled),
+            (TableKind::Samples, false) => columns(&self.motion.force),
             (TableKind::Grid, _) => {
                 let deflection_m = grid(self.envelope.end_m(), 1);
-                let envelope = self.envelope_of(force);
+                let envelope = if declared { &self.envelope } else { &self.motion.force };
                 let force_n = deflection_m.iter().map(|&d| envelope.force_at(d)).collect();
                 (deflection_m, force_n)
             }

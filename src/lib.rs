@@ -5,7 +5,7 @@
 //! ```
 //! use crumple::build::build;
 //! use crumple::dataset::TrainingSet;
-//! use crumple::surrogate::{Model, Options, Query, forest::ForestOptions, predict};
+//! use crumple::surrogate::{Model, ModelKind, Query, forest::ForestOptions, predict};
 //! use std::path::Path;
 //!
 //! # let folder = tempfile::tempdir()?;
@@ -16,7 +16,7 @@
 //!
 //! // database → data set → forest
 //! let set = TrainingSet::new("lead-car-wall", report.database.cases("lead-car-wall"))?;
-//! let model = Model::fit(&set, Options::Forest(ForestOptions::default()))?;
+//! let model = Model::fit(&set, ModelKind::forest(ForestOptions::default()))?;
 //!
 //! // forest → curve at a speed that was never run
 //! let curve = predict(&model, &Query::at(50.0 / 3.6))?;
@@ -67,8 +67,6 @@ pub mod sweep;
 
 pub mod rating;
 
-pub mod validate;
-
-pub mod compare;
+pub mod assess;
 
 pub mod file;

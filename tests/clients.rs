@@ -17,7 +17,7 @@ use crumple::forest::{ForestParams, Ties};
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, RunSettings, Unloading, simulate,
 };
-use crumple::surrogate::{Fitted, Model};
+use crumple::surrogate::Model;
 use linfa::Dataset;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2, Axis};
@@ -323,7 +323,7 @@ fn onnx_runtime_predicts_the_same() {
         assert_eq!(theirs["metadata"]["target"], "force_N");
         assert_eq!(theirs["producer"], concat!("crumple ", env!("CARGO_PKG_VERSION")));
         let model = Model::read(&here.join("m")).unwrap();
-        let Fitted::Forest(forest) = model.fitted() else { panic!("a forest was trained") };
+        let forest = model.forest().expect("a forest was trained");
         let ours: Array1<f64> = forest.forest().predict(&records);
         let theirs = theirs["predicted"].as_array().unwrap();
         assert_eq!(theirs.len(), ours.len());

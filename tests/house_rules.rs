@@ -226,7 +226,7 @@ fn schemas_are_those_of_the_types() {
         ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
         ("plan.schema.json", schemars::schema_for!(crumple::plan::PlanFile)),
         ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
-        ("validation.schema.json", schemars::schema_for!(crumple::validate::Report)),
+        ("validation.schema.json", schemars::schema_for!(crumple::assess::validate::Report)),
         ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
     ];
     for (name, schema) in schemas {

@@ -1,5 +1,6 @@
 //! Arguments that several commands share.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crumple::curve::Parameter;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::{MASS, SPEED};
@@ -28,25 +29,21 @@ pub fn parameter(text: &str) -> Result<(String, Parameter), String> {
     Ok((name.into(), value))
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-pub enum MaxCrush {
-    /// Cubic spline through the training speeds (reference method)
-    Spline,
-    /// Monotone cubic through (0, 0) and the training speeds
-    Monotone,
-    /// Where the curve has taken up the kinetic energy
-    Energy,
-    /// Where the body's own force has stopped it
-    Motion,
+/// One of a few values of the library, by name and with a line of help each.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    values: &'static [(&'static str, T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let names = values.iter().map(|(name, _, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).map(|given| {
+        let found = values.iter().find(|(name, ..)| *name == given);
+        found.expect("the parser lets only these names pass").1
+    })
 }
 
-impl From<MaxCrush> for MaxCrushRule {
-    fn from(rule: MaxCrush) -> Self {
-        match rule {
-            MaxCrush::Spline => Self::Spline,
-            MaxCrush::Monotone => Self::Monotone,
-            MaxCrush::Energy => Self::Energy,
-            MaxCrush::Motion => Self::Motion,
-        }
-    }
-}
+/// Rules for the maximal crush.
+pub const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
+    ("spline", MaxCrushRule::Spline, "Cubic spline through the training speeds (reference method)"),
+    ("monotone", MaxCrushRule::Monotone, "Monotone cubic through (0, 0) and the training speeds"),
+    ("energy", MaxCrushRule::Energy, "Where the curve has taken up the kinetic energy"),
+    ("motion", MaxCrushRule::Motion, "Where the body's own force has stopped it"),
+];

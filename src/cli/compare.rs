@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::compare::train::{TrainComparison, compare_train};
-use crumple::compare::{self, Comparison, Settings};
+use crumple::assess::compare::{self, Comparison, Settings};
+use crumple::assess::train::{TrainComparison, compare_train};
 use crumple::database::Database;
 use crumple::nsdm::Start;
 use crumple::scenario;
 use crumple::unit::km_per_h;
 use serde::Serialize;
 
-use super::arguments;
+use super::arguments::{self, one_of};
 use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome};
@@ -55,15 +55,19 @@ pub struct Args {
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(0..=1000))]
     nsdm_seeds: u64,
     /// Where the genetic algorithm starts
-    #[arg(long, value_enum, default_value_t = NsdmStart::Random)]
-    nsdm_start: NsdmStart,
+    #[arg(long, value_parser = one_of(STARTS), default_value = "random")]
+    nsdm_start: Start,
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum NsdmStart {
-    Random,
-    LeastSquares,
-}
+/// Where the genetic algorithm may start.
+const STARTS: &[(&str, Start, &str)] = &[
+    ("random", Start::Random, "From values drawn evenly, as the reference method has it"),
+    (
+        "least-squares",
+        Start::LeastSquares,
+        "A quarter from the values that fit the accelerations best",
+    ),
+];
 
 /// Comparisons at several speeds.
 #[derive(Serialize)]
@@ -89,10 +93,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         seed: args.seed,
         fixed_speed_m_per_s: args.fixed_speed,
         nsdm_seeds: args.nsdm_seeds,
-        nsdm_start: match args.nsdm_start {
-            NsdmStart::Random => Start::Random,
-            NsdmStart::LeastSquares => Start::LeastSquares,
-        },
+        nsdm_start: args.nsdm_start,
     };
     if let Some(path) = &args.train {
         return train(path, &settings, manners);

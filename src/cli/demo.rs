@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crumple::assess::validate::{train_chosen, validate};
 use crumple::build::{self, RunOutcome};
 use crumple::curve::{Case, ForceKind};
 use crumple::database::Database;
@@ -12,9 +13,8 @@ use crumple::file::{WriteError, write_at, write_whole};
 use crumple::multibody::{Run, simulate};
 use crumple::scenario;
 use crumple::surrogate::leave_one_out::Validation;
-use crumple::surrogate::{Model, PredictedCurve, Query, predict};
+use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crumple::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
-use crumple::validate::{self, Choice, candidates};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
 
@@ -38,6 +38,9 @@ static FE_RUNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/fe");
 /// The group that is trained, and a speed between its FE runs.
 const GROUP: &str = "lead-car-wall";
 const SPEED_M_PER_S: f64 = 50.0 * M_PER_S_PER_KM_PER_H;
+
+/// Seed of the forests.
+const SEED: u64 = 0;
 
 /// FE's run of a whole train, for the comparison of methods.
 static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set");
@@ -99,7 +102,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     flow.unpack()?;
     let database = flow.build()?;
     let validations = flow.validate(&database)?;
-    let model = flow.train(&database)?;
+    let model = flow.train(&database, &validations)?;
     let curve = flow.predict(&model)?;
     let run = flow.simulate()?;
     let Flow { bar, files, .. } = flow;
@@ -166,19 +169,25 @@ impl Flow<'_> {
         let mut validations = Vec::new();
         for group in database.groups() {
             self.bar.step(&format!("validating {group}"));
-            let cases = database.cases(group);
-            validations.push(validate::validate(group, cases, &candidates(0), None)?);
+            validations.push(validate(
+                group,
+                database.cases(group),
+                &ModelKind::candidates(SEED),
+                None,
+            )?);
         }
         Ok(validations)
     }
 
-    /// Trains a model of every group; the one of [`GROUP`] goes on.
-    fn train(&mut self, database: &Database) -> Result<Model, Failure> {
+    /// Trains the model of every group that its validation chose; the one of [`GROUP`] goes on.
+    fn train(&mut self, database: &Database, validations: &[Validation]) -> Result<Model, Failure> {
         let mut first = None;
         for (group, file) in MODELS {
             self.bar.step(&format!("training {file}"));
-            let choice = Choice::Auto { seed: 0, trees: None };
-            let model = validate::train(group, database.cases(group), choice)?;
+            let validation = validations.iter().find(|v| v.group == group);
+            let validation = validation.expect("every group was validated").clone();
+            let cases = database.cases(group);
+            let model = train_chosen(group, cases, &ModelKind::all(SEED), validation)?;
             model.write(&self.path(file))?;
             first = first.or(Some(model));
         }

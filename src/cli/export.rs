@@ -10,6 +10,7 @@ use crumple::surrogate::{Model, PredictedCurve};
 use crumple::unit::UnitSystem;
 use serde::Serialize;
 
+use super::arguments::one_of;
 use super::output;
 use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
@@ -48,20 +49,22 @@ pub struct Target {
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
     /// Which force [default: body; a JSON file of crumple predict holds both]
-    #[arg(long, value_enum)]
-    force: Option<ForceChoice>,
+    #[arg(long, value_parser = one_of(FORCES))]
+    force: Option<ForceKind>,
     /// Number of the curve in the target's deck
     #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_999))]
     curve_id: u32,
 }
 
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum ForceChoice {
-    /// The force that moves a body of one mass
-    Body,
-    /// What the obstacle feels: for bodies whose crush zone is a mass of its own
-    Contact,
-}
+/// Forces of a curve.
+const FORCES: &[(&str, ForceKind, &str)] = &[
+    ("body", ForceKind::Body, "The force that moves a body of one mass"),
+    (
+        "contact",
+        ForceKind::Contact,
+        "What the obstacle feels: for bodies whose crush zone is a mass of its own",
+    ),
+];
 
 fn units(text: &str) -> Result<UnitSystem, String> {
     UnitSystem::parse(text).map_err(|e| e.to_string())
@@ -87,10 +90,7 @@ impl Target {
     /// The file's bytes of the force that was asked for, or of the body's.
     pub fn encode(&self, format: &Format, curve: &PredictedCurve) -> Result<Vec<u8>, Failure> {
         let options = Options { units: self.units, id: self.curve_id };
-        let kind = match self.force {
-            Some(ForceChoice::Contact) => ForceKind::Contact,
-            Some(ForceChoice::Body) | None => ForceKind::Body,
-        };
+        let kind = self.force.unwrap_or(ForceKind::Body);
         let alone = curve.of_force(kind).map_err(|error| match (error, self.force) {
             (PredictError::NoBodyForce, None) => Failure::Usage(
                 "the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into(),

@@ -10,7 +10,7 @@ use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, PredictedCurve, Query, predict};
 use crumple::unit::km_per_h;
 
-use super::arguments::{self, MaxCrush};
+use super::arguments::{self, MAX_CRUSH_RULES, one_of};
 use super::output;
 use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
 
@@ -30,8 +30,8 @@ pub struct Args {
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Rule for the maximal crush [default: the one that was best when speeds were left out]
-    #[arg(long, value_enum)]
-    max_crush: Option<MaxCrush>,
+    #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
+    max_crush: Option<MaxCrushRule>,
     /// The reference method's choices: maximal crush by the cubic spline
     #[arg(long, conflicts_with = "max_crush")]
     paper: bool,
@@ -54,7 +54,7 @@ pub struct Args {
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let rule = match args.paper {
         true => Some(MaxCrushRule::Spline),
-        false => args.max_crush.map(MaxCrushRule::from),
+        false => args.max_crush,
     };
     let formats = args
         .output

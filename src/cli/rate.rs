@@ -10,6 +10,7 @@ use crumple::rating::{self, Quantity, Rating, Settings, Signal, table};
 use crumple::solver::{self, ReadError, Selection, WantedId};
 use crumple::unit::TIME;
 
+use super::arguments::one_of;
 use super::{CommandResult, Failure, Manners, Outcome, output};
 
 /// Most bytes of a table that is rated: some million rows.
@@ -18,28 +19,26 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
 /// Rate a prediction against a reference: ratios, peaks, ISO/TS 18571, CORA and others
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  crumple rate test.csv result.csv --column-a x_acceleration --column-b 'a_m_per_s2[A1]' --cfc 60
-  crumple rate fe/nodout result.csv --id-a 900001 --component-a x_velocity --scale-a 0.001 \\
-      --column-b 'v_m_per_s[A1]' --to 150ms
+  crumple rate test.csv:x_acceleration 'result.csv:a_m_per_s2[A1]' --cfc 60
+  crumple rate fe/nodout:900001:x_velocity,scale=0.001 'result.csv:v_m_per_s[A1]' --to 150ms
   crumple rate 36kmh/nodout 48kmh/nodout --id 900001 --component x_acceleration --cfc 60 --json
-  crumple rate test.csv model.csv --time-unit-a ms --time-unit-b s
+  crumple rate fe/binout:rwforc/forces:1:normal_force fe/rwforc:1:normal_force
+  crumple rate test.csv,time=ms model.csv,time=s
 A is the reference r, B the prediction p. Each is a CSV file (a header line; the first column is the
-time) or any file that crumple histories reads. Both are filtered if asked, then interpolated
+time), FILE:COLUMN, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
+several sections FILE:SECTION:ID:COMPONENT; behind it ,scale=FACTOR on the values and ,time=UNIT of
+the times (s, ms, us). What both share may stand once, as --id and --component or --column. Both are filtered if asked, then interpolated
 linearly at common times 0.1 ms apart (10 kHz, as ISO/TS 18571 wants it). Accelerations are negative
 while the body is slowed down. ISO/TS 18571 and CORA take up to 2 s: choose with --from and --to.")]
 pub struct Args {
-    /// Reference: CSV or a solver's file
-    #[arg(value_name = "A")]
-    reference: PathBuf,
-    /// Prediction: CSV or a solver's file
-    #[arg(value_name = "B")]
-    prediction: PathBuf,
+    /// Reference: CSV or a solver's file, with what to take from it
+    #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
+    reference: Address,
+    /// Prediction: CSV or a solver's file, with what to take from it
+    #[arg(value_name = "B", value_parser = Address::parse, allow_hyphen_values = true)]
+    prediction: Address,
     #[command(flatten)]
     both: Both,
-    #[command(flatten)]
-    of_a: OfA,
-    #[command(flatten)]
-    of_b: OfB,
     /// Filter both with this channel frequency class, such as 60 or 180
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
@@ -50,21 +49,21 @@ pub struct Args {
     #[arg(long, value_parser = time, allow_hyphen_values = true)]
     to: Option<f64>,
     /// What the signals are (default: an acceleration if both names say so)
-    #[arg(long, value_enum)]
-    quantity: Option<QuantityArgument>,
+    #[arg(long, value_parser = one_of(QUANTITIES))]
+    quantity: Option<Quantity>,
 }
 
 /// Where the signal stands in both files.
 #[derive(clap::Args)]
 struct Both {
     /// Column of the CSV files
-    #[arg(long, conflicts_with_all = ["column_a", "column_b"])]
+    #[arg(long)]
     column: Option<String>,
     /// Node, wall or interface of the solver's files; 3:surfa is one side
-    #[arg(long, conflicts_with_all = ["id_a", "id_b"])]
+    #[arg(long)]
     id: Option<WantedId>,
     /// Component of the solver's files, named as in binout, such as x_velocity
-    #[arg(long, conflicts_with_all = ["component_a", "component_b"])]
+    #[arg(long)]
     component: Option<String>,
     /// Section of binouts, such as nodout or rwforc/forces
     #[arg(long)]
@@ -74,45 +73,75 @@ struct Both {
     format: Option<String>,
 }
 
-#[derive(clap::Args)]
-struct OfA {
-    /// Column of A
-    #[arg(long)]
-    column_a: Option<String>,
-    /// Node, wall or interface of A
-    #[arg(long)]
-    id_a: Option<WantedId>,
-    /// Component of A
-    #[arg(long)]
-    component_a: Option<String>,
-    /// Factor on the values of A, such as 0.001 from mm/s to m/s, or -1 (default: 1)
-    #[arg(long, value_parser = factor, allow_hyphen_values = true)]
-    scale_a: Option<f64>,
-    /// Unit of the times of A (default: s)
-    #[arg(long, value_enum)]
-    time_unit_a: Option<TimeUnit>,
+/// Where one signal stands, as it is written on the command line.
+#[derive(Clone, Debug, PartialEq)]
+struct Address {
+    path: PathBuf,
+    /// What stands behind the file's name: a column, or a history.
+    within: Option<String>,
+    /// Factor on the values.
+    scale: f64,
+    /// Of the times.
+    unit: Option<TimeUnit>,
 }
 
-#[derive(clap::Args)]
-struct OfB {
-    /// Column of B
-    #[arg(long)]
-    column_b: Option<String>,
-    /// Node, wall or interface of B
-    #[arg(long)]
-    id_b: Option<WantedId>,
-    /// Component of B
-    #[arg(long)]
-    component_b: Option<String>,
-    /// Factor on the values of B (default: 1)
-    #[arg(long, value_parser = factor, allow_hyphen_values = true)]
-    scale_b: Option<f64>,
-    /// Unit of the times of B (default: s)
-    #[arg(long, value_enum)]
-    time_unit_b: Option<TimeUnit>,
+impl Address {
+    fn parse(text: &str) -> Result<Self, String> {
+        let (mut rest, mut scale, mut unit) = (text, 1.0, None);
+        // A comma may stand in names as well.
+        while let Some((before, last)) = rest.rsplit_once(',') {
+            if let Some(value) = last.strip_prefix("scale=") {
+                scale = factor(value)?;
+            } else if let Some(value) = last.strip_prefix("time=") {
+                unit = Some(TimeUnit::named(value).ok_or_else(|| {
+                    format!("\"{value}\" is no unit of time here: write s, ms or us")
+                })?);
+            } else {
+                break;
+            }
+            rest = before;
+        }
+        // The longest beginning that is a file, since names may hold colons.
+        let colons = rest.rmatch_indices(':').map(|(at, _)| at);
+        let end =
+            std::iter::once(rest.len()).chain(colons).find(|&at| Path::new(&rest[..at]).exists());
+        // Of no file: what does not stand there is said when it is read.
+        let end = end.unwrap_or_else(|| rest.find(':').unwrap_or(rest.len()));
+        let within = rest.get(end + 1..).map(String::from);
+        Ok(Self { path: rest[..end].into(), within, scale, unit })
+    }
 }
 
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+/// The history of a solver's file that an address names.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct History<'a> {
+    section: Option<&'a str>,
+    id: Option<WantedId>,
+    component: Option<&'a str>,
+}
+
+impl<'a> History<'a> {
+    /// `COMPONENT`, `ID:COMPONENT` or `SECTION:ID:COMPONENT`; an id may have a side, `3:surfa`.
+    fn parse(text: &'a str) -> Result<Self, String> {
+        let Some((before, component)) = text.rsplit_once(':') else {
+            return Ok(Self { component: Some(text), ..Self::default() });
+        };
+        let component = Some(component);
+        if let Ok(id) = before.parse() {
+            return Ok(Self { section: None, id: Some(id), component });
+        }
+        let (section, id) = match before.split_once(':') {
+            Some((section, id)) => {
+                let wrong = |e| format!("\"{text}\": \"{id}\" is no id ({e}): write ID:COMPONENT");
+                (section, Some(id.parse().map_err(wrong)?))
+            }
+            None => (before, None),
+        };
+        Ok(Self { section: Some(section), id, component })
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum TimeUnit {
     S,
     Ms,
@@ -128,6 +157,10 @@ impl TimeUnit {
         }
     }
 
+    fn named(name: &str) -> Option<Self> {
+        [Self::S, Self::Ms, Self::Us].into_iter().find(|u| u.name() == name)
+    }
+
     /// Its length in s.
     fn seconds(self) -> f64 {
         match self {
@@ -141,17 +174,15 @@ impl TimeUnit {
     fn at_the_end_of(name: &str) -> Option<Self> {
         let name = name.trim_end_matches([')', ']', ' ']);
         let (_, unit) = name.rsplit_once(['_', '(', '[', ' ', '/'])?;
-        [Self::S, Self::Ms, Self::Us].into_iter().find(|u| u.name() == unit)
+        Self::named(unit)
     }
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum QuantityArgument {
-    /// Adds the means of the deceleration
-    Acceleration,
-    /// Anything else
-    Other,
-}
+/// What signals may be.
+const QUANTITIES: &[(&str, Quantity, &str)] = &[
+    ("acceleration", Quantity::Acceleration, "Adds the means of the deceleration"),
+    ("other", Quantity::Other, "Anything else"),
+];
 
 fn time(text: &str) -> Result<f64, String> {
     TIME.parse(text).map_err(|e| e.to_string())
@@ -162,18 +193,15 @@ fn factor(text: &str) -> Result<f64, String> {
     factor.ok_or_else(|| format!("\"{text}\" is no factor: write for example 0.001 or -1"))
 }
 
-/// Where one signal stands.
-struct Place<'a> {
-    /// Letter of the file on the command line.
-    letter: char,
+/// Where one signal stands, by its address and the options for both.
+struct Wanted<'a> {
+    address: &'a Address,
     path: &'a Path,
     column: Option<&'a str>,
     id: Option<WantedId>,
     component: Option<&'a str>,
     section: Option<&'a str>,
     format: Option<&'a str>,
-    scale: f64,
-    unit: Option<TimeUnit>,
 }
 
 /// A signal as it was read, and what tells its kind.
@@ -186,41 +214,22 @@ struct Read {
 
 pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let both = &args.both;
-    let common = |letter, path| Place {
-        letter,
-        path,
-        column: both.column.as_deref(),
+    let wanted = |address| Wanted {
+        address,
+        path: address.path.as_path(),
+        column: address.within.as_deref().or(both.column.as_deref()),
         id: both.id,
         component: both.component.as_deref(),
         section: both.section.as_deref(),
         format: both.format.as_deref(),
-        scale: 1.0,
-        unit: None,
     };
-    let (a, b) = (common('a', args.reference.as_path()), common('b', args.prediction.as_path()));
-    let a = Place {
-        column: args.of_a.column_a.as_deref().or(a.column),
-        id: args.of_a.id_a.or(a.id),
-        component: args.of_a.component_a.as_deref().or(a.component),
-        scale: args.of_a.scale_a.unwrap_or(1.0),
-        unit: args.of_a.time_unit_a,
-        ..a
-    };
-    let b = Place {
-        column: args.of_b.column_b.as_deref().or(b.column),
-        id: args.of_b.id_b.or(b.id),
-        component: args.of_b.component_b.as_deref().or(b.component),
-        scale: args.of_b.scale_b.unwrap_or(1.0),
-        unit: args.of_b.time_unit_b,
-        ..b
-    };
+    let (a, b) = (wanted(&args.reference), wanted(&args.prediction));
     let (reference, prediction) = (a.read(manners)?, b.read(manners)?);
     used(args, [reference.is_table, prediction.is_table])?;
     same_unit_of_time(&a, &reference.signal, &b, &prediction.signal)?;
     let named = [&reference.column, &prediction.column].map(|name| Quantity::named(name));
     let quantity = match args.quantity {
-        Some(QuantityArgument::Acceleration) => Quantity::Acceleration,
-        Some(QuantityArgument::Other) => Quantity::Other,
+        Some(quantity) => quantity,
         None if named == [Quantity::Acceleration; 2] => Quantity::Acceleration,
         None => Quantity::Other,
     };
@@ -240,21 +249,15 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
 
 /// Refuses what chooses nothing: a column of a solver's file, a node of a table.
 fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
-    let (both, a, b) = (&args.both, &args.of_a, &args.of_b);
+    let both = &args.both;
     let [a_is_table, b_is_table] = is_table;
     let (any_table, all_tables) = (a_is_table || b_is_table, a_is_table && b_is_table);
     let column = "names a column of a CSV file, but that is a solver's: use --id and --component";
     let history = "chooses a history of a solver's file, but that is a CSV: use --column";
     for (option, given, fits, why) in [
         ("--column", both.column.is_some(), any_table, column),
-        ("--column-a", a.column_a.is_some(), a_is_table, column),
-        ("--column-b", b.column_b.is_some(), b_is_table, column),
         ("--id", both.id.is_some(), !all_tables, history),
-        ("--id-a", a.id_a.is_some(), !a_is_table, history),
-        ("--id-b", b.id_b.is_some(), !b_is_table, history),
         ("--component", both.component.is_some(), !all_tables, history),
-        ("--component-a", a.component_a.is_some(), !a_is_table, history),
-        ("--component-b", b.component_b.is_some(), !b_is_table, history),
         ("--section", both.section.is_some(), !all_tables, history),
     ] {
         if given && !fits {
@@ -268,16 +271,17 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
 const LENGTHS: f64 = 100.0;
 
 /// Units are not guessed: records of very different lengths must say theirs.
-fn same_unit_of_time(a: &Place, of_a: &Signal, b: &Place, of_b: &Signal) -> Result<(), Failure> {
+fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Result<(), Failure> {
     let length = |signal: &Signal| signal.range_s().1 - signal.range_s().0;
     let (long_a, long_b) = (length(of_a), length(of_b));
     let ratio = (long_a / long_b).max(long_b / long_a);
-    if ratio < LENGTHS || (a.unit.is_some() && b.unit.is_some()) {
+    if ratio < LENGTHS || (a.address.unit.is_some() && b.address.unit.is_some()) {
         return Ok(());
     }
     Err(failed(format!(
-        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: say the units with --time-unit-a and --time-unit-b (s, ms or us)",
+        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: say the units behind the names, such as {},time=ms",
         a.path.display(),
+        b.path.display(),
         b.path.display()
     )))
 }
@@ -287,7 +291,7 @@ fn failed(message: String) -> Failure {
     Failure::Failed(message.into())
 }
 
-impl Place<'_> {
+impl Wanted<'_> {
     fn read(&self, manners: Manners) -> Result<Read, Failure> {
         let is_table = self.path.extension().is_some_and(|extension| {
             ["csv", "tsv", "txt"].iter().any(|e| extension.eq_ignore_ascii_case(e))
@@ -306,9 +310,9 @@ impl Place<'_> {
             Err(Failure::Failed(error))
                 if matches!(error.downcast_ref(), Some(ReadError::UnknownFormat { .. })) =>
             {
-                let letter = self.letter;
                 Err(failed(format!(
-                    "{error}; a CSV file has the ending .csv, or --column-{letter}"
+                    "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",
+                    self.path.display()
                 )))
             }
             other => other,
@@ -322,20 +326,19 @@ impl Place<'_> {
         let columns = table::read(&mut &*text, self.column).map_err(|error| {
             let how = match error {
                 table::TableError::NoColumn { .. } | table::TableError::SeveralColumns { .. } => {
-                    format!(" with --column-{}", self.letter)
+                    format!(" behind the file's name: {path}:COLUMN")
                 }
                 _ => String::new(),
             };
             failed(format!("{path}: {error}{how}"))
         })?;
         let said = TimeUnit::at_the_end_of(&columns.time_name);
-        if self.unit.is_none()
+        if self.address.unit.is_none()
             && let Some(unit) = said.filter(|unit| *unit != TimeUnit::S)
         {
             return Err(failed(format!(
-                "{path}: line 1, column 1 (\"{}\"): expected a time in s: say --time-unit-{} {}",
+                "{path}: line 1, column 1 (\"{}\"): expected a time in s: write {path},time={}",
                 columns.time_name,
-                self.letter,
                 unit.name()
             )));
         }
@@ -344,14 +347,18 @@ impl Place<'_> {
     }
 
     fn read_solver_file(&self, manners: Manners) -> Result<Read, Failure> {
+        let within = self.address.within.as_deref();
+        let named = within.map(History::parse).transpose().map_err(Failure::Usage)?;
+        let named = named.unwrap_or_default();
+        let section = named.section.or(self.section);
         let selection = Selection {
-            ids: self.id.map(|id| vec![id]),
-            components: self.component.map(|component| vec![component.into()]),
-            section: self.section.map(Into::into),
+            ids: named.id.or(self.id).map(|id| vec![id]),
+            components: named.component.or(self.component).map(|name| vec![name.into()]),
+            section: section.map(Into::into),
             ..Selection::all()
         };
         let file = solver::read(self.path, self.format, &selection)?;
-        if let Some(section) = self.section.filter(|section| **section != *file.section) {
+        if let Some(section) = section.filter(|section| **section != *file.section) {
             return Err(Failure::Usage(format!(
                 "{} has no section \"{section}\": it is a text file with the one section \"{}\"",
                 self.path.display(),
@@ -361,13 +368,13 @@ impl Place<'_> {
         for problem in &file.problems {
             manners.warn(&format!("{}: {problem}", self.path.display()));
         }
-        let (path, letter) = (self.path.display(), self.letter);
+        let path = self.path.display();
         let history = match &file.histories[..] {
             [history] => history,
             [] => return Err(failed(format!("{path}: it holds no history"))),
             [first, .., last] => {
                 return Err(failed(format!(
-                    "{path}: {} histories fit, from {} to {}: choose one with --id-{letter} and --component-{letter} (crumple inspect lists them)",
+                    "{path}: {} histories fit, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
                     file.histories.len(),
                     first.label(),
                     last.label()
@@ -377,7 +384,7 @@ impl Place<'_> {
         let label = history.label();
         if let Some(state) = history.values.iter().position(|v| v.is_nan()) {
             return Err(failed(format!(
-                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: leave it out with --from or --to after writing the rest by crumple histories",
+                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose a stretch without it by --from and --to, after writing the rest with crumple histories",
                 state + 1,
                 history.time[state]
             )));
@@ -388,10 +395,10 @@ impl Place<'_> {
 
     /// The signal in s and scaled.
     fn signal(&self, column: &str, time: &[f64], values: &[f64]) -> Result<Signal, Failure> {
-        let seconds = self.unit.unwrap_or(TimeUnit::S).seconds();
+        let seconds = self.address.unit.unwrap_or(TimeUnit::S).seconds();
         let name = format!("{}: {column}", self.path.display());
         let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect();
-        Signal::new(&name, scaled(time, seconds), scaled(values, self.scale))
+        Signal::new(&name, scaled(time, seconds), scaled(values, self.address.scale))
             .map_err(|error| failed(format!("{name}: {error}")))
     }
 }

@@ -1,17 +1,20 @@
 //! `crumple train`: from a group of the database to a model file.
 
+use std::iter;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use crumple::assess::validate::{self, Choice};
 use crumple::database::Database;
 use crumple::forest::{StopRule, Thresholds};
 use crumple::surrogate::forest::ForestOptions;
 use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{Fitted, Options};
+use crumple::surrogate::{MODELS, ModelKind};
 use crumple::unit::km_per_h;
-use crumple::validate::{self, Choice};
 use serde::Serialize;
 
+use super::arguments::one_of;
 use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, Manners, Outcome, keep_input};
@@ -32,8 +35,8 @@ pub struct Args {
     #[arg(long)]
     group: Option<String>,
     /// Kind of model
-    #[arg(long, value_enum, default_value_t = Kind::Auto)]
-    model: Kind,
+    #[arg(long, value_parser = model_names(), default_value = AUTO)]
+    model: String,
     /// Number of trees [default: 50 of a forest, 500 of extra]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     trees: Option<u32>,
@@ -44,11 +47,11 @@ pub struct Args {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_samples_leaf: u32,
     /// Thresholds of splits [default: midpoint of a forest, random of extra]
-    #[arg(long, value_enum)]
-    thresholds: Option<ThresholdKind>,
+    #[arg(long, value_parser = one_of(THRESHOLDS))]
+    thresholds: Option<Thresholds>,
     /// When a node is not split any more
-    #[arg(long, value_enum, default_value_t = StopKind::StdOverMean)]
-    stop: StopKind,
+    #[arg(long, value_parser = one_of(STOP_RULES), default_value = "std-over-mean")]
+    stop: StopRuleAt,
     /// Threshold of the stop rule: in N for var-over-mean, dimensionless for std-over-mean
     #[arg(long, default_value_t = 0.01)]
     stop_threshold: f64,
@@ -61,48 +64,38 @@ pub struct Args {
     output: PathBuf,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Kind {
-    /// The model that leave-one-speed-out chooses
-    Auto,
-    /// Random forest on speed and deflection (DDTCM)
-    Forest,
-    /// Extremely randomised trees
-    Extra,
-    /// Linear in speed at equal deflection
-    Linear,
-    /// Linear in speed, with the force following the speed at each deflection
-    Rate,
-    /// Peaks matched and warped onto each other before blending
-    Registered,
-    /// Principal scores of registered curves, each a Gaussian process
-    Gp,
-    /// The FE curve of the nearest speed (FDRM)
-    Nearest,
+/// The name that lets leave-one-speed-out choose.
+const AUTO: &str = "auto";
+
+/// Names and descriptions of the models, and of the choice among them.
+fn model_names() -> PossibleValuesParser {
+    let auto = PossibleValue::new(AUTO).help("The model that leave-one-speed-out chooses");
+    let models = MODELS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.about));
+    PossibleValuesParser::new(iter::once(auto).chain(models))
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum ThresholdKind {
-    Midpoint,
-    Random,
-}
+/// How thresholds of splits are chosen.
+const THRESHOLDS: &[(&str, Thresholds, &str)] = &[
+    ("midpoint", Thresholds::Midpoint, "The best midpoint between consecutive values"),
+    ("random", Thresholds::Random, "One random value per feature"),
+];
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum StopKind {
-    /// Grow until leaves are pure
-    Never,
-    /// Var/Mean, as printed in the reference
-    VarOverMean,
-    /// sqrt(Var)/|Mean|
-    StdOverMean,
-}
+/// A rule with the threshold that it is given.
+type StopRuleAt = fn(f64) -> StopRule;
+
+/// When a node is not split any more.
+const STOP_RULES: &[(&str, StopRuleAt, &str)] = &[
+    ("never", |_| StopRule::Unpruned, "Grow until leaves are pure"),
+    ("var-over-mean", StopRule::VarOverMean, "Var/Mean, as printed in the reference"),
+    ("std-over-mean", StopRule::StdOverMean, "sqrt(Var)/|Mean|"),
+];
 
 #[derive(Serialize)]
 struct Document<'a> {
     output: String,
     group: &'a str,
     model: &'a str,
-    options: &'a Options,
+    options: &'a ModelKind,
     max_crush_rule: MaxCrushRule,
     training_speeds_m_per_s: Vec<f64>,
     training_hash: &'a str,
@@ -116,43 +109,32 @@ impl Args {
         let seed = self.seed;
         if self.paper {
             let options = ForestOptions { seed, ..ForestOptions::paper() };
-            return Ok(Choice::Options(Options::Forest(options)));
+            return Ok(Choice::Kind(ModelKind::forest(options)));
         }
-        let is_forest = matches!(self.model, Kind::Forest | Kind::Extra);
-        let is_auto = matches!(self.model, Kind::Auto);
-        if !is_forest && (self.thresholds.is_some() || !is_auto && self.trees.is_some()) {
+        let kind = ModelKind::named(&self.model, seed);
+        let has_forest = kind.is_some_and(|kind| kind.forest_options().is_some());
+        if !has_forest && (self.thresholds.is_some() || kind.is_some() && self.trees.is_some()) {
             return Err(Failure::Usage(
                 "--trees and --thresholds need --model forest or --model extra".into(),
             ));
         }
-        let forest = |options: ForestOptions| ForestOptions {
-            trees: self.trees.map_or(options.trees, |t| t as usize),
-            seed,
-            thresholds: match self.thresholds {
-                Some(ThresholdKind::Midpoint) => Thresholds::Midpoint,
-                Some(ThresholdKind::Random) => Thresholds::Random,
-                None => options.thresholds,
-            },
-            stop: match self.stop {
-                StopKind::Never => StopRule::Unpruned,
-                StopKind::VarOverMean => StopRule::VarOverMean(self.stop_threshold),
-                StopKind::StdOverMean => StopRule::StdOverMean(self.stop_threshold),
-            },
-            min_samples_leaf: self.min_samples_leaf as usize,
-            ..options
+        let Some(kind) = kind else {
+            return Ok(Choice::Auto { seed, trees: self.trees.map(|t| t as usize) });
         };
-        Ok(Choice::Options(match self.model {
-            Kind::Auto => {
-                return Ok(Choice::Auto { seed, trees: self.trees.map(|t| t as usize) });
-            }
-            Kind::Forest => Options::Forest(forest(ForestOptions::default())),
-            Kind::Extra => Options::Extra(forest(ForestOptions::extra())),
-            Kind::Linear => Options::Linear,
-            Kind::Rate => Options::Rate,
-            Kind::Registered => Options::Registered,
-            Kind::Gp => Options::Gp,
-            Kind::Nearest => Options::Nearest,
-        }))
+        Ok(Choice::Kind(kind.with_forest(|own| self.forest(own))))
+    }
+
+    /// A forest's own options with those that were asked for.
+    fn forest(&self, own: ForestOptions) -> ForestOptions {
+        let ForestOptions { table, .. } = ForestOptions::default();
+        ForestOptions {
+            trees: self.trees.map_or(own.trees, |t| t as usize),
+            thresholds: self.thresholds.unwrap_or(own.thresholds),
+            stop: (self.stop)(self.stop_threshold),
+            min_samples_leaf: self.min_samples_leaf as usize,
+            table,
+            ..own
+        }
     }
 }
 
@@ -187,17 +169,14 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         ));
     }
     let warned = !truncated.is_empty() || model.cases.len() < 3;
-    let out_of_bag = match model.fitted() {
-        Fitted::Forest(forest) => forest.forest().out_of_bag(),
-        _ => None,
-    };
+    let out_of_bag = model.forest().and_then(|forest| forest.forest().out_of_bag());
     let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
     if manners.json {
         output::print_json(&Document {
             output: args.output.display().to_string(),
             group,
-            model: model.options.name(),
-            options: &model.options,
+            model: model.name(),
+            options: &model.kind,
             max_crush_rule: model.max_crush_rule,
             training_speeds_m_per_s: speeds().collect(),
             training_hash: &model.training_hash,
@@ -207,7 +186,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     } else {
         output::print(|out| {
             let speeds: Vec<String> = speeds().map(km_per_h).collect();
-            writeln!(out, "{} on {}", model.options.name(), speeds.join(", "))?;
+            writeln!(out, "{} on {}", model.name(), speeds.join(", "))?;
             if let Some(oob) = out_of_bag {
                 let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
                 writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;

@@ -3,15 +3,16 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use crumple::assess::choose::{NextRun, next_run};
+use crumple::assess::validate::{GroupReport, Report, ValidateError, add_nested, validate};
 use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
+use crumple::surrogate::ModelKind;
 use crumple::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
 use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
-use crumple::validate::choose::{NextRun, next_run};
-use crumple::validate::{GroupReport, Report, ValidateError, add_nested, candidates, validate};
 
 use super::output;
 use super::progress::Bar;
@@ -116,7 +117,7 @@ fn validated(
     group: &str,
     cases: &[Case],
 ) -> Result<(Validation, Option<NextRun>), ValidateError> {
-    let mut validation = validate(group, cases, &candidates(args.seed), None)?;
+    let mut validation = validate(group, cases, &ModelKind::candidates(args.seed), None)?;
     if args.nested {
         add_nested(&mut validation, cases, args.seed)?;
     }

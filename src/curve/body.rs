@@ -1,5 +1,6 @@
 //! Body force: what moves the car body, from the rate of the deflection.
 
+use super::driving::rebound_stiffness_n_per_m;
 use super::loading::{loading_branch, loading_end};
 use super::{Case, Curve, Envelope, cfc};
 use crate::history::derivative;
@@ -22,9 +23,8 @@ pub struct BodyMotion {
 impl BodyMotion {
     /// Unloading stiffness from the end of the force that gives the rebound, in N/m.
     pub fn end_stiffness_n_per_m(&self, mass_kg: f64) -> Option<f64> {
-        let top = self.force.force_at(self.force.end_m());
-        let speed = self.rebound_speed_m_per_s?;
-        Some(top * top / (mass_kg * speed * speed)).filter(|k| *k > 0.0 && k.is_finite())
+        let top_n = self.force.force_at(self.force.end_m());
+        rebound_stiffness_n_per_m(top_n, mass_kg, self.rebound_speed_m_per_s?)
     }
 }
 
@@ -141,8 +141,7 @@ pub fn recorded_force(case: &Case) -> Option<RecordedForce> {
         unloading_deflection_m,
         unloading_force_n,
         unloading_stiffness_n_per_m: separation
-            .map(|speed| top * top / (mass * speed * speed))
-            .filter(|k| *k > 0.0 && k.is_finite()),
+            .and_then(|speed| rebound_stiffness_n_per_m(top, mass, speed)),
     })
 }
 

@@ -5,6 +5,7 @@
 pub mod body;
 pub mod cfc;
 pub mod contact;
+pub mod driving;
 pub mod energy;
 pub mod envelope;
 pub mod extract;
@@ -19,6 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
+pub use driving::{CurveUnloading, DrivingCurve};
 pub use envelope::{Envelope, EnvelopeError};
 
 /// A force–deflection history: what one run measured at an interface.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use super::{ExportError, MAX_CURVE_BYTES, Options, facts, nine_digits};
-use crate::curve::{Envelope, EnvelopeError, ForceKind};
+use crate::curve::{CurveUnloading, DrivingCurve, Envelope, EnvelopeError, ForceKind};
 use crate::file;
 use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
@@ -40,33 +40,6 @@ pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, Expor
     Ok(out.into_bytes())
 }
 
-/// A curve from a CSV file, with what its header lines say of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CurveTable {
-    pub envelope: Envelope,
-    /// `# unloading_stiffness_N_per_m: …`
-    pub unloading_stiffness_n_per_m: Option<f64>,
-    /// `# force_kind: body` or `contact`
-    pub force_kind: Option<ForceKind>,
-    /// `# speed_kind: wall` or `closing`
-    pub speed_kind: Option<SpeedKind>,
-    /// `# speed_m_per_s: …`
-    pub speed_m_per_s: Option<f64>,
-}
-
-impl CurveTable {
-    /// A table of which nothing else is known.
-    pub fn bare(envelope: Envelope) -> Self {
-        Self {
-            envelope,
-            unloading_stiffness_n_per_m: None,
-            force_kind: None,
-            speed_kind: None,
-            speed_m_per_s: None,
-        }
-    }
-}
-
 /// Why a CSV file is no curve.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
@@ -93,11 +66,12 @@ pub enum CsvError {
 /// Reads a curve from a CSV file: its first column is the deflection (`d_m`, `d_mm`,
 /// `deflection_m`), its second the force (`force_N`, `force_kN`, `force_MN`); further columns
 /// are ignored. Separated by commas, semicolons or tabs, whichever stand in the header. Of the
-/// `# key: value` lines in front, those named in [`CurveTable`] are read.
+/// `# key: value` lines in front, those of force kind, speed, speed kind and unloading
+/// stiffness are read.
 ///
 /// # Errors
 /// [`CsvError`] with line and field.
-pub fn read(path: &Path) -> Result<CurveTable, CsvError> {
+pub fn read(path: &Path) -> Result<DrivingCurve, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
     let bytes = file::read(path, MAX_CURVE_BYTES).map_err(io)?;
@@ -143,14 +117,14 @@ pub fn read(path: &Path) -> Result<CurveTable, CsvError> {
         .map_err(|source| CsvError::Envelope { path: path.into(), source })?;
     match envelope.first_pulling_point() {
         Some(point) => Err(CsvError::Pulling { path: path.into(), point }),
-        None => Ok(CurveTable { envelope, ..facts.table }),
+        None => Ok(DrivingCurve { loading: envelope, ..facts.curve }),
     }
 }
 
 /// What stands in the `#` lines in front of a table.
 struct Facts {
-    /// With an envelope that is still to come.
-    table: CurveTable,
+    /// With a loading branch that is still to come.
+    curve: DrivingCurve,
     /// Lines and bytes of them.
     lines: u64,
     bytes: usize,
@@ -160,7 +134,7 @@ impl Facts {
     fn read(path: &Path, bytes: &[u8]) -> Result<Self, CsvError> {
         let nothing = Envelope::new(vec![0.0, 1.0], vec![0.0, 0.0]);
         let nothing = nothing.map_err(|source| CsvError::Envelope { path: path.into(), source })?;
-        let mut facts = Self { table: CurveTable::bare(nothing), lines: 0, bytes: 0 };
+        let mut facts = Self { curve: DrivingCurve::bare(nothing), lines: 0, bytes: 0 };
         for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|l| l.starts_with(b"#")) {
             facts.lines += 1;
             facts.bytes += line.len();
@@ -185,19 +159,19 @@ impl Facts {
             let number = value.parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
             number.ok_or_else(|| wrong("a number above 0"))
         };
-        let table = &mut self.table;
+        let curve = &mut self.curve;
         match key {
             "unloading_stiffness_N_per_m" => {
-                table.unloading_stiffness_n_per_m = Some(above_zero()?);
+                curve.unloading = CurveUnloading::Stiffness(above_zero()?);
             }
-            "speed_m_per_s" => table.speed_m_per_s = Some(above_zero()?),
+            "speed_m_per_s" => curve.speed_m_per_s = Some(above_zero()?),
             "force_kind" => {
                 let kind = ForceKind::parse(value);
-                table.force_kind = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);
+                curve.force = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);
             }
             "speed_kind" => {
                 let kind = SpeedKind::parse(value);
-                table.speed_kind = Some(kind.ok_or_else(|| wrong("\"wall\" or \"closing\""))?);
+                curve.speed_kind = Some(kind.ok_or_else(|| wrong("\"wall\" or \"closing\""))?);
             }
             _ => {}
         }

@@ -2,15 +2,13 @@
 
 use super::ExportError;
 use crate::forest::OnnxDescription;
-use crate::surrogate::{Fitted, Model};
+use crate::surrogate::Model;
 
 /// The model's forest: speed and deflection to force, in SI.
 pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
-    let (Fitted::Forest(forest) | Fitted::Extra(forest)) = model.fitted() else {
-        let needs = format!(
-            "models of --model forest or extra, this is of --model {}",
-            model.options.name()
-        );
+    let Some(forest) = model.forest() else {
+        let needs =
+            format!("models of --model forest or extra, this is of --model {}", model.name());
         return Err(ExportError::Unfit { format: "onnx", needs });
     };
     let (low, high) = model.range_m_per_s();

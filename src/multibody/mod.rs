@@ -6,6 +6,7 @@
 
 mod bank;
 pub mod damping;
+mod driven;
 mod engine;
 mod extrapolation;
 pub mod integrator;
@@ -16,6 +17,7 @@ pub mod train;
 mod watch;
 
 pub use damping::Damping;
+pub use driven::UnloadingChoice;
 pub use integrator::{Method, Record, Run, RunSettings, RunWarning, SimulationError, simulate};
 pub use interface::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 pub use train::{

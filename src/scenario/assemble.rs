@@ -191,7 +191,7 @@ impl Builder<'_> {
         if let Some(made) = self.made.iter().find(|m| m.curve == curve && m.key == key) {
             return Ok(made.clone());
         }
-        let mut spring = spring(source, table, slot, speed).map_err(|e| match e {
+        let spring = spring(source, table, slot, speed).map_err(|e| match e {
             SpringError::Message(message) => invalid(format!("curve \"{curve}\": {message}")),
             SpringError::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
         })?;
@@ -200,7 +200,7 @@ impl Builder<'_> {
             Role::Noses | Role::Vehicles => Some(SpeedKind::Closing),
             Role::Within => None,
         };
-        if let (Some(kind), Some(expected)) = (spring.kind, expected)
+        if let (Some(kind), Some(expected)) = (spring.curve.speed_kind, expected)
             && kind != expected
         {
             return Err(invalid(format!(
@@ -210,13 +210,16 @@ impl Builder<'_> {
                 expected.name()
             )));
         }
-        let law = spring.law(table).map_err(|m| invalid(format!("curve \"{curve}\": {m}")))?;
+        let (law, of_law) =
+            spring.law(table).map_err(|m| invalid(format!("curve \"{curve}\": {m}")))?;
         let used = Used {
             curve: curve.into(),
-            force: spring.force.map(|f| f.name()),
-            speed_m_per_s: spring.speed_m_per_s,
+            force: spring.curve.force.map(|f| f.name()),
+            speed_m_per_s: spring.curve.speed_m_per_s,
         };
-        self.warnings.extend(spring.warnings.iter().map(|w| format!("curve \"{curve}\": {w}")));
+        self.warnings.extend(
+            spring.warnings.iter().chain(&of_law).map(|w| format!("curve \"{curve}\": {w}")),
+        );
         let made = Made { curve: curve.into(), key, law: Arc::new(law), used };
         self.made.push(made.clone());
         Ok(made)

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{CurveTable, ForceName, Scenario, ScenarioError, StageTable};
-use crate::curve::{Case, Envelope, ForceKind};
+use super::{CurveTable, Scenario, ScenarioError, StageTable};
+use crate::curve::{Case, DrivingCurve, Envelope};
 use crate::database::Database;
 use crate::export::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
@@ -20,7 +20,8 @@ pub struct Sources {
 pub enum Source {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
-    Table(Box<csv::CurveTable>),
+    /// Of a file.
+    Curve(Box<DrivingCurve>),
     /// Stages of a device between two bodies.
     Stages(Envelope),
     Case(Box<Case>),
@@ -97,12 +98,6 @@ impl<E: Into<ScenarioError>> From<E> for ReadError {
 }
 
 impl Source {
-    /// A force that moves bodies of one mass, and of which nothing else is known.
-    pub fn of_body(envelope: Envelope) -> Self {
-        let table = csv::CurveTable::bare(envelope);
-        Self::Table(Box::new(csv::CurveTable { force_kind: Some(ForceKind::Body), ..table }))
-    }
-
     fn read(
         table: &CurveTable,
         name: &str,
@@ -119,19 +114,15 @@ impl Source {
                     return Ok(Self::Predicted(Box::new(json::read(&path)?)));
                 }
                 let mut held = csv::read(&path)?;
-                let stated = match table.force {
-                    Some(ForceName::Body) => Some(ForceKind::Body),
-                    Some(ForceName::Contact) => Some(ForceKind::Contact),
-                    Some(ForceName::Declared) | None => held.force_kind,
-                };
-                if held.force_kind.is_some() && stated != held.force_kind {
+                let stated = table.force.or(held.force);
+                if held.force.is_some() && stated != held.force {
                     return Err(ReadError::Message(format!(
-                        "curve \"{name}\": force names another force than {} says it holds: leave force away",
+                        "curve \"{name}\": force names another force than {} says it holds: remove force",
                         path.display()
                     )));
                 }
-                held.force_kind = stated;
-                Ok(Self::Table(Box::new(held)))
+                held.force = stated;
+                Ok(Self::Curve(Box::new(held)))
             }
             (None, None, Some(database), None) => {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));

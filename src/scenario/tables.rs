@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::curve::Parameter;
+use crate::curve::{ForceKind, Parameter};
 use crate::multibody::Method;
 use crate::plan::Plan;
 use crate::surrogate::max_crush::MaxCrushRule;
@@ -167,25 +167,13 @@ pub struct CurveTable {
     #[serde(default)]
     pub parameters: BTreeMap<String, Parameter>,
     /// Of a model, predicted curve or database case: the force that is taken; if absent the
-    /// one that the vehicles need. Of a CSV file that does not say it: the force that it holds.
-    pub force: Option<ForceName>,
+    /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not say it: the force that it holds.
+    pub force: Option<ForceKind>,
     /// Of a model or predicted curve: member of its band, from −1 (lower edge) over 0 (the
     /// curve) to 1 (upper edge).
     pub band: Option<f64>,
     /// Factor on the force.
     pub scale: Option<f64>,
-}
-
-/// Which force of a predicted curve drives an interface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ForceName {
-    /// The force of the recipe (contact or body).
-    Declared,
-    /// What the obstacle feels.
-    Contact,
-    /// The force of the body's motion, with its rebound.
-    Body,
 }
 
 /// A stage of a staged curve.

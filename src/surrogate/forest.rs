@@ -1,12 +1,35 @@
 //! `forest` (DDTCM), the reference method's random forest on {v, d} → F, and `extra`.
 
+use std::sync::Arc;
+
+use linfa::ParamGuard;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
 
+use super::max_crush::MaxCrushRule;
+use super::models::{ModelEntry, loaded};
 use super::{At, CaseCurve, Surrogate, Warning};
-use crate::dataset::{Force, TableKind, TrainingSet};
+use crate::curve::ForceKind;
+use crate::dataset::{TableKind, TrainingSet};
 use crate::forest::{ForestError, ForestParams, RegressionForest, StopRule, Thresholds};
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "forest",
+    about: "Random forest on speed and deflection (DDTCM)",
+    complexity: 4,
+    baseline: true,
+    sees_features: true,
+    least_curves: 2,
+    // The reference method knows only crush over speed.
+    crush_rule: MaxCrushRule::Monotone,
+    forest: Some(ForestOptions::paper),
+    fit: |input| {
+        Ok(Arc::new(ForestSurrogate::fit(input.set, input.force, input.forest_options())?))
+    },
+    load: loaded::<ForestSurrogate>,
+};
 
 /// Choices of the forest surrogate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,11 +75,25 @@ impl ForestOptions {
     pub fn paper() -> Self {
         Self { stop: StopRule::VarOverMean(0.01), table: TableKind::Samples, ..Self::default() }
     }
+}
 
-    /// Extremely randomised trees: 500 on all points, thresholds at random, so that the
-    /// forest is nearly continuous in speed.
-    pub fn extra() -> Self {
-        Self { trees: 500, thresholds: Thresholds::Random, bootstrap: false, ..Self::default() }
+impl ForestOptions {
+    /// Whether they make a forest.
+    ///
+    /// # Errors
+    /// [`ForestError`] names the option that is out of its range.
+    pub fn check(&self) -> Result<(), ForestError> {
+        self.params().check_ref().map(|_| ())
+    }
+
+    fn params(&self) -> ForestParams<f64> {
+        ForestParams::new(self.trees)
+            .seed(self.seed)
+            .thresholds(self.thresholds)
+            .stop(self.stop)
+            .min_samples_leaf(self.min_samples_leaf)
+            .bootstrap(self.bootstrap)
+            .out_of_bag(self.bootstrap)
     }
 }
 
@@ -77,17 +114,12 @@ impl ForestSurrogate {
     /// [`ForestError`] for options that make no forest.
     pub fn fit(
         set: &TrainingSet,
-        force: Force,
+        force: ForceKind,
         options: &ForestOptions,
     ) -> Result<Self, ForestError> {
-        let forest = ForestParams::new(options.trees)
-            .seed(options.seed)
-            .thresholds(options.thresholds)
-            .stop(options.stop)
-            .min_samples_leaf(options.min_samples_leaf)
-            .bootstrap(options.bootstrap)
-            .out_of_bag(options.bootstrap)
-            .quantiles(options.quantiles && force == Force::Declared)
+        let forest = options
+            .params()
+            .quantiles(options.quantiles && force == set.force_kind)
             .fit(&set.table_of(options.table, force))?;
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
@@ -108,18 +140,30 @@ impl ForestSurrogate {
         let found = self.forest.quantiles(records(at, deflection_m).view(), &levels).ok()?;
         Some((found.column(0).to_vec(), found.column(1).to_vec()))
     }
-
-    /// Checks a forest that was read from a file.
-    pub fn check(&self, features: usize) -> Result<(), String> {
-        if self.forest.features() != features {
-            let found = self.forest.features();
-            return Err(format!("the forest has {found} features instead of {features}"));
-        }
-        self.forest.check().map_err(|e| e.to_string())
-    }
 }
 
 impl Surrogate for ForestSurrogate {
+    fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {
+        Some(serde_json::value::to_raw_value(self))
+    }
+
+    fn check(&self, features: usize) -> Result<(), String> {
+        // Speed and deflection come first.
+        let (found, expected) = (self.forest.features(), 2 + features);
+        if found != expected {
+            return Err(format!("the forest has {found} features instead of {expected}"));
+        }
+        self.forest.check().map_err(|e| e.to_string())
+    }
+
+    fn answers_from_curves(&self) -> bool {
+        false
+    }
+
+    fn forest(&self) -> Option<&ForestSurrogate> {
+        Some(self)
+    }
+
     fn force_n(&self, _: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let force: Array1<f64> = self.forest.predict(&records(at, deflection_m));
         force.to_vec()

@@ -1,7 +1,24 @@
 //! `linear`: the force at equal deflection interpolated linearly in speed.
 
+use std::sync::Arc;
+
 use super::curves::interpolate_held;
+use super::max_crush::MaxCrushRule;
+use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "linear",
+    about: "Linear in speed at equal deflection",
+    complexity: 0,
+    baseline: true,
+    sees_features: false,
+    least_curves: 2,
+    crush_rule: MaxCrushRule::Motion,
+    forest: None,
+    fit: |_| Ok(Arc::new(Linear)),
+    load: |_| Ok(Arc::new(Linear)),
+};
 
 /// Interpolates over the cases that reach a deflection; holds the outermost beyond them.
 #[derive(Clone, Copy, Debug, PartialEq)]

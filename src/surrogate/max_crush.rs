@@ -1,22 +1,15 @@
 //! Maximal crush as a function of impact speed: four rules, and their spread.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Model;
+use super::predict::PredictError;
 use crate::curve::Envelope;
 
 /// How the maximal crush is found.
 #[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum MaxCrushRule {
@@ -44,6 +37,19 @@ impl MaxCrushRule {
             Self::Motion => "motion",
         }
     }
+}
+
+/// The maximal crush by all rules, in m; `None` where a rule has no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MaxCrush {
+    pub spline_m: Option<f64>,
+    pub monotone_m: Option<f64>,
+    pub energy_m: Option<f64>,
+    /// Absent in files of earlier versions.
+    #[serde(default)]
+    pub motion_m: Option<f64>,
+    /// Largest less smallest.
+    pub spread_m: f64,
 }
 
 /// Cubic spline through `points` (speed in m/s increasing, crush in m) at `v`.
@@ -144,6 +150,58 @@ pub fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
 /// holds its last value.
 pub fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)
+}
+
+/// The maximal crush by every rule.
+pub(super) fn by_all_rules(
+    model: &Model,
+    v: f64,
+    declared: &Envelope,
+    body: &Envelope,
+    kinetic_j: f64,
+) -> MaxCrush {
+    // Crush over speed is a function only if nothing else differs.
+    let points: Vec<(f64, f64)> = match model.features.is_empty() {
+        true => {
+            let whole = model.cases.iter().filter(|c| !c.truncated);
+            whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect()
+        }
+        false => Vec::new(),
+    };
+    let spline_m = spline(&points, v);
+    let monotone_m = monotone(&points, v);
+    let energy_m = energy(declared, kinetic_j);
+    let motion_m = energy(body, kinetic_j);
+    let all = || [spline_m, monotone_m, energy_m, motion_m].into_iter().flatten();
+    let spread_m = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
+    MaxCrush { spline_m, monotone_m, energy_m, motion_m, spread_m: spread_m.max(0.0) }
+}
+
+impl MaxCrush {
+    /// The answer of one rule.
+    pub fn by(&self, rule: MaxCrushRule) -> Option<f64> {
+        match rule {
+            MaxCrushRule::Spline => self.spline_m,
+            MaxCrushRule::Monotone => self.monotone_m,
+            MaxCrushRule::Energy => self.energy_m,
+            MaxCrushRule::Motion => self.motion_m,
+        }
+    }
+}
+
+/// The answer of one rule, which must be a length.
+pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, PredictError> {
+    match crush.by(rule) {
+        Some(end) if end > 0.0 && end.is_finite() => Ok(end),
+        found => Err(PredictError::MaxCrush {
+            rule: rule.name(),
+            found: found.map_or("not defined for these cases".into(), |d| format!("{d} m")),
+            other: MaxCrushRule::ALL
+                .into_iter()
+                .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
+                .map_or("(no rule has an answer here)", MaxCrushRule::name),
+        }),
+    }
 }
 
 #[cfg(test)]

@@ -1,23 +1,35 @@
 //! Surrogates: models of F(v, d) behind one trait, and the curve predicted from them.
 
 pub mod band;
+mod cases;
 pub mod curves;
+mod extra;
 pub mod forest;
-pub mod gp;
 mod kept;
-pub mod landmarks;
+mod landmarks;
 pub mod leave_one_out;
-pub mod linear;
+mod linear;
 pub mod max_crush;
-pub mod model;
-pub mod nearest;
+mod model;
+mod model_file;
+pub mod models;
+mod nearest;
 pub mod predict;
-pub mod rate;
-pub mod registered;
+pub mod predicted;
+mod query;
+mod rate;
+mod registered;
+mod spikes;
 pub mod warning;
 
+use std::fmt::Debug;
+
+use serde_json::value::RawValue;
+
+pub use cases::ModelCase;
 pub use curves::CaseCurve;
-pub use model::{Fitted, Model, ModelError, Options};
+pub use model::{Model, ModelError};
+pub use models::{MODELS, ModelKind};
 pub use predict::{PredictedCurve, Query, predict};
 pub use warning::Warning;
 
@@ -37,7 +49,7 @@ pub struct At<'a> {
 
 /// A model of the force at an interface over impact speed, deflection and whatever else
 /// distinguishes the cases it was fitted to.
-pub trait Surrogate {
+pub trait Surrogate: Debug + Send + Sync {
     /// Forces in N at increasing deflections (m), one per deflection. `cases` are the
     /// curves it was fitted to, in order of speed.
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64>;
@@ -45,5 +57,29 @@ pub trait Surrogate {
     /// What a user must know about a query here, beyond what holds for all models.
     fn warnings(&self, _cases: &[CaseCurve], _at: &At<'_>) -> Vec<Warning> {
         Vec::new()
+    }
+
+    /// What was fitted, for the model file; `None` for a model that answers from the training
+    /// curves alone.
+    fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {
+        None
+    }
+
+    /// What a fit guarantees of the parameters and a file might not.
+    ///
+    /// # Errors
+    /// What is wrong, to follow "the model is damaged: ".
+    fn check(&self, _features: usize) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Whether it needs the training curves to answer.
+    fn answers_from_curves(&self) -> bool {
+        true
+    }
+
+    /// Its forest, if it is one.
+    fn forest(&self) -> Option<&forest::ForestSurrogate> {
+        None
     }
 }

@@ -1,6 +1,23 @@
 //! `nearest` (FDRM): the one FE curve measured at the nearest speed, used as it is.
 
+use std::sync::Arc;
+
+use super::max_crush::MaxCrushRule;
+use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "nearest",
+    about: "The FE curve of the nearest speed (FDRM)",
+    complexity: 5,
+    baseline: true,
+    sees_features: true,
+    least_curves: 1,
+    crush_rule: MaxCrushRule::Motion,
+    forest: None,
+    fit: |_| Ok(Arc::new(Nearest)),
+    load: |_| Ok(Arc::new(Nearest)),
+};
 
 /// The measured curve that lies nearest answers.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,28 @@
 //! `rate`: a force that depends on deflection and on the speed at that deflection.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
 
 use super::curves::neighbours;
 use super::kept::Kept;
+use super::max_crush::MaxCrushRule;
+use super::models::{ModelEntry, loaded};
 use super::{At, CaseCurve, Surrogate};
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "rate",
+    about: "Linear in speed, with the force following the speed at each deflection",
+    complexity: 1,
+    baseline: false,
+    sees_features: false,
+    least_curves: 2,
+    crush_rule: MaxCrushRule::Motion,
+    forest: None,
+    fit: |input| Ok(Arc::new(Rate::fit(input.curves))),
+    load: loaded::<Rate>,
+};
 
 /// `F = Q(d; v) R(ḋ)` with `R(u) = 1 + β √u`.
 ///
@@ -59,15 +77,6 @@ impl Rate {
             .map(|k| (k, disagreement(cases, trial(k))))
             .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
         Self { sensitivity: 0.5 * trial(best.0), levels: Kept::default() }
-    }
-
-    /// # Errors
-    /// If the number read from a file is none that a fit gives.
-    pub fn check(&self) -> Result<(), String> {
-        match (0.0..=MOST).contains(&self.sensitivity) {
-            true => Ok(()),
-            false => Err(format!("its rate sensitivity is {}", self.sensitivity)),
-        }
     }
 
     fn factor(&self, closing_m_per_s: f64) -> f64 {
@@ -140,6 +149,17 @@ fn disagreement(cases: &[CaseCurve], sensitivity: f64) -> f64 {
 }
 
 impl Surrogate for Rate {
+    fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {
+        Some(serde_json::value::to_raw_value(self))
+    }
+
+    fn check(&self, _: usize) -> Result<(), String> {
+        match (0.0..=MOST).contains(&self.sensitivity) {
+            true => Ok(()),
+            false => Err(format!("its rate sensitivity is {}", self.sensitivity)),
+        }
+    }
+
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         if speeds.is_empty() {

@@ -1,9 +1,26 @@
 //! `registered`: landmarks matched and warped onto each other before curves are blended.
 
+use std::sync::Arc;
+
 use super::curves::{interpolate_held, least_squares};
 use super::landmarks::{Landmarks, Warp};
 use super::linear::Linear;
+use super::max_crush::MaxCrushRule;
+use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "registered",
+    about: "Peaks matched and warped onto each other before curves are blended",
+    complexity: 2,
+    baseline: false,
+    sees_features: false,
+    least_curves: 2,
+    crush_rule: MaxCrushRule::Motion,
+    forest: None,
+    fit: |_| Ok(Arc::new(Registered)),
+    load: |_| Ok(Arc::new(Registered)),
+};
 
 /// Peaks sit at nearly fixed crush, and move a little with speed: where a query expects a
 /// landmark, each case contributes the force of its own landmark. Only inside the training

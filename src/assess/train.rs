@@ -7,27 +7,23 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CompareError, Settings, nsdm_target};
-use crate::curve::Case;
+use super::compare::{CompareError, Settings};
+use super::methods::{ddtcm_model, fit_nsdm};
+use super::validate::{self, Choice};
 use crate::curve::body::filtered;
 use crate::curve::rating::l1_ratio;
 use crate::curve::resample::interpolate;
+use crate::curve::{Case, DrivingCurve};
 use crate::database::{Database, DatabaseError};
 use crate::dataset::TrainingSet;
 use crate::file;
 use crate::history::{EntityId, derivative};
 use crate::multibody::simulate;
-use crate::nsdm;
 use crate::scenario::{
-    self, DampingTable, EndName, ForceName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
-    ScenarioError, Source, Sources,
+    self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, ScenarioError,
+    Source, Sources,
 };
 use crate::solver::{self, ReadError, Selection, WantedId};
-use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{Model, Options};
-use crate::validate::motion::Reference;
-use crate::validate::{self, Choice};
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
@@ -255,50 +251,55 @@ fn methods<'a>(
     settings: &Settings,
 ) -> Result<Vec<Method<'a>>, CompareError> {
     let groups = groups(path, scenario)?;
-    let with = |change: &dyn Fn(&mut scenario::CurveTable)| {
+    // Every curve with the body's force, or with the recipe's.
+    let with_body = || {
         let mut scenario = scenario.clone();
-        scenario.curves.values_mut().for_each(change);
+        scenario.curves.values_mut().for_each(|table| table.force = None);
+        scenario
+    };
+    let with_declared = || {
+        let mut scenario = scenario.clone();
+        for (name, table) in &mut scenario.curves {
+            table.force = groups.get(name).map(|(case, _)| case.force_kind);
+        }
         scenario
     };
     let mut methods = Vec::new();
     let mut add = |name, scenario, sources, fit_time_s| {
         methods.push(Method { name, scenario, sources, fit_time_s });
     };
-    add("fe_body", with(&|table| table.force = None), sources.clone(), 0.0);
-    add("fdrm", with(&|table| table.force = Some(ForceName::Declared)), sources.clone(), 0.0);
+    add("fe_body", with_body(), sources.clone(), 0.0);
+    add("fdrm", with_declared(), sources.clone(), 0.0);
 
     if settings.nsdm_seeds > 0 {
         let start = Instant::now();
         let (mut changed, mut springs) = (scenario.clone(), sources.clone());
         for (name, (case, _)) in &groups {
-            let target = nsdm_target(&Reference::of(case)?)?;
-            let choices =
-                nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
-            let seeds: Vec<u64> = settings.nsdm_seeds();
-            let fits = nsdm::fit_seeds(&target, &choices, &seeds)?;
-            let best = fits.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective));
-            let (Some(fit), Some(table)) = (best, changed.curves.get_mut(name)) else { continue };
+            let fitted = fit_nsdm(case, settings)?;
+            let fit = fitted.best();
+            let Some(table) = changed.curves.get_mut(name) else { continue };
             table.law = LawName::Elastic;
             table.end = EndName::Slope;
             table.damping = Some(DampingTable {
                 speed_m_per_s: fit.model.damping.nodes().to_vec(),
                 coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
             });
-            springs.replace(name, Source::of_body(fit.model.envelope()?));
+            springs.replace(
+                name,
+                Source::Curve(Box::new(DrivingCurve::of_body(fit.model.envelope()?))),
+            );
         }
         add("nsdm", changed, springs, start.elapsed().as_secs_f64());
     }
 
     let start = Instant::now();
     let mut forests = sources.clone();
-    let options = Options::Forest(ForestOptions { seed: settings.seed, ..ForestOptions::paper() });
     for (name, (case, cases)) in &groups {
-        let mut model = Model::fit(&TrainingSet::new(&case.group, cases)?, options)?;
-        // The paper's rule; beyond its speeds and masses the motion is asked.
-        model.max_crush_rule = MaxCrushRule::Spline;
+        // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
+        let model = ddtcm_model(&TrainingSet::new(&case.group, cases)?, settings.seed)?;
         forests.replace(name, Source::Model(Box::new(model)));
     }
-    let mut paper = with(&|table| table.force = Some(ForceName::Declared));
+    let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
     add("ddtcm", paper, forests, start.elapsed().as_secs_f64());
 
@@ -313,7 +314,7 @@ fn methods<'a>(
     for (name, speed) in
         [("best_train", InterfaceSpeed::Train), ("best_local", InterfaceSpeed::Local)]
     {
-        let mut changed = with(&|table| table.force = None);
+        let mut changed = with_body();
         changed.run.interface_speed = speed;
         add(name, changed, best.clone(), fit_s);
     }

@@ -1,13 +1,13 @@
 //! Motion of a case against a multi-body run of one mass: the errors of a curve in use.
 
-use crate::curve::body::{filtered, recorded_force};
+use crate::curve::body::filtered;
 use crate::curve::rating::l1_ratio;
 use crate::curve::resample::interpolate;
-use crate::curve::{Case, Envelope};
+use crate::curve::{Case, DrivingCurve};
 use crate::history::derivative;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
-    Unloading, UnloadingShape, simulate,
+    UnloadingChoice, simulate,
 };
 
 /// The comparison ends this long after FE's largest deflection, so that rebound counts.
@@ -35,6 +35,8 @@ pub struct Reference {
 pub enum MotionError {
     #[error("case \"{case}\": only {states} states lie in the window: at least 3 are needed")]
     TooShort { case: String, states: usize },
+    #[error("its errors against FE are no finite numbers")]
+    NotFinite,
     #[error("case \"{case}\": the multi-body run is shorter than the window")]
     RunTooShort { case: String },
     #[error(transparent)]
@@ -52,51 +54,6 @@ pub struct MotionErrors {
     pub acceleration_l1: f64,
     /// Central differences over two sampling intervals on both sides.
     pub acceleration_unfiltered_l1: f64,
-}
-
-/// A curve and how it unloads from its end.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Driver {
-    pub envelope: Envelope,
-    pub stiffness_n_per_m: Option<f64>,
-    /// Of a recorded motion.
-    pub shape: Option<UnloadingShape>,
-}
-
-impl Driver {
-    /// A curve that unloads on a straight line.
-    pub fn new(envelope: Envelope, stiffness_n_per_m: Option<f64>) -> Self {
-        Self { envelope, stiffness_n_per_m, shape: None }
-    }
-
-    /// The force that moved the body of a case, with its own unloading; `None` if the case has
-    /// no loading branch.
-    pub fn recorded(case: &Case) -> Option<Self> {
-        let recorded = recorded_force(case)?;
-        let shape = UnloadingShape::of_branch(
-            &recorded.unloading_deflection_m,
-            &recorded.unloading_force_n,
-        );
-        Some(Self {
-            envelope: recorded.loading,
-            stiffness_n_per_m: recorded.unloading_stiffness_n_per_m,
-            shape: Some(shape.unwrap_or_else(UnloadingShape::line)),
-        })
-    }
-
-    /// The stiffness with which a body of `mass_kg` leaves the envelope's end at
-    /// `rebound_m_per_s`; `other` if that is not known.
-    pub fn rebounding(
-        envelope: Envelope,
-        mass_kg: f64,
-        rebound_m_per_s: Option<f64>,
-        other: Option<f64>,
-    ) -> Self {
-        let top = envelope.force_at(envelope.end_m());
-        let stiffness = rebound_m_per_s.map(|v| top * top / (mass_kg * v * v));
-        let stiffness_n_per_m = stiffness.filter(|&k| k > 0.0 && k.is_finite()).or(other);
-        Self::new(envelope, stiffness_n_per_m)
-    }
 }
 
 impl Reference {
@@ -129,31 +86,33 @@ impl Reference {
         self.time_s[self.inside - 1]
     }
 
-    /// Runs one body of the case's effective mass against a wall with the driver's curve.
+    /// Runs one body of the case's effective mass against a wall with a driving curve.
     ///
     /// # Errors
     /// [`MotionError`] if the curve makes no run.
-    pub fn run(&self, driver: &Driver) -> Result<Run, MotionError> {
+    pub fn run(&self, curve: &DrivingCurve) -> Result<Run, MotionError> {
         let body = Body::new("body", self.mass_kg, self.speed_m_per_s);
-        let envelope = driver.envelope.clone();
-        let stiffness_n_per_m = driver.stiffness_n_per_m.unwrap_or_else(|| envelope.max_slope());
-        let unloading = match stiffness_n_per_m > 0.0 {
-            true => Unloading::Memory { stiffness_n_per_m },
-            // A curve that never rises has no line to unload on.
-            false => Unloading::Elastic,
-        };
-        let law = match &driver.shape {
-            None => ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold),
-            Some(shape) => {
-                ForceLaw::recorded(envelope, unloading, shape.clone(), EnvelopeEnd::Hold)
-            }
-        };
+        let law = ForceLaw::of_curve(curve, UnloadingChoice::Own, EnvelopeEnd::Hold);
         let interface = Interface::new("body|wall", law, 0.0);
         let chain = Chain::new(vec![body], vec![interface])?;
         let output_interval_s = self.time_s[1] - self.time_s[0];
         // One output more than is compared, so that rounding cannot make it too short.
         let duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
         Ok(simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?)
+    }
+
+    /// Errors of the one-mass run that a driving curve gives.
+    ///
+    /// # Errors
+    /// [`MotionError`] if the curve makes no run, or one whose errors are no finite numbers.
+    pub fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, MotionError> {
+        let errors = self.errors(&self.run(curve)?)?;
+        let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
+        let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];
+        match all.iter().all(|e| e.is_finite()) {
+            true => Ok(errors),
+            false => Err(MotionError::NotFinite),
+        }
     }
 
     /// Times of the states that are compared and a little more, in s.

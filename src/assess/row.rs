@@ -2,15 +2,15 @@
 
 use std::time::Instant;
 
-use super::{CompareError, Row};
-use crate::curve::Envelope;
+use super::compare::{CompareError, Row};
+use super::methods::{FittedNsdm, Method};
+use super::reference::Reference;
+use crate::curve::ForceKind;
 use crate::curve::rating::l1_ratio;
-use crate::nsdm::Nsdm;
 use crate::rating::{Quantity, Rating, Settings, Signal, rate};
-use crate::validate::motion::{Driver, Reference};
 
 /// What all rows of one comparison share.
-pub(super) struct Maker<'a> {
+pub(super) struct RowBuilder<'a> {
     pub reference: &'a Reference,
     pub fe_time_s: Option<f64>,
     /// Of all runs that curves are trained on.
@@ -34,53 +34,66 @@ impl Default for Times {
     }
 }
 
-impl Maker<'_> {
-    /// The row of a curve. `forces` are FE's own and the method's, of one kind of force.
-    pub fn row(
-        &self,
-        method: &str,
-        curve: &str,
-        driver: &Driver,
-        forces: Option<(&Envelope, &Envelope)>,
-        times: Times,
-    ) -> Result<Row, CompareError> {
+/// The motion that a method gives.
+struct Motion<'a> {
+    /// At the reference's times, in m/s.
+    velocity: &'a [f64],
+    peak_force_n: f64,
+    max_crush_m: f64,
+    /// Time of the run, in s.
+    simulation_s: f64,
+}
+
+impl RowBuilder<'_> {
+    /// The row of a method with a curve.
+    pub fn row(&self, method: Method) -> Result<Row, CompareError> {
+        let Method { name, made_from, curve, forces: (truth, ours), times } = method;
         let start = Instant::now();
-        let run = self.reference.run(driver)?;
+        let run = self.reference.run(&curve)?;
         let simulation_s = start.elapsed().as_secs_f64();
         let velocity = self.reference.velocity_of(&run)?;
-        let (peak_n, crush_m) =
-            (run.interfaces[0].peak_force_n, run.interfaces[0].max_deflection_m);
-        let mut row =
-            self.rated(method, curve, &velocity, (peak_n, crush_m), times, simulation_s)?;
-        row.force_l1 = forces.map(|(truth, ours)| {
-            let along = truth.deflection_m();
-            let force: Vec<f64> = along.iter().map(|&d| ours.force_at(d)).collect();
-            l1_ratio(truth.force_n(), &force)
-        });
-        Ok(row)
+        let motion = Motion {
+            velocity: &velocity,
+            peak_force_n: run.interfaces[0].peak_force_n,
+            max_crush_m: run.interfaces[0].max_deflection_m,
+            simulation_s,
+        };
+        let force: Vec<f64> = truth.deflection_m().iter().map(|&d| ours.force_at(d)).collect();
+        let force_l1 = Some(l1_ratio(truth.force_n(), &force));
+        let row = self.rated(name, made_from, curve.force, motion, times)?;
+        Ok(Row { force_l1, ..row })
     }
 
     /// The row of a spring and damper.
-    pub fn of_nsdm(&self, model: &Nsdm, curve: &str, times: Times) -> Result<Row, CompareError> {
+    pub fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
         let reference = self.reference;
         let start = Instant::now();
         let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
-        let motion = model.run(mass, speed, reference.time_s())?;
-        let simulation_s = start.elapsed().as_secs_f64();
-        let crush_m = motion.x_m.iter().copied().fold(0.0, f64::max);
-        let peak_n = motion.a_m_per_s2.iter().map(|a| -a * mass).fold(0.0, f64::max);
-        self.rated("nsdm", curve, &motion.v_m_per_s, (peak_n, crush_m), times, simulation_s)
+        let motion = fitted.best().model.run(mass, speed, reference.time_s())?;
+        let motion = Motion {
+            velocity: &motion.v_m_per_s,
+            peak_force_n: motion.a_m_per_s2.iter().map(|a| -a * mass).fold(0.0, f64::max),
+            max_crush_m: motion.x_m.iter().copied().fold(0.0, f64::max),
+            simulation_s: start.elapsed().as_secs_f64(),
+        };
+        let times = Times {
+            // All seeds: one alone would not say which is best.
+            fit_s: fitted.fits.iter().map(|(_, seconds)| seconds).sum(),
+            training_s: fitted.training_s,
+            ..Times::default()
+        };
+        self.rated("nsdm", fitted.made_from.clone(), None, motion, times)
     }
 
     fn rated(
         &self,
         method: &str,
-        curve: &str,
-        velocity: &[f64],
-        (peak_force_n, max_crush_m): (f64, f64),
+        curve: String,
+        driven_by: Option<ForceKind>,
+        motion: Motion<'_>,
         times: Times,
-        simulation_time_s: f64,
     ) -> Result<Row, CompareError> {
+        let Motion { velocity, peak_force_n, max_crush_m, simulation_s } = motion;
         let reference = self.reference;
         let inside = reference.inside();
         let errors = reference.errors_of(velocity);
@@ -91,12 +104,13 @@ impl Maker<'_> {
             let settings = Settings { quantity, ..Settings::default() };
             Ok(rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)?)
         };
-        let own_s = times.predict_s + simulation_time_s;
+        let own_s = times.predict_s + simulation_s;
         let over = |all_s: f64| self.fe_time_s.filter(|_| times.training).map(|fe| fe / all_s);
         let training_s = times.training_s.or(self.training_time_s);
         Ok(Row {
             method: method.into(),
-            curve: curve.into(),
+            driven_by,
+            curve,
             velocity_l1: errors.velocity_l1,
             acceleration_l1: errors.acceleration_l1,
             acceleration_unfiltered_l1: errors.acceleration_unfiltered_l1,
@@ -105,7 +119,7 @@ impl Maker<'_> {
             max_crush_m,
             fit_time_s: times.fit_s,
             predict_time_s: times.predict_s,
-            simulation_time_s,
+            simulation_time_s: simulation_s,
             speed_up: over(own_s),
             speed_up_with_training: training_s.and_then(|t| over(t + times.fit_s + own_s)),
             velocity: rated(&reference.velocity()[..inside], &velocity[..inside], Quantity::Other)?,

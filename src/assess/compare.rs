@@ -1,27 +1,23 @@
-//! Comparison with FE: the curves of each method in one multi-body model, at a speed that is
-//! left out ([`compare`]) and in a whole train ([`train`]).
-
-mod row;
-pub mod train;
-
-use std::time::Instant;
+//! Comparison of the methods at a speed that is left out: the curve of each in one multi-body
+//! model, against FE.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::left_out::{LeftOutCase, NotLeftOut};
+use super::methods;
+use super::reference::{MotionError, Reference};
+use super::row::RowBuilder;
+use super::train::TrainError;
+use super::validate::ValidateError;
 use crate::curve::{Case, EnvelopeError, ForceKind};
 use crate::dataset::{DatasetError, TrainingSet, is_same_speed, nearest};
 use crate::multibody::SimulationError;
-use crate::nsdm::{self, Identifiability, NsdmError, Start, Target};
+use crate::nsdm::{self, Identifiability, NsdmError, Start};
 use crate::rating::{Rating, SignalError};
-use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::ModelError;
 use crate::surrogate::predict::PredictError;
-use crate::surrogate::{Model, ModelError, Options, predict};
 use crate::unit::{SpeedKind, km_per_h};
-use crate::validate::motion::{Driver, MotionError, Reference};
-use crate::validate::{self, Choice, ValidateError, query_of};
-use row::{Maker, Times};
 
 /// How the methods are set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +33,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    fn nsdm_seeds(&self) -> Vec<u64> {
+    pub(super) fn nsdm_seeds(&self) -> Vec<u64> {
         (0..self.nsdm_seeds).map(|k| self.seed.wrapping_add(k)).collect()
     }
 }
@@ -75,10 +71,12 @@ pub struct Comparison {
 /// One method.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Row {
-    /// `fe` and `fe_body` (FE's own curves, of the recipe's force and of the body's motion: the
-    /// floors of a one-mass model), `fdrm`, `nsdm`, `ddtcm`, `best` (the model that validation
-    /// chooses).
+    /// `fe` (FE's own curve of the recipe's force: the floor of a one-mass model), `fe_body` (of the
+    /// body's motion, made from FE's speeds: a check of consistency), `fdrm`, `nsdm`, `ddtcm`,
+    /// `best` (the model that validation chooses).
     pub method: String,
+    /// Which force drives the run; null for a spring and damper.
+    pub driven_by: Option<ForceKind>,
     /// What its curve was made from.
     pub curve: String,
     pub velocity_l1: f64,
@@ -150,7 +148,9 @@ pub enum CompareError {
     #[error(transparent)]
     Signal(#[from] SignalError),
     #[error(transparent)]
-    Train(#[from] train::TrainError),
+    Train(#[from] TrainError),
+    #[error(transparent)]
+    NotLeftOut(#[from] NotLeftOut),
 }
 
 /// Causes that validation names as well.
@@ -220,15 +220,13 @@ pub fn compare(
     if set.cases.len() < 3 {
         return Err(CompareError::TooFew { cases: set.cases.len() });
     }
-    let own = &set.cases[index];
-    let find = |name: &str| cases.iter().find(|c| c.name == name).ok_or(DatasetError::Empty);
-    let case = find(&own.name)?;
-    let reference = Reference::of(case)?;
-    if own.truncated {
-        return Err(CompareError::Truncated { case: own.name.clone() });
-    }
-    let mut rest = set.clone();
-    rest.cases.retain(|c| !near(c.speed_m_per_s));
+    let left_out = LeftOutCase::new(&set, cases, index).map_err(|error| match error {
+        NotLeftOut::Truncated { case } => CompareError::Truncated { case },
+        NotLeftOut::Motion(error) => error.into(),
+        NotLeftOut::TooFew { .. } => CompareError::TooFew { cases: set.cases.len() },
+        error => error.into(),
+    })?;
+    let LeftOutCase { case, rest, reference, .. } = &left_out;
     if rest.cases.len() < 2 {
         return Err(CompareError::TooFew { cases: set.cases.len() });
     }
@@ -244,128 +242,62 @@ pub fn compare(
         .iter()
         .find(|c| is_same_speed(c.speed_m_per_s, fixed_at))
         .ok_or_else(|| no_case(fixed_at, rest.speeds_m_per_s()))?;
-    let fixed_case = find(&fixed.name)?;
-    let fe_time = |c: &Case| c.solver_wall_time_s;
-    let training_time_s: Option<f64> = rest
-        .cases
-        .iter()
-        .map(|c| find(&c.name).ok().and_then(fe_time))
-        .collect::<Option<Vec<f64>>>()
-        .map(|times| times.iter().sum());
-    let maker = Maker { reference: &reference, fe_time_s: fe_time(case), training_time_s };
-
-    let mut rows = Vec::new();
-    let fe = |from: &crate::dataset::TrainingCase| {
-        let v = from.motion.rebound_speed_m_per_s;
-        let other = from.unloading_stiffness_n_per_m;
-        Driver::rebounding(from.envelope.clone(), from.effective_mass_kg, v, other)
+    let find = |name: &str| {
+        cases.iter().find(|c| c.name == name).expect("a training set is made of the group's cases")
     };
-    let made_from = format!("FE at {}", km_per_h(speed));
-    let none = Times { training: false, ..Times::default() };
-    let truth = Some((&own.envelope, &own.envelope));
-    rows.push(maker.row("fe", &made_from, &fe(own), truth, none)?);
-    if case.force_kind == ForceKind::Contact
-        && let Some(driver) = Driver::recorded(case)
-    {
-        let truth = Some((&own.motion.force, &own.motion.force));
-        rows.push(maker.row("fe_body", &made_from, &driver, truth, none)?);
-    }
-    let made_from = format!("FE at {}", km_per_h(fixed.speed_m_per_s));
-    let one_run = Times { training_s: fe_time(fixed_case), ..Times::default() };
-    let truth = Some((&own.envelope, &fixed.envelope));
-    rows.push(maker.row("fdrm", &made_from, &fe(fixed), truth, one_run)?);
+    let fixed_case = find(&fixed.name);
+    let times = rest.cases.iter().map(|c| find(&c.name).solver_wall_time_s);
+    let training_time_s: Option<f64> =
+        times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
+    let rows = RowBuilder { reference, fe_time_s: case.solver_wall_time_s, training_time_s };
 
+    let mut compared = Vec::new();
+    for method in methods::of_fe(&left_out) {
+        compared.push(rows.row(method)?);
+    }
+    compared.push(rows.row(methods::fdrm(&left_out, fixed, fixed_case))?);
     let mut report = None;
     if settings.nsdm_seeds > 0 {
-        let (row, nsdm) = fit_nsdm(&maker, fixed_case, settings, &made_from)?;
-        rows.push(row);
-        report = Some(nsdm);
+        let fitted = methods::fit_nsdm(fixed_case, settings)?;
+        compared.push(rows.of_nsdm(&fitted)?);
+        report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
-
-    let options = Options::Forest(ForestOptions { seed: settings.seed, ..ForestOptions::paper() });
-    let start = Instant::now();
-    let model = Model::fit(&rest, options)?;
-    let fit_s = start.elapsed().as_secs_f64();
-    let rule = match model.features.is_empty() {
-        true => MaxCrushRule::Spline,
-        false => MaxCrushRule::Motion,
-    };
-    let start = Instant::now();
-    let curve = predict(&model, &query_of(case, &model).with_rule(rule))?;
-    let envelope = curve.envelope()?;
-    let times = Times { fit_s, predict_s: start.elapsed().as_secs_f64(), ..Times::default() };
-    let driver = Driver::new(envelope.clone(), Some(curve.stiffness_at_end(&envelope)));
-    let made_from = format!("forest on {} speeds", rest.cases.len());
-    rows.push(maker.row("ddtcm", &made_from, &driver, Some((&own.envelope, &envelope)), times)?);
-
+    compared.push(rows.row(methods::ddtcm(&left_out, settings.seed)?)?);
     let others: Vec<Case> = cases.iter().filter(|c| !near(c.speed.m_per_s)).cloned().collect();
-    let start = Instant::now();
-    let model = validate::train(group, &others, Choice::Auto { seed: settings.seed, trees: None })?;
-    let fit_s = start.elapsed().as_secs_f64();
-    let start = Instant::now();
-    let curve = predict(&model, &query_of(case, &model))?;
-    let driving = curve.driving_envelope()?;
-    let times = Times { fit_s, predict_s: start.elapsed().as_secs_f64(), ..Times::default() };
-    let driver = Driver::new(driving.clone(), Some(curve.stiffness_at_end(&driving)));
-    let made_from = format!("{} on {} speeds", curve.model, rest.cases.len());
-    let declared = curve.envelope()?;
-    rows.push(maker.row("best", &made_from, &driver, Some((&own.envelope, &declared)), times)?);
+    compared.push(rows.row(methods::best(&left_out, group, &others, settings.seed)?)?);
 
     Ok(Comparison {
         group: group.into(),
         case: case.name.clone(),
         speed_m_per_s: speed,
         speed_kind: case.speed.kind,
-        inner: index > 0 && index + 1 < set.cases.len(),
+        inner: left_out.inner,
         mass_kg: case.masses.effective_kg(),
         window_s: reference.window_s(),
         reference_peak_force_n: case.peak_force_n(),
         reference_max_crush_m: case.max_deflection_m(),
-        fe_time_s: fe_time(case),
+        fe_time_s: case.solver_wall_time_s,
         training_time_s,
-        rows,
+        rows: compared,
         nsdm: report,
     })
 }
 
-/// The motion of a case that a spring and damper are fitted to: to 30 ms after its largest
-/// deflection.
-pub(crate) fn nsdm_target(reference: &Reference) -> Result<Target, NsdmError> {
-    let until = reference.inside();
-    Target::new(
-        reference.mass_kg(),
-        reference.speed_m_per_s(),
-        reference.time_s()[..until].to_vec(),
-        reference.velocity()[..until].to_vec(),
-        reference.acceleration()[..until].to_vec(),
-    )
-}
-
-/// Fits with every seed; the row is that of the fit with the least objective, as one who
-/// knows nothing of the new speed would choose.
-fn fit_nsdm(
-    maker: &Maker<'_>,
+/// Errors of every seed's fit, at the speed it was fitted at and here.
+fn nsdm_report(
+    fitted: &methods::FittedNsdm,
     fixed: &Case,
+    reference: &Reference,
     settings: &Settings,
-    made_from: &str,
-) -> Result<(Row, NsdmReport), CompareError> {
-    let own = Reference::of(fixed)?;
-    let target = nsdm_target(&own)?;
-    let choices = nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
-    let mut fits = Vec::new();
-    for seed in settings.nsdm_seeds() {
-        let start = Instant::now();
-        let fit = nsdm::fit(&target, &choices, seed)?;
-        fits.push((fit, start.elapsed().as_secs_f64()));
-    }
+) -> Result<NsdmReport, CompareError> {
     let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, CompareError> {
         let motion = fit.model.run(at.mass_kg(), at.speed_m_per_s(), at.time_s())?;
         Ok(at.errors_of(&motion.v_m_per_s))
     };
-    let mut lines = Vec::new();
-    for (fit, fit_time_s) in &fits {
-        let (own, here) = (errors_at(fit, &own)?, errors_at(fit, maker.reference)?);
-        lines.push(NsdmFit {
+    let mut fits = Vec::new();
+    for (fit, fit_time_s) in &fitted.fits {
+        let (own, here) = (errors_at(fit, &fitted.reference)?, errors_at(fit, reference)?);
+        fits.push(NsdmFit {
             seed: fit.seed,
             own_velocity_l1: own.velocity_l1,
             own_acceleration_l1: own.acceleration_l1,
@@ -374,30 +306,15 @@ fn fit_nsdm(
             fit_time_s: *fit_time_s,
         });
     }
-    let best = fits
-        .iter()
-        .min_by(|a, b| a.0.objective.total_cmp(&b.0.objective))
-        .ok_or(DatasetError::Empty)?;
-    let row = maker.of_nsdm(
-        &best.0.model,
-        &format!("fit to {made_from}"),
-        Times {
-            // All seeds: one alone would not say which is best.
-            fit_s: fits.iter().map(|(_, seconds)| seconds).sum(),
-            training_s: fixed.solver_wall_time_s,
-            ..Times::default()
-        },
-    )?;
-    let all: Vec<nsdm::Fit> = fits.iter().map(|(fit, _)| fit.clone()).collect();
-    let report = NsdmReport {
+    let all: Vec<nsdm::Fit> = fitted.fits.iter().map(|(fit, _)| fit.clone()).collect();
+    Ok(NsdmReport {
         fitted_to: fixed.name.clone(),
         fitted_at_m_per_s: fixed.speed.m_per_s,
         start: match settings.nsdm_start {
             Start::Random => "random".into(),
             Start::LeastSquares => "least squares".into(),
         },
-        fits: lines,
+        fits,
         identifiability: Identifiability::of(&all).ok(),
-    };
-    Ok((row, report))
+    })
 }

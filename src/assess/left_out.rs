@@ -1,0 +1,305 @@
+//! Left-out cases: one speed is dropped, predicted from the rest, run, and measured against FE.
+
+use std::collections::BTreeMap;
+
+use super::reference::{MotionError, MotionErrors, Reference};
+use super::validate::ValidateError;
+use crate::curve::driving::DrivingCurve;
+use crate::curve::rating::{l1_ratio, matched_peaks};
+use crate::curve::{Case, Envelope, ForceKind, Parameter};
+use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
+use crate::surrogate::band::{self, LeftOutSpeeds, Residuals};
+use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::Prediction;
+use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
+use crate::unit::km_per_h;
+
+/// Fewest steps along FE's crush at which forces are compared.
+const STEPS: usize = 400;
+
+/// What to ask a model of this group's so that it predicts the case.
+pub fn query_of(case: &Case, model: &Model) -> Query {
+    let mut parameters = case.parameters.clone();
+    // What all training cases share is no parameter of the model.
+    parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
+    if let Some(other) = case.masses.other_kg {
+        parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
+    }
+    Query {
+        mass_kg: Some(case.masses.body_kg),
+        parameters,
+        // Ends that are left out are judged however far away the others lie.
+        extrapolate: true,
+        ..Query::at(case.speed.m_per_s)
+    }
+}
+
+/// Why a case cannot be left out.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotLeftOut {
+    /// Its largest deflection is not known.
+    #[error("case \"{case}\" ended while loading: not left out")]
+    Truncated {
+        /// Its name.
+        case: String,
+    },
+    /// There is no motion to compare with.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// Ratios to its energy would divide by zero.
+    #[error("case \"{case}\" has no energy to compare with")]
+    NoEnergy {
+        /// Its name.
+        case: String,
+    },
+    /// Fewer than two speeds remain.
+    #[error("without case \"{case}\" fewer than 2 speeds remain")]
+    TooFew {
+        /// Its name.
+        case: String,
+    },
+}
+
+/// A case that is left out, and what is left.
+pub struct LeftOutCase<'a> {
+    /// As the training set has it.
+    pub own: &'a TrainingCase,
+    /// As the database has it.
+    pub case: &'a Case,
+    /// The training set without the cases of its speed.
+    pub rest: TrainingSet,
+    /// Whether the rest has speeds on both sides.
+    pub inner: bool,
+    /// Over which it is predicted: the gap it leaves, or an end's distance to the others.
+    pub span_m_per_s: f64,
+    /// FE's motion.
+    pub reference: Reference,
+}
+
+impl<'a> LeftOutCase<'a> {
+    /// Leaves out all cases of the speed of the set's case `index`, which is one of `cases`.
+    ///
+    /// # Errors
+    /// [`NotLeftOut`] if it cannot be compared with.
+    pub fn new(set: &'a TrainingSet, cases: &'a [Case], index: usize) -> Result<Self, NotLeftOut> {
+        let own = &set.cases[index];
+        let case = cases
+            .iter()
+            .find(|c| c.name == own.name)
+            .expect("a training set is made of the group's cases");
+        let name = || own.name.clone();
+        if own.truncated {
+            return Err(NotLeftOut::Truncated { case: name() });
+        }
+        let reference = Reference::of(case)?;
+        if own.envelope.work() <= 0.0 {
+            return Err(NotLeftOut::NoEnergy { case: name() });
+        }
+        let v = own.speed_m_per_s;
+        let mut rest = set.clone();
+        rest.cases.retain(|c| !is_same_speed(c.speed_m_per_s, v));
+        let others = rest.speeds_m_per_s();
+        let inner = others.first().is_some_and(|&low| low < v)
+            && others.last().is_some_and(|&high| v < high);
+        let span_m_per_s = match inner {
+            true => band::gap_m_per_s(&others, v).ok_or(NotLeftOut::TooFew { case: name() })?,
+            false => band::distance_outside_m_per_s(&others, v),
+        };
+        Ok(Self { own, case, rest, inner, span_m_per_s, reference })
+    }
+
+    /// FE's own curves in the one-mass model: of the recipe's force, and of the body's motion
+    /// where that is another.
+    ///
+    /// That of the body's motion is made from FE's speeds, so its errors check that curve, force law
+    /// and run are consistent; only a contact force's are a floor for predictions of it.
+    ///
+    /// # Errors
+    /// [`MotionError`] if a curve makes no run.
+    pub fn floors(&self) -> Result<Vec<Floor>, MotionError> {
+        let floor = |(kind, curve): (ForceKind, DrivingCurve)| {
+            let errors = self.reference.errors_with(&curve)?;
+            Ok(Floor {
+                force: kind.name().into(),
+                case: self.own.name.clone(),
+                speed_m_per_s: self.own.speed_m_per_s,
+                inner: self.inner,
+                velocity_l1: errors.velocity_l1,
+                acceleration_l1: errors.acceleration_l1,
+                acceleration_unfiltered_l1: errors.acceleration_unfiltered_l1,
+            })
+        };
+        self.own_curves().into_iter().map(floor).collect()
+    }
+
+    /// FE's own curves, by force.
+    fn own_curves(&self) -> Vec<(ForceKind, DrivingCurve)> {
+        let of_body = |envelope: &Envelope| {
+            let recorded = DrivingCurve::recorded(self.case);
+            (ForceKind::Body, recorded.unwrap_or_else(|| rebounding(self.own, envelope)))
+        };
+        match self.rest.force_kind {
+            ForceKind::Contact => {
+                let contact = rebounding(self.own, &self.own.envelope);
+                vec![(ForceKind::Contact, contact), of_body(&self.own.motion.force)]
+            }
+            ForceKind::Body => vec![of_body(&self.own.envelope)],
+        }
+    }
+
+    /// Predicts the case by one model and every rule for the maximal crush.
+    pub(super) fn trial(&self, kind: ModelKind) -> Trial {
+        let judged = || -> Result<Vec<_>, ValidateError> {
+            let model = Model::fit(&self.rest, kind)
+                .map_err(|error| ValidateError::NotFitted(error.to_string()))?;
+            let query = query_of(self.case, &model);
+            // Body force and motion are the same by all rules.
+            let prediction = Prediction::new(&model, &query)?;
+            let by = |rule| self.judged(prediction.curve(rule)?);
+            Ok(MaxCrushRule::ALL.map(|rule| (rule, by(rule))).into())
+        };
+        let predictions = match judged() {
+            Ok(judged) => judged
+                .into_iter()
+                .map(|(rule, judged)| (rule, judged.map_err(|e| e.to_string())))
+                .collect(),
+            Err(error) => MaxCrushRule::ALL.map(|rule| (rule, Err(error.to_string()))).into(),
+        };
+        self.trial_of(kind.name(), predictions)
+    }
+
+    pub(super) fn trial_of(&self, model: &'static str, predictions: Predictions) -> Trial {
+        Trial {
+            model,
+            case: self.own.name.clone(),
+            speed_m_per_s: self.own.speed_m_per_s,
+            inner: self.inner,
+            predictions,
+        }
+    }
+
+    /// The errors of a predicted curve.
+    pub(super) fn judged(&self, curve: PredictedCurve) -> Result<Judged, ValidateError> {
+        let envelope = curve.envelope()?;
+        let end = self.own.envelope.end_m();
+        let along = grid(end, STEPS);
+        let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
+        let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
+        let driven_by = |force| -> Result<MotionErrors, ValidateError> {
+            Ok(self.reference.errors_with(&curve.driving(force)?)?)
+        };
+        let judged = Judged {
+            force_l1: l1_ratio(&reference, &predicted),
+            energy_error: curve.energy_j / self.own.envelope.work() - 1.0,
+            max_crush_error: curve.max_deflection_m / end - 1.0,
+            peaks: peak_errors(&along, &reference, &predicted),
+            residuals: {
+                // Up to its first point a prediction rises from 0, which FE does not.
+                let first = curve.deflection_m[1];
+                let from = along.iter().position(|&d| d >= first).unwrap_or(0);
+                let ratios = band::ratios(&reference, &predicted).split_off(from);
+                Residuals { span_m_per_s: self.span_m_per_s, ratios }
+            },
+            body: driven_by(ForceKind::Body)?,
+            contact: match curve.body_force_n {
+                Some(_) => Some(driven_by(ForceKind::Contact)?),
+                None => None,
+            },
+        };
+        let numbers = [judged.force_l1, judged.energy_error, judged.max_crush_error];
+        match numbers.iter().all(|n| n.is_finite()) {
+            true => Ok(judged),
+            false => Err(ValidateError::NotFinite),
+        }
+    }
+}
+
+/// The recipe's force, or another of the case, with the unloading that gives FE's rebound.
+pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> DrivingCurve {
+    DrivingCurve::bare(envelope.clone()).rebounding(
+        own.effective_mass_kg,
+        own.motion.rebound_speed_m_per_s,
+        own.unloading_stiffness_n_per_m,
+    )
+}
+
+/// Errors of one prediction.
+pub(super) struct Judged {
+    pub force_l1: f64,
+    pub energy_error: f64,
+    pub max_crush_error: f64,
+    pub peaks: Vec<PeakError>,
+    pub residuals: Residuals,
+    pub body: MotionErrors,
+    pub contact: Option<MotionErrors>,
+}
+
+/// One model at one case by every rule, or why that has no answer.
+pub(super) type Predictions = BTreeMap<MaxCrushRule, Result<Judged, String>>;
+
+pub(super) struct Trial {
+    pub model: &'static str,
+    case: String,
+    speed_m_per_s: f64,
+    pub inner: bool,
+    pub predictions: Predictions,
+}
+
+impl Trial {
+    pub fn left_out(&self) -> LeftOutSpeeds {
+        LeftOutSpeeds::of(self.inner)
+    }
+
+    pub fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
+        Some(self.judged(rule)?.residuals.clone())
+    }
+
+    pub fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {
+        self.predictions.get(&rule)?.as_ref().ok()
+    }
+
+    /// Why there is no row.
+    pub fn failure(&self, rule: MaxCrushRule) -> Option<String> {
+        let error = self.predictions.get(&rule)?.as_ref().err()?;
+        Some(format!("{} at {}: no row: {error}", self.model, km_per_h(self.speed_m_per_s)))
+    }
+
+    pub fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
+        let by_rule = self.judged(rule)?;
+        let crush = |rule| Some((rule, self.judged(rule)?.max_crush_error));
+        Some(LeftOut {
+            model: self.model.into(),
+            case: self.case.clone(),
+            speed_m_per_s: self.speed_m_per_s,
+            inner: self.inner,
+            force_l1: by_rule.force_l1,
+            energy_error: by_rule.energy_error,
+            max_crush_error: by_rule.max_crush_error,
+            max_crush_errors: MaxCrushRule::ALL.into_iter().filter_map(crush).collect(),
+            peaks: by_rule.peaks.clone(),
+            velocity_l1: by_rule.body.velocity_l1,
+            acceleration_l1: by_rule.body.acceleration_l1,
+            acceleration_unfiltered_l1: by_rule.body.acceleration_unfiltered_l1,
+            contact_velocity_l1: by_rule.contact.map(|c| c.velocity_l1),
+            contact_acceleration_l1: by_rule.contact.map(|c| c.acceleration_l1),
+            coverage: None,
+        })
+    }
+}
+
+/// The first two peaks of FE's force and the predicted peaks nearest to them.
+fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakError> {
+    matched_peaks(along, reference, predicted)
+        .into_iter()
+        .map(|peak| {
+            let (deflection_m, force_n) = peak.reference;
+            PeakError {
+                deflection_m,
+                force_n,
+                force_error: peak.prediction.map(|(_, force)| force / force_n - 1.0),
+                shift_m: peak.prediction.map(|(at, _)| at - deflection_m),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,178 @@
+//! The methods that are compared: FE's own curves, FDRM, NSDM, DDTCM and the best model.
+
+use std::time::Instant;
+
+use super::compare::{CompareError, Settings};
+use super::left_out::{LeftOutCase, query_of, rebounding};
+use super::reference::Reference;
+use super::row::Times;
+use super::validate::{Choice, train};
+use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
+use crate::dataset::{TrainingCase, TrainingSet};
+use crate::nsdm::{self, NsdmError, Target};
+use crate::surrogate::forest::ForestOptions;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::{Model, ModelError, ModelKind, PredictedCurve, Query, predict};
+use crate::unit::km_per_h;
+
+/// A method's curve at a left-out speed.
+pub(super) struct Method {
+    pub name: &'static str,
+    /// What its curve was made from.
+    pub made_from: String,
+    pub curve: DrivingCurve,
+    /// FE's force and the method's, of one kind of force.
+    pub forces: (Envelope, Envelope),
+    pub times: Times,
+}
+
+fn fe_at(speed_m_per_s: f64) -> String {
+    format!("FE at {}", km_per_h(speed_m_per_s))
+}
+
+/// FE's own curves: of the recipe's force, and of the body's motion where that is another.
+pub(super) fn of_fe(left_out: &LeftOutCase<'_>) -> Vec<Method> {
+    let LeftOutCase { own, case, .. } = left_out;
+    let method = |name, curve, truth: &Envelope| Method {
+        name,
+        made_from: fe_at(case.speed.m_per_s),
+        curve,
+        forces: (truth.clone(), truth.clone()),
+        times: Times { training: false, ..Times::default() },
+    };
+    let declared = of_recipe(own, case.force_kind);
+    let mut methods = vec![method("fe", declared, &own.envelope)];
+    if case.force_kind == ForceKind::Contact {
+        let recorded = DrivingCurve::recorded(case);
+        methods.extend(recorded.map(|curve| method("fe_body", curve, &own.motion.force)));
+    }
+    methods
+}
+
+/// The recipe's force of a case, rebounding as FE does.
+fn of_recipe(case: &TrainingCase, force: ForceKind) -> DrivingCurve {
+    DrivingCurve { force: Some(force), ..rebounding(case, &case.envelope) }
+}
+
+/// The FE curve of one other speed, as it is.
+pub(super) fn fdrm(left_out: &LeftOutCase<'_>, fixed: &TrainingCase, of: &Case) -> Method {
+    Method {
+        name: "fdrm",
+        made_from: fe_at(fixed.speed_m_per_s),
+        curve: of_recipe(fixed, of.force_kind),
+        forces: (left_out.own.envelope.clone(), fixed.envelope.clone()),
+        times: Times { training_s: of.solver_wall_time_s, ..Times::default() },
+    }
+}
+
+/// A spring and damper fitted to one case by every seed.
+pub(super) struct FittedNsdm {
+    pub made_from: String,
+    /// Motion that it was fitted to.
+    pub reference: Reference,
+    /// Each with the time it took, in s.
+    pub fits: Vec<(nsdm::Fit, f64)>,
+    /// FE's time of the run it was fitted to, in s.
+    pub training_s: Option<f64>,
+}
+
+impl FittedNsdm {
+    /// The fit with the least objective, as one who knows nothing of the new speed would choose.
+    pub fn best(&self) -> &nsdm::Fit {
+        let fits = self.fits.iter().map(|(fit, _)| fit);
+        fits.min_by(|a, b| a.objective.total_cmp(&b.objective)).expect("at least one seed")
+    }
+}
+
+/// Fits the spring and damper with every seed of the settings.
+pub(super) fn fit_nsdm(fixed: &Case, settings: &Settings) -> Result<FittedNsdm, CompareError> {
+    let reference = Reference::of(fixed)?;
+    let target = nsdm_target(&reference)?;
+    let choices = nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
+    let mut fits = Vec::new();
+    for seed in settings.nsdm_seeds() {
+        let start = Instant::now();
+        let fit = nsdm::fit(&target, &choices, seed)?;
+        fits.push((fit, start.elapsed().as_secs_f64()));
+    }
+    let made_from = format!("fit to {}", fe_at(fixed.speed.m_per_s));
+    Ok(FittedNsdm { made_from, reference, fits, training_s: fixed.solver_wall_time_s })
+}
+
+/// The motion of a case that a spring and damper are fitted to: to 30 ms after its largest
+/// deflection.
+pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, NsdmError> {
+    let until = reference.inside();
+    Target::new(
+        reference.mass_kg(),
+        reference.speed_m_per_s(),
+        reference.time_s()[..until].to_vec(),
+        reference.velocity()[..until].to_vec(),
+        reference.acceleration()[..until].to_vec(),
+    )
+}
+
+/// The reference method's model: its forest, and its spline for the maximal crush where speed
+/// alone differs.
+pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, ModelError> {
+    let options = ForestOptions { seed, ..ForestOptions::paper() };
+    let mut model = Model::fit(set, ModelKind::forest(options))?;
+    model.max_crush_rule = match model.features.is_empty() {
+        true => MaxCrushRule::Spline,
+        false => MaxCrushRule::Motion,
+    };
+    Ok(model)
+}
+
+/// The reference method: the recipe's force drives, as in the paper.
+pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, CompareError> {
+    let start = Instant::now();
+    let model = ddtcm_model(&left_out.rest, seed)?;
+    let fit_s = start.elapsed().as_secs_f64();
+    let rule = model.max_crush_rule;
+    let (curve, predict_s) = predicted(left_out, &model, Some(rule))?;
+    let driving = curve.driving(left_out.rest.force_kind)?;
+    let made_from = format!("forest on {} speeds", left_out.rest.cases.len());
+    method("ddtcm", made_from, left_out, &curve, driving, (fit_s, predict_s))
+}
+
+/// The model that leaving speeds out chooses among the others; the body's force drives.
+pub(super) fn best(
+    left_out: &LeftOutCase<'_>,
+    group: &str,
+    others: &[Case],
+    seed: u64,
+) -> Result<Method, CompareError> {
+    let start = Instant::now();
+    let model = train(group, others, Choice::Auto { seed, trees: None })?;
+    let fit_s = start.elapsed().as_secs_f64();
+    let (curve, predict_s) = predicted(left_out, &model, None)?;
+    let driving = curve.driving(ForceKind::Body)?;
+    let made_from = format!("{} on {} speeds", curve.model, left_out.rest.cases.len());
+    method("best", made_from, left_out, &curve, driving, (fit_s, predict_s))
+}
+
+/// The model's curve at the left-out case, and the time it took in s.
+fn predicted(
+    left_out: &LeftOutCase<'_>,
+    model: &Model,
+    rule: Option<MaxCrushRule>,
+) -> Result<(PredictedCurve, f64), CompareError> {
+    let query = Query { rule, ..query_of(left_out.case, model) };
+    let start = Instant::now();
+    let curve = predict(model, &query)?;
+    Ok((curve, start.elapsed().as_secs_f64()))
+}
+
+fn method(
+    name: &'static str,
+    made_from: String,
+    left_out: &LeftOutCase<'_>,
+    curve: &PredictedCurve,
+    driving: DrivingCurve,
+    (fit_s, predict_s): (f64, f64),
+) -> Result<Method, CompareError> {
+    let forces = (left_out.own.envelope.clone(), curve.envelope()?);
+    let times = Times { fit_s, predict_s, ..Times::default() };
+    Ok(Method { name, made_from, curve: driving, forces, times })
+}

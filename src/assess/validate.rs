@@ -1,0 +1,386 @@
+//! Validation: every model at every speed that is left out, and the model that is chosen.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::choose::{NextRun, choose};
+use super::left_out::{LeftOutCase, Trial, query_of};
+use super::reference::MotionError;
+use crate::curve::Case;
+use crate::dataset::{DatasetError, TrainingSet, is_same_speed};
+use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
+use crate::surrogate::forest::ForestOptions;
+use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::PredictError;
+use crate::surrogate::{MODELS, Model, ModelError, ModelKind, predict};
+
+/// Why there is no validation or no model.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidateError {
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    #[error("without this speed: {0}")]
+    NotFitted(String),
+    #[error("its errors against FE are no finite numbers")]
+    NotFinite,
+}
+
+/// What `crumple validate --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// In the order of the database.
+    pub groups: Vec<GroupReport>,
+}
+
+/// One group: its table, or why there is none.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum GroupReport {
+    Validated {
+        #[serde(flatten)]
+        validation: Box<Validation>,
+        /// Absent if it was not asked for, or if there is no gap to run in.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        next_run: Option<NextRun>,
+    },
+    Failed {
+        group: String,
+        error: String,
+    },
+}
+
+/// Which model to train.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Choice {
+    /// The one that leave-one-speed-out chooses; seed of the forests, and their number of trees
+    /// if not their own.
+    Auto {
+        /// Of all random draws.
+        seed: u64,
+        /// Of each forest.
+        trees: Option<usize>,
+    },
+    /// This one; it is validated beside `nearest` and `linear`.
+    Kind(ModelKind),
+}
+
+/// Fits the chosen model to a group, with its validation.
+///
+/// # Errors
+/// [`ValidateError`] if the cases are no training set, or too few for the model.
+pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, ValidateError> {
+    match choice {
+        Choice::Auto { seed, trees } => {
+            let asked = |kind: ModelKind| {
+                kind.with_forest(|f| ForestOptions { trees: trees.unwrap_or(f.trees), ..f })
+            };
+            let candidates: Vec<ModelKind> =
+                ModelKind::candidates(seed).into_iter().map(asked).collect();
+            let validation = validate(group, cases, &candidates, None)?;
+            let kept: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
+            train_chosen(group, cases, &kept, validation)
+        }
+        Choice::Kind(kind) => {
+            // What the model itself refuses is said before it is validated.
+            Model::check_fits(&TrainingSet::new(group, cases)?, kind)?;
+            let mut candidates = vec![ModelKind::nearest(), ModelKind::linear()];
+            candidates.retain(|baseline| baseline.name() != kind.name());
+            candidates.push(kind);
+            candidates.sort_by_key(|kind| MODELS.iter().position(|e| e.name == kind.name()));
+            let validation = validate(group, cases, &candidates, Some(kind.name()))?;
+            train_chosen(group, cases, &[kind], validation)
+        }
+    }
+}
+
+/// Fits the model of `kept` that a validation of these cases chose.
+///
+/// # Errors
+/// As [`train`].
+pub fn train_chosen(
+    group: &str,
+    cases: &[Case],
+    kept: &[ModelKind],
+    validation: Validation,
+) -> Result<Model, ValidateError> {
+    let set = TrainingSet::new(group, cases)?;
+    let chosen = kept.iter().find(|kind| kind.name() == validation.chosen);
+    // Only the model that is kept needs the members of its leaves.
+    let kind = chosen
+        .copied()
+        .unwrap_or(ModelKind::nearest())
+        .with_forest(|forest| ForestOptions { quantiles: forest.bootstrap, ..forest });
+    let mut model = Model::fit(&set, kind)?;
+    if let Some(means) = validation.means.iter().find(|m| m.model == kind.name()) {
+        model.max_crush_rule = means.max_crush_rule;
+    }
+    model.leave_one_out = Some(validation);
+    Ok(model)
+}
+
+/// Leaves every speed out in turn and predicts it by every candidate.
+///
+/// A model that cannot be fitted to the group, or has no answer at a speed, is noted with the
+/// reason; one without an answer at every inner speed has no means and cannot be chosen. `keep`
+/// names the model that counts as chosen, whatever its errors.
+///
+/// # Errors
+/// [`ValidateError`] if the cases are no training set.
+pub fn validate(
+    group: &str,
+    cases: &[Case],
+    candidates: &[ModelKind],
+    keep: Option<&str>,
+) -> Result<Validation, ValidateError> {
+    let set = TrainingSet::new(group, cases)?;
+    let (fitting, mut notes) = those_that_fit(&set, candidates);
+    let left_out = match left_out_cases(&set, cases) {
+        Ok((left_out, more)) => {
+            notes.extend(more);
+            left_out
+        }
+        Err(too_few) => {
+            notes.push(too_few);
+            Vec::new()
+        }
+    };
+    let mut floors = Vec::new();
+    for case in &left_out {
+        match case.floors() {
+            Ok(own) => floors.extend(own),
+            Err(error) => notes.push(format!("FE's own curves of \"{}\": {error}", case.own.name)),
+        }
+    }
+    let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
+        fitting.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
+    let trials: Vec<Trial> = pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect();
+
+    let inner_speeds = left_out.iter().filter(|case| case.inner).count();
+    let (mut rows, mut means, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
+    for kind in &fitting {
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.model == kind.name()).collect();
+        let Some(table) = ModelTable::of(kind, &own) else { continue };
+        notes.extend(table.failures);
+        match mean(kind.name(), table.rule, &table.rows) {
+            Some(of) if of.speeds < inner_speeds => notes.push(without_means(kind.name())),
+            of => means.extend(of),
+        }
+        residuals.insert(kind.name(), table.residuals);
+        rows.extend(table.rows);
+    }
+    let (chosen, reason) = match keep {
+        Some(model) => (model.to_string(), "asked for".into()),
+        None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
+    };
+    let band_of = |left_out: LeftOutSpeeds| {
+        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?)
+    };
+    let (band, band_outside) = (band_of(LeftOutSpeeds::Inner), band_of(LeftOutSpeeds::Ends));
+    let group = group.into();
+    Ok(Validation { group, chosen, reason, rows, means, floors, band, band_outside, notes })
+}
+
+/// The candidates that can be fitted to the set, and why the others cannot.
+fn those_that_fit(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec<String>) {
+    let (mut fitting, mut notes) = (Vec::new(), Vec::new());
+    for &kind in candidates {
+        match Model::check_fits(set, kind) {
+            Ok(()) => fitting.push(kind),
+            Err(error) => notes.push(format!("{}: {error}", kind.name())),
+        }
+    }
+    (fitting, notes)
+}
+
+/// Every case left out in turn, with notes on those that cannot be.
+///
+/// # Errors
+/// Says why no speed can be left out.
+fn left_out_cases<'a>(
+    set: &'a TrainingSet,
+    cases: &'a [Case],
+) -> Result<(Vec<LeftOutCase<'a>>, Vec<String>), String> {
+    let mut speeds = set.speeds_m_per_s();
+    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    let found = speeds.len();
+    if found < 3 {
+        let s = if found == 1 { "" } else { "s" };
+        return Err(format!("the group has {found} speed{s}: leaving one out needs at least 3"));
+    }
+    let (mut left_out, mut notes) = (Vec::new(), Vec::new());
+    for index in 0..set.cases.len() {
+        match LeftOutCase::new(set, cases, index) {
+            Ok(case) => left_out.push(case),
+            Err(error) => notes.push(error.to_string()),
+        }
+    }
+    Ok((left_out, notes))
+}
+
+/// The rows of one model, by its rule for the maximal crush.
+struct ModelTable {
+    rule: MaxCrushRule,
+    rows: Vec<LeftOut>,
+    residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>>,
+    /// Why a trial has no row.
+    failures: Vec<String>,
+}
+
+impl ModelTable {
+    /// `None` without any trial.
+    fn of(kind: &ModelKind, trials: &[&Trial]) -> Option<Self> {
+        let rule = best_rule(kind, trials)?;
+        let mut rows = Vec::new();
+        let mut residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>> = BTreeMap::new();
+        for trial in trials {
+            let (Some(row), Some(of)) = (trial.row(rule), trial.residuals(rule)) else { continue };
+            rows.push(row);
+            residuals.entry(trial.left_out()).or_default().push(of);
+        }
+        let mut index: BTreeMap<LeftOutSpeeds, usize> = BTreeMap::new();
+        for row in &mut rows {
+            let left_out = LeftOutSpeeds::of(row.inner);
+            let i = index.entry(left_out).or_default();
+            row.coverage = band::coverage(left_out, &residuals[&left_out], *i);
+            *i += 1;
+        }
+        let failures = trials.iter().filter_map(|t| t.failure(rule)).collect();
+        Some(Self { rule, rows, residuals, failures })
+    }
+}
+
+/// Adds the rows and means of `auto` itself: with every inner speed left out, model and rule
+/// are chosen anew by leaving out speeds of what remains.
+///
+/// The errors of the chosen model are those that it was chosen by, and so a little too good;
+/// these are not. Speeds that leave fewer than three others, or fail otherwise, have no row but a
+/// note.
+///
+/// # Errors
+/// As [`validate`].
+pub fn add_nested(
+    validation: &mut Validation,
+    cases: &[Case],
+    seed: u64,
+) -> Result<(), ValidateError> {
+    let group = validation.group.clone();
+    let set = TrainingSet::new(&group, cases)?;
+    let mut speeds = set.speeds_m_per_s();
+    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    if speeds.len() < 4 {
+        validation.notes.push(format!(
+            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {}",
+            speeds.len()
+        ));
+        return Ok(());
+    }
+    // Cases that cannot be left out have been noted.
+    let (mut left_out, _) = left_out_cases(&set, cases).unwrap_or_default();
+    left_out.retain(|case| case.inner);
+    let trials: Vec<Trial> = left_out
+        .par_iter()
+        .map(|held| {
+            let v = held.own.speed_m_per_s;
+            let others: Vec<Case> =
+                cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
+            let predictions = train(&group, &others, Choice::Auto { seed, trees: None })
+                .and_then(|model| {
+                    let curve = predict(&model, &query_of(held.case, &model))?;
+                    Ok((curve.provenance.max_crush_rule, held.judged(curve)?))
+                })
+                .map_or_else(
+                    |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),
+                    |(rule, judged)| BTreeMap::from([(rule, Ok(judged))]),
+                );
+            held.trial_of("auto", predictions)
+        })
+        .collect();
+    // Each has one rule.
+    let of = |trial: &Trial| trial.predictions.keys().next().copied();
+    let rows: Vec<LeftOut> = trials.iter().filter_map(|t| t.row(of(t)?)).collect();
+    validation.notes.extend(trials.iter().filter_map(|t| t.failure(of(t)?)));
+    let rule = trials.first().and_then(of).unwrap_or(MaxCrushRule::Motion);
+    match mean("auto", rule, &rows) {
+        Some(of) if of.speeds < left_out.len() => validation.notes.push(without_means("auto")),
+        of => validation.means.extend(of),
+    }
+    validation.rows.extend(rows);
+    Ok(())
+}
+
+/// Why a model is not among the means.
+fn without_means(model: &str) -> String {
+    format!("{model} has no means and cannot be chosen: it has no answer at every inner speed")
+}
+
+/// With too few speeds to leave one out.
+fn without_validation(fitting: &[ModelKind]) -> (String, String) {
+    let reason = "too few speeds to leave one out";
+    let linear = fitting.contains(&ModelKind::linear());
+    (if linear { "linear" } else { "nearest" }.into(), reason.into())
+}
+
+/// The rule with the smallest mean error of crush and energy over the inner speeds, as the
+/// crush decides both; the reference method keeps its spline. A rule with an answer at more speeds
+/// goes before; `None` without any trial.
+fn best_rule(kind: &ModelKind, trials: &[&Trial]) -> Option<MaxCrushRule> {
+    let errors = |rule: MaxCrushRule, of_inner: bool| -> Vec<f64> {
+        let of = trials.iter().filter(|t| t.inner == of_inner).filter_map(|t| t.judged(rule));
+        of.map(|j| j.max_crush_error.abs() + j.energy_error.abs()).collect()
+    };
+    let missing = |rule: MaxCrushRule| {
+        let inner = errors(rule, true).len();
+        (trials.len() - inner, trials.len() - inner - errors(rule, false).len())
+    };
+    let mean = |rule: MaxCrushRule| {
+        let errors = errors(rule, true);
+        errors.iter().sum::<f64>() / errors.len().max(1) as f64
+    };
+    // The spline is not monotone by construction: nobody gets it without asking.
+    let best = (!trials.is_empty()).then_some(MaxCrushRule::ALL).and_then(|all| {
+        all.into_iter()
+            .filter(|rule| *rule != MaxCrushRule::Spline)
+            .min_by(|&a, &b| missing(a).cmp(&missing(b)).then(mean(a).total_cmp(&mean(b))))
+    })?;
+    match kind.is_reference_method() && missing(MaxCrushRule::Spline).0 <= missing(best).0 {
+        true => Some(MaxCrushRule::Spline),
+        false => Some(best),
+    }
+}
+
+/// Means over the inner speeds; `None` without any.
+fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
+    let inner: Vec<&LeftOut> = rows.iter().filter(|r| r.inner).collect();
+    let over = |of: fn(&LeftOut) -> f64| {
+        inner.iter().map(|r| of(r).abs()).sum::<f64>() / inner.len() as f64
+    };
+    (!inner.is_empty()).then(|| Means {
+        model: model.into(),
+        speeds: inner.len(),
+        force_l1: over(|r| r.force_l1),
+        energy_error: over(|r| r.energy_error),
+        max_crush_error: over(|r| r.max_crush_error),
+        max_crush_rule: rule,
+        max_crush_errors: MaxCrushRule::ALL
+            .into_iter()
+            .filter_map(|rule| {
+                let errors: Option<Vec<f64>> =
+                    inner.iter().map(|r| Some(r.max_crush_errors.get(&rule)?.abs())).collect();
+                Some((rule, errors?.iter().sum::<f64>() / inner.len() as f64))
+            })
+            .collect(),
+        velocity_l1: over(|r| r.velocity_l1),
+        acceleration_l1: over(|r| r.acceleration_l1),
+        acceleration_unfiltered_l1: over(|r| r.acceleration_unfiltered_l1),
+    })
+}

@@ -1,0 +1,230 @@
+//! Driving curves: what the database, models, files and NSDM give, and what multi-body runs,
+//! exports and comparisons take.
+
+use super::body::recorded_force;
+use super::{Case, Envelope, EnvelopeError, ForceKind};
+use crate::unit::SpeedKind;
+
+/// A force–deflection curve that can drive an interface, with what its source knows of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrivingCurve {
+    /// Loading branch from (0, 0) to the maximal crush.
+    pub loading: Envelope,
+    /// The same force along deflections of which some lie beyond the maximal crush: neighbours
+    /// in a train push on where a body by itself would have stopped.
+    pub beyond: Option<Envelope>,
+    /// From the end of the loading branch.
+    pub unloading: CurveUnloading,
+    /// Which force it is; `None` if its source does not say.
+    pub force: Option<ForceKind>,
+    /// What its speed is measured against; `None` for a curve without a speed.
+    pub speed_kind: Option<SpeedKind>,
+    /// Speed that it belongs to.
+    pub speed_m_per_s: Option<f64>,
+}
+
+/// What is known of a curve's unloading from its largest deflection.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CurveUnloading {
+    /// Nothing.
+    Unknown,
+    /// A straight line of this stiffness in N/m.
+    Stiffness(f64),
+    /// The recorded branch, from the largest deflection to where the force is first zero.
+    Recorded {
+        /// Of the straight line that gives back the same energy, in N/m.
+        stiffness_n_per_m: f64,
+        /// Falling.
+        deflection_m: Vec<f64>,
+        /// One per deflection.
+        force_n: Vec<f64>,
+    },
+}
+
+/// Why a case has no curve of the force that was asked for.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoDrivingCurve {
+    /// Its loading branch is no envelope.
+    #[error("{0}")]
+    Envelope(#[from] EnvelopeError),
+    /// Its body force cannot be told from its speeds.
+    #[error("its sampled states make no loading branch")]
+    NoMotion,
+}
+
+/// Stiffness in N/m of the straight line on which a body of `mass_kg` leaves a force of `top_n`
+/// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is no stiffness.
+pub fn rebound_stiffness_n_per_m(top_n: f64, mass_kg: f64, rebound_m_per_s: f64) -> Option<f64> {
+    let stiffness = top_n * top_n / (mass_kg * rebound_m_per_s * rebound_m_per_s);
+    (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
+}
+
+impl DrivingCurve {
+    /// A curve of which nothing else is known.
+    pub fn bare(loading: Envelope) -> Self {
+        Self {
+            loading,
+            beyond: None,
+            unloading: CurveUnloading::Unknown,
+            force: None,
+            speed_kind: None,
+            speed_m_per_s: None,
+        }
+    }
+
+    /// A force that moves bodies of one mass, and of which nothing else is known.
+    pub fn of_body(loading: Envelope) -> Self {
+        Self { force: Some(ForceKind::Body), ..Self::bare(loading) }
+    }
+
+    /// The force that moved the body of a case, with the recorded unloading; `None` if the
+    /// sampled states make no loading branch.
+    pub fn recorded(case: &Case) -> Option<Self> {
+        let recorded = recorded_force(case)?;
+        let unloading = match recorded.unloading_stiffness_n_per_m {
+            Some(stiffness_n_per_m) => CurveUnloading::Recorded {
+                stiffness_n_per_m,
+                deflection_m: recorded.unloading_deflection_m,
+                force_n: recorded.unloading_force_n,
+            },
+            None => CurveUnloading::of(case.unloading_stiffness_n_per_m),
+        };
+        Some(Self {
+            unloading,
+            force: Some(ForceKind::Body),
+            speed_kind: Some(case.speed.kind),
+            speed_m_per_s: Some(case.speed.m_per_s),
+            ..Self::bare(recorded.loading)
+        })
+    }
+
+    /// The curve of a case: the recipe's force, or for [`ForceKind::Body`] beside a contact
+    /// force the recorded one of the body's motion.
+    ///
+    /// # Errors
+    /// [`NoDrivingCurve`] if the case has no such curve.
+    pub fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
+        if force == ForceKind::Body && case.force_kind == ForceKind::Contact {
+            return Self::recorded(case).ok_or(NoDrivingCurve::NoMotion);
+        }
+        Ok(Self {
+            unloading: CurveUnloading::of(case.unloading_stiffness_n_per_m),
+            force: Some(case.force_kind),
+            speed_kind: Some(case.speed.kind),
+            speed_m_per_s: Some(case.speed.m_per_s),
+            ..Self::bare(case.loading()?.envelope)
+        })
+    }
+
+    /// The same with the unloading that lets a body of `mass_kg` rebound at `rebound_m_per_s`,
+    /// or with `otherwise` in N/m where that speed is not known.
+    pub fn rebounding(
+        self,
+        mass_kg: f64,
+        rebound_m_per_s: Option<f64>,
+        otherwise: Option<f64>,
+    ) -> Self {
+        let top_n = self.loading.force_at(self.loading.end_m());
+        let stiffness = rebound_m_per_s
+            .and_then(|speed| rebound_stiffness_n_per_m(top_n, mass_kg, speed))
+            .or(otherwise);
+        Self { unloading: CurveUnloading::of(stiffness), ..self }
+    }
+
+    /// The same with a known unloading stiffness in N/m.
+    pub fn unloading_with(self, stiffness_n_per_m: f64) -> Self {
+        Self { unloading: CurveUnloading::Stiffness(stiffness_n_per_m), ..self }
+    }
+
+    /// The same with the loading branch continued by what lies beyond it, at the level that the
+    /// branch ends with.
+    ///
+    /// # Errors
+    /// [`EnvelopeError`] if the two make no envelope.
+    pub fn continued(mut self) -> Result<Self, EnvelopeError> {
+        let Some(beyond) = self.beyond.take() else { return Ok(self) };
+        let end = self.loading.end_m();
+        let share = match beyond.force_at(end) {
+            at if at > 0.0 => self.loading.force_at(end) / at,
+            _ => 1.0,
+        };
+        let (mut d, mut f) =
+            (self.loading.deflection_m().to_vec(), self.loading.force_n().to_vec());
+        for (&deflection, &force) in beyond.deflection_m().iter().zip(beyond.force_n()) {
+            if deflection > end {
+                d.push(deflection);
+                f.push(share * force);
+            }
+        }
+        self.loading = Envelope::new(d, f)?;
+        Ok(self)
+    }
+
+    /// The same with all forces, and the stiffness with them, times `factor` (above 0).
+    ///
+    /// # Errors
+    /// [`EnvelopeError`] if the products are no finite numbers.
+    pub fn scaled(mut self, factor: f64) -> Result<Self, EnvelopeError> {
+        let times = |e: &Envelope| {
+            let force_n = e.force_n().iter().map(|f| f * factor).collect();
+            Envelope::new(e.deflection_m().to_vec(), force_n)
+        };
+        self.loading = times(&self.loading)?;
+        self.beyond = self.beyond.as_ref().map(times).transpose()?;
+        match &mut self.unloading {
+            CurveUnloading::Unknown => {}
+            CurveUnloading::Stiffness(k) => *k *= factor,
+            CurveUnloading::Recorded { stiffness_n_per_m, force_n, .. } => {
+                *stiffness_n_per_m *= factor;
+                force_n.iter_mut().for_each(|f| *f *= factor);
+            }
+        }
+        Ok(self)
+    }
+}
+
+impl CurveUnloading {
+    /// A line of that stiffness in N/m, if it is known.
+    pub fn of(stiffness_n_per_m: Option<f64>) -> Self {
+        stiffness_n_per_m.map_or(Self::Unknown, Self::Stiffness)
+    }
+
+    /// Stiffness in N/m of the line that gives back the same energy, if it is known.
+    pub fn stiffness_n_per_m(&self) -> Option<f64> {
+        match self {
+            Self::Unknown => None,
+            Self::Stiffness(stiffness_n_per_m) | Self::Recorded { stiffness_n_per_m, .. } => {
+                Some(*stiffness_n_per_m)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve() -> DrivingCurve {
+        DrivingCurve::bare(Envelope::new(vec![0.0, 1.0], vec![0.0, 2e6]).unwrap())
+    }
+
+    /// A body of 20 t that leaves 2 MN at 2 m/s takes 40 kJ with it.
+    #[test]
+    fn a_rebound_tells_the_stiffness() {
+        let curve = curve().rebounding(20e3, Some(2.0), None);
+        let stiffness = curve.unloading.stiffness_n_per_m().unwrap();
+        assert_eq!(stiffness, 5e7);
+        assert_eq!(2e6_f64.powi(2) / (2.0 * stiffness), 40e3);
+        assert_eq!(rebound_stiffness_n_per_m(0.0, 20e3, 2.0), None);
+        let without = super::tests::curve().rebounding(20e3, None, Some(3e7));
+        assert_eq!(without.unloading, CurveUnloading::Stiffness(3e7));
+    }
+
+    #[test]
+    fn what_lies_beyond_joins_at_the_level_of_the_end() {
+        let beyond = Envelope::new(vec![0.0, 0.5, 1.5, 2.0], vec![0.0, 1e6, 1e6, 3e6]).unwrap();
+        let curve = DrivingCurve { beyond: Some(beyond), ..curve() }.continued().unwrap();
+        assert_eq!(curve.loading.deflection_m(), [0.0, 1.0, 1.5, 2.0]);
+        assert_eq!(curve.loading.force_n(), [0.0, 2e6, 2e6, 6e6]);
+    }
+}

@@ -1,0 +1,123 @@
+//! What a model keeps of its training cases, and their curves by force.
+
+use serde::{Deserialize, Serialize};
+
+use super::CaseCurve;
+use super::kept::Kept;
+use crate::curve::{EnvelopeError, ForceKind};
+use crate::dataset::{TrainingCase, grid};
+
+/// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
+const STEPS: usize = 200;
+/// Forces beyond this are damage, not measurement.
+const LARGEST_N: f64 = 1e15;
+
+/// What a model keeps of a training case: its curves over even deflections, no coarser than
+/// 2 mm, and its ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelCase {
+    pub name: String,
+    pub speed_m_per_s: f64,
+    /// Values of the model's features.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub features: Vec<f64>,
+    pub max_deflection_m: f64,
+    pub truncated: bool,
+    #[serde(rename = "unloading_stiffness_N_per_m")]
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Speed of separation when the body force has first fallen to zero.
+    #[serde(default)]
+    pub rebound_speed_m_per_s: Option<f64>,
+    /// Empty in files of version 1.
+    #[serde(default)]
+    pub deflection_m: Vec<f64>,
+    #[serde(rename = "force_N", default)]
+    pub force_n: Vec<f64>,
+    /// The force of the body's motion; empty where the declared force is one.
+    #[serde(rename = "body_force_N", default)]
+    pub body_force_n: Vec<f64>,
+    #[serde(default)]
+    pub closing_speed_m_per_s: Vec<f64>,
+}
+
+impl ModelCase {
+    pub(super) fn of(case: &TrainingCase, kind: ForceKind) -> Self {
+        let deflection_m = grid(case.envelope.end_m(), STEPS);
+        let over = |at: &dyn Fn(f64) -> f64| deflection_m.iter().map(|&d| at(d)).collect();
+        Self {
+            name: case.name.clone(),
+            speed_m_per_s: case.speed_m_per_s,
+            features: case.features.clone(),
+            max_deflection_m: case.envelope.end_m(),
+            truncated: case.truncated,
+            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            rebound_speed_m_per_s: case.motion.rebound_speed_m_per_s,
+            force_n: over(&|d| case.envelope.force_at(d)),
+            body_force_n: match kind {
+                ForceKind::Contact => over(&|d| case.motion.force.force_at(d)),
+                ForceKind::Body => Vec::new(),
+            },
+            closing_speed_m_per_s: over(&|d| case.motion.closing_speed.force_at(d).max(0.0)),
+            deflection_m,
+        }
+    }
+
+    /// What a fit guarantees of a case.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let positive = |value: Option<f64>| value.is_none_or(|v| v > 0.0 && v.is_finite());
+        if !positive(self.unloading_stiffness_n_per_m) || !positive(self.rebound_speed_m_per_s) {
+            return Err("its unloading stiffness or rebound speed is not above 0".into());
+        }
+        let forces = self.force_n.iter().chain(&self.body_force_n);
+        if let Some(force) = forces.into_iter().find(|f| f.abs() > LARGEST_N) {
+            return Err(format!("a force of {force} N is beyond any vehicle's"));
+        }
+        if let Some(end) = self.deflection_m.last()
+            && (end / self.max_deflection_m - 1.0).abs() > 1e-9
+        {
+            let max = self.max_deflection_m;
+            return Err(format!("its curve ends at {end} m, its maximal deflection is {max} m"));
+        }
+        Ok(())
+    }
+
+    fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, EnvelopeError> {
+        CaseCurve::new(
+            self.speed_m_per_s,
+            self.features.clone(),
+            self.deflection_m.clone(),
+            force_n.to_vec(),
+            self.closing_speed_m_per_s.clone(),
+        )
+    }
+}
+
+/// Training curves by force.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Curves {
+    pub declared: Vec<CaseCurve>,
+    pub body: Vec<CaseCurve>,
+    /// Of the curves of the declared force and of the body's, once it was asked for.
+    pub kinks: [Kept<Kink>; 2],
+}
+
+/// How far single points of the curves lie above or below both of their neighbours, in N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Kink {
+    /// Distance of the neighbours.
+    pub step_m: f64,
+    pub most_n: f64,
+}
+
+impl Curves {
+    pub fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
+        let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
+            cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
+        };
+        Ok(Self {
+            declared: with(|c| &c.force_n)?,
+            body: with(|c| &c.body_force_n)?,
+            kinks: Default::default(),
+        })
+    }
+}

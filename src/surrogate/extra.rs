@@ -1,0 +1,31 @@
+//! `extra`: extremely randomised trees (Geurts et al., Machine Learning 63, 2006).
+
+use std::sync::Arc;
+
+use super::forest::{ForestOptions, ForestSurrogate};
+use super::max_crush::MaxCrushRule;
+use super::models::{ModelEntry, loaded};
+use crate::forest::Thresholds;
+
+pub(super) const ENTRY: ModelEntry = ModelEntry {
+    name: "extra",
+    about: "Extremely randomised trees",
+    complexity: 3,
+    baseline: false,
+    sees_features: true,
+    least_curves: 2,
+    crush_rule: MaxCrushRule::Motion,
+    forest: Some(ForestOptions::extra),
+    fit: |input| {
+        Ok(Arc::new(ForestSurrogate::fit(input.set, input.force, input.forest_options())?))
+    },
+    load: loaded::<ForestSurrogate>,
+};
+
+impl ForestOptions {
+    /// Extremely randomised trees: 500 on all points, thresholds at random, so that the
+    /// forest is nearly continuous in speed.
+    pub fn extra() -> Self {
+        Self { trees: 500, thresholds: Thresholds::Random, bootstrap: false, ..Self::default() }
+    }
+}

@@ -1,0 +1,241 @@
+//! Model files: versioned, self-describing JSON, readable without this program
+//! (`schemas/model.md`).
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::value::{RawValue, to_raw_value};
+
+use super::cases::{Curves, ModelCase};
+use super::leave_one_out::Validation;
+use super::max_crush::MaxCrushRule;
+use super::models::ModelKind;
+use super::{Model, ModelError, Surrogate};
+use crate::curve::ForceKind;
+use crate::dataset::Feature;
+use crate::file::{self, write_whole};
+use crate::unit::{SpeedKind, UnitSystem};
+
+/// Value of a model file's `format`.
+const FORMAT: &str = "crumple model";
+/// Version of the model files that this program writes and reads.
+pub(super) const VERSION: u32 = 3;
+/// Most bytes of a model file: a forest of 500 trees has some ten million.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// What tells a model file from others.
+#[derive(Deserialize)]
+struct Head {
+    format: String,
+    version: u32,
+}
+
+/// The keys of a model file, in their order.
+#[derive(Serialize, Deserialize)]
+struct ModelFile<'a> {
+    format: String,
+    version: u32,
+    written_by: String,
+    group: String,
+    speed_kind: SpeedKind,
+    force_kind: ForceKind,
+    mass_kg: f64,
+    other_mass_kg: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    study_units: Option<UnitSystem>,
+    #[serde(default)]
+    features: Vec<Feature>,
+    training_hash: String,
+    cases: Vec<ModelCase>,
+    options: ModelKind,
+    #[serde(default)]
+    max_crush_rule: MaxCrushRule,
+    #[serde(default)]
+    mode_switches_m_per_s: Vec<(f64, f64)>,
+    #[serde(default)]
+    leave_one_out: Option<Validation>,
+    /// The model's name, or `{ name: parameters }` where it has parameters.
+    #[serde(borrow)]
+    fitted: &'a RawValue,
+    #[serde(borrow, default)]
+    fitted_body: Option<&'a RawValue>,
+}
+
+impl Model {
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// [`ModelError`] with the place in the file where it is no model of ours.
+    pub fn read(path: &Path) -> Result<Self, ModelError> {
+        let text = file::read(path, MAX_BYTES)
+            .map_err(|source| ModelError::Io { path: path.into(), source })?;
+        Self::parse(path, &text)
+    }
+
+    /// Parses and checks the bytes of a model file; `path` is for messages.
+    ///
+    /// # Errors
+    /// As of [`read`](Self::read).
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self, ModelError> {
+        let no_model = |line, column, detail| ModelError::NotAModel {
+            path: path.into(),
+            line,
+            column,
+            detail,
+        };
+        let at_its_place = |e: serde_json::Error| no_model(e.line(), e.column(), e.to_string());
+        let head: Head = serde_json::from_slice(text).map_err(at_its_place)?;
+        if head.format != FORMAT {
+            return Err(no_model(1, 1, format!("its format is \"{}\"", head.format)));
+        }
+        if head.version != VERSION {
+            return Err(ModelError::Version { path: path.into(), found: head.version });
+        }
+        let file: ModelFile<'_> = serde_json::from_slice(text).map_err(at_its_place)?;
+        let fitted = |raw: &RawValue| {
+            fitted_of(&file.options, raw).map_err(|e| {
+                // The place of the value in the file; what is wrong in it is counted from there.
+                let before = raw.get().as_ptr() as usize - text.as_ptr() as usize;
+                let before = &text[..before.min(text.len())];
+                let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+                let column = before.iter().rev().take_while(|&&byte| byte != b'\n').count() + 1;
+                no_model(line, column, e.to_string())
+            })
+        };
+        let damaged = |detail| ModelError::Damaged { path: path.into(), detail };
+        let model = Self {
+            fitted: fitted(file.fitted)?,
+            fitted_body: file.fitted_body.map(fitted).transpose()?,
+            curves: Curves::of(&file.cases).map_err(|e| damaged(e.to_string()))?,
+            written_by: file.written_by,
+            group: file.group,
+            speed_kind: file.speed_kind,
+            force_kind: file.force_kind,
+            mass_kg: file.mass_kg,
+            other_mass_kg: file.other_mass_kg,
+            study_units: file.study_units,
+            features: file.features,
+            training_hash: file.training_hash,
+            cases: file.cases,
+            kind: file.options,
+            max_crush_rule: file.max_crush_rule,
+            mode_switches_m_per_s: file.mode_switches_m_per_s,
+            leave_one_out: file.leave_one_out,
+        };
+        model.check().map_err(damaged)?;
+        Ok(model)
+    }
+
+    /// What a fitted model guarantees and a file might not.
+    fn check(&self) -> Result<(), String> {
+        if self.cases.is_empty() {
+            return Err("it has no cases".into());
+        }
+        let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
+        let several = !self.features.is_empty();
+        if !speeds().zip(speeds().skip(1)).all(|(a, b)| a < b || several && a == b)
+            || !speeds().all(|v| v > 0.0 && v.is_finite())
+        {
+            return Err("its speeds are not increasing".into());
+        }
+        if self.cases.iter().any(|c| c.features.len() != self.features.len()) {
+            return Err("its cases have not as many features as it names".into());
+        }
+        if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
+            return Err("a maximal deflection is not above 0".into());
+        }
+        for case in &self.cases {
+            case.check().map_err(|detail| format!("case \"{}\": {detail}", case.name))?;
+        }
+        if self.fitted_body.is_some() && self.force_kind == ForceKind::Body {
+            return Err("it holds two forces, but its force is the body's".into());
+        }
+        let bands = self.leave_one_out.iter().flat_map(|v| [v.band, v.band_outside]);
+        if !bands.flatten().all(|band| band.is_sound()) {
+            return Err("the widths or the span of its band are no measurement".into());
+        }
+        let masses = [Some(self.mass_kg), self.other_mass_kg];
+        if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {
+            return Err("a mass is not above 0".into());
+        }
+        let lacks = |fitted: &Arc<dyn Surrogate>, curves: usize| {
+            fitted.answers_from_curves() && curves != self.cases.len()
+        };
+        let body = self.fitted_body.as_ref();
+        if lacks(&self.fitted, self.curves.declared.len())
+            || body.is_some_and(|b| lacks(b, self.curves.body.len()))
+        {
+            return Err("it lacks the curves of its cases".into());
+        }
+        self.fitted.check(self.features.len())?;
+        body.map_or(Ok(()), |b| b.check(self.features.len()))
+    }
+
+    /// The model file's bytes.
+    ///
+    /// # Errors
+    /// Of `serde_json`, which no fitted model causes.
+    pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let raw = |fitted: &Arc<dyn Surrogate>| match fitted.parameters() {
+            None => to_raw_value(self.name()),
+            Some(parameters) => to_raw_value(&BTreeMap::from([(self.name(), parameters?)])),
+        };
+        let (fitted, fitted_body) =
+            (raw(&self.fitted)?, self.fitted_body.as_ref().map(raw).transpose()?);
+        let file = ModelFile {
+            format: FORMAT.into(),
+            version: VERSION,
+            written_by: self.written_by.clone(),
+            group: self.group.clone(),
+            speed_kind: self.speed_kind,
+            force_kind: self.force_kind,
+            mass_kg: self.mass_kg,
+            other_mass_kg: self.other_mass_kg,
+            study_units: self.study_units,
+            features: self.features.clone(),
+            training_hash: self.training_hash.clone(),
+            cases: self.cases.clone(),
+            options: self.kind,
+            max_crush_rule: self.max_crush_rule,
+            mode_switches_m_per_s: self.mode_switches_m_per_s.clone(),
+            leave_one_out: self.leave_one_out.clone(),
+            fitted: &fitted,
+            fitted_body: fitted_body.as_deref(),
+        };
+        let mut bytes = serde_json::to_vec(&file)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// Writes the model file as a whole.
+    ///
+    /// # Errors
+    /// [`ModelError::Write`] if the target cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), ModelError> {
+        let bytes = self
+            .to_json()
+            .map_err(|e| ModelError::Damaged { path: path.into(), detail: e.to_string() })?;
+        Ok(write_whole(path, &bytes)?)
+    }
+}
+
+/// What `fitted` or `fitted_body` holds of a model of that kind.
+fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, serde_json::Error> {
+    use serde::de::Error;
+    let other = |found: &str| {
+        let expected = kind.name();
+        serde_json::Error::custom(format!("options name the model {expected}, fitted {found}"))
+    };
+    if raw.get().starts_with('"') {
+        let name: String = serde_json::from_str(raw.get())?;
+        return if name == kind.name() { (kind.entry().load)(None) } else { Err(other(&name)) };
+    }
+    let named: BTreeMap<String, &RawValue> = serde_json::from_str(raw.get())?;
+    match named.first_key_value() {
+        Some((name, parameters)) if name == kind.name() => (kind.entry().load)(Some(parameters)),
+        Some((name, _)) => Err(other(name)),
+        None => Err(other("nothing")),
+    }
+}

@@ -1,0 +1,250 @@
+//! The models that can be trained: one line each in [`MODELS`].
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::value::RawValue;
+
+use super::forest::ForestOptions;
+use super::max_crush::MaxCrushRule;
+use super::{CaseCurve, Surrogate};
+use super::{extra, forest, linear, nearest, rate, registered};
+use crate::curve::ForceKind;
+use crate::dataset::TrainingSet;
+use crate::forest::ForestError;
+
+/// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
+/// line here.
+pub const MODELS: &[ModelEntry] =
+    &[nearest::ENTRY, linear::ENTRY, rate::ENTRY, registered::ENTRY, extra::ENTRY, forest::ENTRY];
+
+/// One model: what it is called, what it needs, how it is fitted and read again.
+#[derive(Clone, Copy, Debug)]
+pub struct ModelEntry {
+    /// As the command line and model files name it.
+    pub name: &'static str,
+    /// What it is, in one line.
+    pub about: &'static str,
+    /// Place from simple (0) to elaborate: of about equally good models the simplest is taken.
+    pub complexity: u8,
+    /// Whether a chosen model must be at least as good as this one.
+    pub baseline: bool,
+    /// Whether it sees parameters beside the speed.
+    pub sees_features: bool,
+    /// Fewest training curves that it answers from.
+    pub least_curves: usize,
+    /// The rule for the maximal crush of a model that was not validated, if speed alone differs.
+    pub crush_rule: MaxCrushRule,
+    /// Options of its forest; `None` for a model without one.
+    pub(super) forest: Option<fn() -> ForestOptions>,
+    pub(super) fit: fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, ForestError>,
+    /// From what [`Surrogate::parameters`] gave; `None` for a model without any.
+    pub(super) load: fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>,
+}
+
+/// What a model is fitted to.
+pub(super) struct FitInput<'a> {
+    pub set: &'a TrainingSet,
+    /// The curves of `force`, in order of speed.
+    pub curves: &'a [CaseCurve],
+    pub force: ForceKind,
+    pub forest: Option<&'a ForestOptions>,
+}
+
+impl FitInput<'_> {
+    /// The forest's options.
+    pub fn forest_options(&self) -> &ForestOptions {
+        self.forest.expect("ModelKind gives options to each model with a forest")
+    }
+}
+
+/// `parameters` of a model that has some.
+pub(super) fn loaded<T>(
+    parameters: Option<&RawValue>,
+) -> Result<Arc<dyn Surrogate>, serde_json::Error>
+where
+    T: Surrogate + DeserializeOwned + 'static,
+{
+    let parameters = parameters.map_or("null", RawValue::get);
+    Ok(Arc::new(serde_json::from_str::<T>(parameters)?))
+}
+
+/// Most trees of a forest that is fitted only to compare it with other models.
+const CANDIDATE_TREES: usize = 100;
+
+/// Which model, with its options.
+#[derive(Clone, Copy)]
+pub struct ModelKind {
+    entry: &'static ModelEntry,
+    forest: Option<ForestOptions>,
+}
+
+impl ModelKind {
+    /// The model of that name with its own options and this seed for its forest; `None` if there
+    /// is none.
+    pub fn named(name: &str, seed: u64) -> Option<Self> {
+        MODELS.iter().find(|entry| entry.name == name).map(|entry| Self::of(entry, seed))
+    }
+
+    fn of(entry: &'static ModelEntry, seed: u64) -> Self {
+        Self { entry, forest: entry.forest.map(|options| ForestOptions { seed, ..options() }) }
+    }
+
+    /// Every model, in the order of [`MODELS`].
+    pub fn all(seed: u64) -> Vec<Self> {
+        MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
+    }
+
+    /// Every model as leaving speeds out compares it: forests of at most 100 trees, whose errors
+    /// at left-out speeds differ from those of more by less than 0.2 percentage points.
+    pub fn candidates(seed: u64) -> Vec<Self> {
+        let fewer = |f: ForestOptions| ForestOptions { trees: f.trees.min(CANDIDATE_TREES), ..f };
+        Self::all(seed).into_iter().map(|kind| kind.with_forest(fewer)).collect()
+    }
+
+    /// The one run of the nearest speed (FDRM).
+    pub fn nearest() -> Self {
+        Self::known(nearest::ENTRY.name)
+    }
+
+    /// Linear in speed at equal deflection.
+    pub fn linear() -> Self {
+        Self::known(linear::ENTRY.name)
+    }
+
+    /// Linear in speed, with the force following the speed at each deflection.
+    pub fn rate() -> Self {
+        Self::known(rate::ENTRY.name)
+    }
+
+    /// Peaks matched and warped onto each other before curves are blended.
+    pub fn registered() -> Self {
+        Self::known(registered::ENTRY.name)
+    }
+
+    /// A random forest (DDTCM with [`ForestOptions::paper`]).
+    pub fn forest(options: ForestOptions) -> Self {
+        Self::known(forest::ENTRY.name).with_forest(|_| options)
+    }
+
+    /// Extremely randomised trees.
+    pub fn extra(options: ForestOptions) -> Self {
+        Self::known(extra::ENTRY.name).with_forest(|_| options)
+    }
+
+    fn known(name: &str) -> Self {
+        Self::named(name, 0).expect("MODELS has an entry of that name")
+    }
+
+    /// The same with other options of its forest, if it has one.
+    pub fn with_forest(self, change: impl FnOnce(ForestOptions) -> ForestOptions) -> Self {
+        Self { forest: self.forest.map(change), ..self }
+    }
+
+    /// What the table of models says of it.
+    pub fn entry(&self) -> &'static ModelEntry {
+        self.entry
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.entry.name
+    }
+
+    /// Options of its forest, if it has one.
+    pub fn forest_options(&self) -> Option<&ForestOptions> {
+        self.forest.as_ref()
+    }
+
+    /// Whether it is the reference method's forest (DDTCM), whatever its seed.
+    pub fn is_reference_method(&self) -> bool {
+        let paper = |f: ForestOptions| ForestOptions { seed: f.seed, ..ForestOptions::paper() };
+        self.name() == forest::ENTRY.name && self.forest.is_some_and(|f| f == paper(f))
+    }
+}
+
+impl PartialEq for ModelKind {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name() && self.forest == other.forest
+    }
+}
+
+impl fmt::Debug for ModelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ModelKind")
+            .field("name", &self.name())
+            .field("forest", &self.forest)
+            .finish()
+    }
+}
+
+/// `ModelKind` as model files have it.
+#[derive(Serialize, Deserialize)]
+struct KindInFile {
+    model: String,
+    #[serde(flatten)]
+    forest: Option<ForestOptions>,
+}
+
+impl Serialize for ModelKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        KindInFile { model: self.name().into(), forest: self.forest }.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for ModelKind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+        let KindInFile { model, forest } = KindInFile::deserialize(deserializer)?;
+        let Some(kind) = Self::named(&model, 0) else {
+            let known: Vec<&str> = MODELS.iter().map(|entry| entry.name).collect();
+            let known = known.join(", ");
+            return Err(D::Error::custom(format!("no model \"{model}\": expected one of {known}")));
+        };
+        match (kind.forest.is_some(), forest) {
+            (true, None) => {
+                Err(D::Error::custom(format!("model \"{model}\" lacks the options of its forest")))
+            }
+            (true, forest) => Ok(Self { forest, ..kind }),
+            (false, _) => Ok(kind),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_complexities_are_distinct() {
+        for (i, a) in MODELS.iter().enumerate() {
+            for b in &MODELS[i + 1..] {
+                assert_ne!(a.name, b.name);
+                assert_ne!(a.complexity, b.complexity, "{} and {}", a.name, b.name);
+            }
+        }
+    }
+
+    #[test]
+    fn kinds_come_back_from_their_file() {
+        for kind in ModelKind::all(7) {
+            let json = serde_json::to_string(&kind).unwrap();
+            assert_eq!(serde_json::from_str::<ModelKind>(&json).unwrap(), kind, "{json}");
+        }
+        assert_eq!(serde_json::to_string(&ModelKind::rate()).unwrap(), r#"{"model":"rate"}"#);
+        let unknown = serde_json::from_str::<ModelKind>(r#"{"model":"best"}"#).unwrap_err();
+        assert!(unknown.to_string().contains("expected one of nearest, linear"), "{unknown}");
+    }
+
+    #[test]
+    fn the_reference_method_is_known_by_its_options() {
+        assert!(
+            ModelKind::forest(ForestOptions { seed: 3, ..ForestOptions::paper() })
+                .is_reference_method()
+        );
+        assert!(!ModelKind::forest(ForestOptions::default()).is_reference_method());
+        assert!(!ModelKind::rate().is_reference_method());
+    }
+}

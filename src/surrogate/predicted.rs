@@ -1,0 +1,296 @@
+//! The predicted curve: the master format of exports, and what can be made of it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Warning;
+use super::band::Band;
+use super::max_crush::{MaxCrush, MaxCrushRule};
+use super::predict::PredictError;
+use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::unit::{SpeedKind, UnitSystem};
+
+/// A predicted curve: the master format of exports (JSON).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PredictedCurve {
+    /// Loading branch from (0, 0) to the maximal crush.
+    pub deflection_m: Vec<f64>,
+    #[serde(rename = "force_N")]
+    pub force_n: Vec<f64>,
+    /// Band around the force, where the model gives one.
+    #[serde(rename = "force_low_N", default, skip_serializing_if = "Option::is_none")]
+    pub force_low_n: Option<Vec<f64>>,
+    #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
+    pub force_high_n: Option<Vec<f64>>,
+    /// The force that moves the body, where `force_N` is what the obstacle feels: mass that
+    /// the crush zone stops early is in the one and not in the other. It drives bodies of one
+    /// mass.
+    #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
+    pub body_force_n: Option<Vec<f64>>,
+    /// Forces between which the members of a forest's leaves lie, if the model keeps them. They
+    /// tell how the training points scatter, not how far FE lies off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forest_quantiles: Option<ForestQuantiles>,
+    /// Unloading stiffness that belongs to `force_N`, from its maximal crush: that of the
+    /// rebound where one is known, else the measured one, at least the steepest rise.
+    #[serde(rename = "unloading_stiffness_N_per_m")]
+    pub unloading_stiffness_n_per_m: f64,
+    /// The same for `body_force_N`.
+    #[serde(
+        rename = "body_unloading_stiffness_N_per_m",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Which runs `force_N` may drive.
+    #[serde(default)]
+    pub drives: String,
+    /// Which runs `body_force_N` may drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_drives: Option<String>,
+    /// The rebound from the maximal crush.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rebound: Option<Rebound>,
+    pub max_deflection_m: f64,
+    pub speed_m_per_s: f64,
+    pub speed_kind: SpeedKind,
+    /// Mass of the body, or of each body of a pair.
+    pub mass_kg: f64,
+    /// Integral of force over deflection.
+    #[serde(rename = "energy_J")]
+    pub energy_j: f64,
+    pub model: String,
+    pub warnings: Vec<Warning>,
+    pub provenance: Provenance,
+}
+
+/// Quantiles of a regression forest (Meinshausen, JMLR 7, 2006) along the curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ForestQuantiles {
+    /// Share of the members' weight between the two.
+    pub level: f64,
+    #[serde(rename = "low_N")]
+    pub low_n: Vec<f64>,
+    #[serde(rename = "high_N")]
+    pub high_n: Vec<f64>,
+}
+
+/// How the bodies part after the maximal crush.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rebound {
+    /// In m/s; interpolated as a power of the impact speed, since the share that comes back
+    /// falls with it.
+    pub speed_m_per_s: f64,
+    /// Unloading stiffness from the maximal crush that gives this speed: `F²/(m v²)` with the
+    /// force and mass of the body.
+    #[serde(rename = "stiffness_N_per_m")]
+    pub stiffness_n_per_m: f64,
+}
+
+/// Where a predicted curve comes from and how it was checked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Provenance {
+    pub written_by: String,
+    pub group: String,
+    pub force_kind: ForceKind,
+    pub training_hash: String,
+    /// Units of the training runs' files: what an export to their solver is written in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub study_units: Option<UnitSystem>,
+    pub training_speeds_m_per_s: Vec<f64>,
+    pub in_range: bool,
+    pub nearest_training_speed_m_per_s: f64,
+    pub distance_to_nearest_m_per_s: f64,
+    pub max_crush_rule: MaxCrushRule,
+    pub max_crush: MaxCrush,
+    /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
+    #[serde(rename = "kinetic_energy_J")]
+    pub kinetic_energy_j: f64,
+    /// Energy of the curve over the kinetic energy.
+    pub energy_over_kinetic: f64,
+    /// The same for the body force, where it is another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_energy_over_kinetic: Option<f64>,
+    /// The band around the force at this speed, and what it rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band: Option<Band>,
+    /// Values of the model's further parameters.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Parameter>,
+}
+
+impl PredictedCurve {
+    /// The loading branch as a function.
+    ///
+    /// # Errors
+    /// [`PredictError`] if the curve was read from a file and breaks its promises.
+    pub fn envelope(&self) -> Result<Envelope, PredictError> {
+        let stiffness = self.unloading_stiffness_n_per_m;
+        if !(stiffness > 0.0 && stiffness.is_finite()) {
+            return Err(PredictError::Damaged(format!(
+                "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
+            )));
+        }
+        for (name, band) in [
+            ("force_low_N", &self.force_low_n),
+            ("force_high_N", &self.force_high_n),
+            ("body_force_N", &self.body_force_n),
+        ] {
+            if let Some(band) = band
+                && band.len() != self.force_n.len()
+            {
+                return Err(PredictError::Damaged(format!(
+                    "{name} has {} values, force_N {}",
+                    band.len(),
+                    self.force_n.len()
+                )));
+            }
+        }
+        let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
+        match envelope.first_pulling_point() {
+            Some(point) => Err(PredictError::Damaged(format!(
+                "force_N of point {point} is below 0: an interface only pushes"
+            ))),
+            None => Ok(envelope),
+        }
+    }
+
+    /// The curve of one force alone, with the unloading that belongs to it. What is of the
+    /// declared force only (band, quantiles) goes with that.
+    ///
+    /// # Errors
+    /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
+    /// force, else as [`envelope`](Self::envelope).
+    pub fn of_force(&self, kind: ForceKind) -> Result<Self, PredictError> {
+        match (kind, self.provenance.force_kind) {
+            (ForceKind::Contact, ForceKind::Body) => Err(PredictError::NoContactForce),
+            (ForceKind::Contact, ForceKind::Contact) => self.of_contact_force(),
+            (ForceKind::Body, _) => self.of_body_force(),
+        }
+    }
+
+    fn of_contact_force(&self) -> Result<Self, PredictError> {
+        let stiffness = self.stiffness_at_end(&self.envelope()?);
+        let mut curve = self.clone();
+        curve.unloading_stiffness_n_per_m = stiffness;
+        if let Some(rebound) = &mut curve.rebound {
+            rebound.stiffness_n_per_m = stiffness;
+        }
+        curve.without_second_force();
+        Ok(curve)
+    }
+
+    fn of_body_force(&self) -> Result<Self, PredictError> {
+        let envelope = self.driving_envelope()?;
+        let mut curve = self.clone();
+        curve.unloading_stiffness_n_per_m = self.stiffness_at_end(&envelope);
+        if self.body_force_n.is_none() {
+            return Ok(curve);
+        }
+        if curve.rebound.is_none() {
+            curve.unloading_stiffness_n_per_m = envelope.max_slope();
+        }
+        curve.energy_j = envelope.work();
+        curve.force_n = envelope.force_n().to_vec();
+        (curve.force_low_n, curve.force_high_n, curve.forest_quantiles) = (None, None, None);
+        curve.drives = ForceKind::Body.drives().into();
+        curve.provenance.force_kind = ForceKind::Body;
+        curve.provenance.energy_over_kinetic =
+            self.provenance.body_energy_over_kinetic.unwrap_or(self.provenance.energy_over_kinetic);
+        curve.provenance.band = None;
+        curve.without_second_force();
+        Ok(curve)
+    }
+
+    fn without_second_force(&mut self) {
+        self.body_force_n = None;
+        self.body_unloading_stiffness_n_per_m = None;
+        self.body_drives = None;
+        self.provenance.body_energy_over_kinetic = None;
+    }
+
+    /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
+    /// energy of the rebound is the same whichever force it comes from.
+    pub fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
+        let end = self.max_deflection_m;
+        let driving = self.body_force_n.as_ref().unwrap_or(&self.force_n).last();
+        let share = driving.map_or(1.0, |driving| envelope.force_at(end) / driving);
+        self.rebound
+            .map(|r| r.stiffness_n_per_m * share * share)
+            .filter(|k| *k > 0.0 && k.is_finite())
+            .unwrap_or(self.unloading_stiffness_n_per_m)
+    }
+
+    /// The curve of one force that drives an interface.
+    ///
+    /// # Errors
+    /// As [`driving_member`](Self::driving_member).
+    pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, PredictError> {
+        self.driving_member(force, None)
+    }
+
+    /// The same with `member` of the band's half width added, from −1 (lower edge) to 1.
+    ///
+    /// # Errors
+    /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] or
+    /// [`PredictError::NoContactForce`] if it does not have that force; [`PredictError::Damaged`]
+    /// for a member outside these bounds or a curve without a band.
+    pub fn driving_member(
+        &self,
+        force: ForceKind,
+        member: Option<f64>,
+    ) -> Result<DrivingCurve, PredictError> {
+        let mut loading = match (force, self.provenance.force_kind) {
+            (ForceKind::Contact, ForceKind::Body) => return Err(PredictError::NoContactForce),
+            (ForceKind::Contact, ForceKind::Contact) => self.envelope()?,
+            (ForceKind::Body, _) => self.driving_envelope()?,
+        };
+        if let Some(member) = member {
+            loading = self.band_member(&loading, member)?;
+        }
+        // The force law keeps to its bounds by itself; the one constant is for other tools.
+        let unloading = CurveUnloading::Stiffness(self.stiffness_at_end(&loading));
+        Ok(DrivingCurve {
+            unloading,
+            force: Some(force),
+            speed_kind: Some(self.speed_kind),
+            speed_m_per_s: Some(self.speed_m_per_s),
+            ..DrivingCurve::bare(loading)
+        })
+    }
+
+    fn band_member(&self, loading: &Envelope, member: f64) -> Result<Envelope, PredictError> {
+        if !(-1.0..=1.0).contains(&member) {
+            return Err(PredictError::Damaged(format!("band = {member}: expected from -1 to 1")));
+        }
+        let edge = if member < 0.0 { &self.force_low_n } else { &self.force_high_n };
+        let edge = edge.as_ref().ok_or_else(|| {
+            PredictError::Damaged("there is no band around it: remove band".into())
+        })?;
+        let declared = self.force_n.iter().zip(edge);
+        let force_n = loading
+            .force_n()
+            .iter()
+            .zip(declared)
+            .map(|(force, (declared, edge))| (force + member.abs() * (edge - declared)).max(0.0))
+            .collect();
+        Ok(Envelope::new(loading.deflection_m().to_vec(), force_n)?)
+    }
+
+    /// The curve that moves a body of one mass: the body force, or the only force there is.
+    ///
+    /// # Errors
+    /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] for a contact force alone.
+    pub fn driving_envelope(&self) -> Result<Envelope, PredictError> {
+        let declared = self.envelope()?;
+        match &self.body_force_n {
+            Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),
+            None if self.provenance.force_kind == ForceKind::Contact => {
+                Err(PredictError::NoBodyForce)
+            }
+            None => Ok(declared),
+        }
+    }
+}

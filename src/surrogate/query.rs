@@ -1,0 +1,213 @@
+//! Queries: what is asked of a model, and what follows from that alone.
+
+use std::collections::BTreeMap;
+
+use super::cases::ModelCase;
+use super::curves::interpolate_held;
+use super::max_crush::{self, MaxCrush, MaxCrushRule};
+use super::predict::PredictError;
+use super::predicted::Rebound;
+use super::warning::{Warning, is_far_outside, outside_of};
+use super::{At, Model};
+use crate::curve::driving::rebound_stiffness_n_per_m;
+use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
+use crate::dataset::{MASS, OTHER_MASS, feature_values};
+use crate::unit::Speed;
+
+/// Deviation of the mass from the training runs' that needs no warning.
+const SAME_MASS: f64 = 1e-3;
+
+/// What is asked of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Query {
+    pub speed_m_per_s: f64,
+    /// Mass of the body, or of each body of a pair; the training runs' if absent.
+    pub mass_kg: Option<f64>,
+    /// How the maximal crush is found; the model's own way if absent.
+    pub rule: Option<MaxCrushRule>,
+    /// Values of the model's further parameters.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Scale the force so that the curve takes up the impact's energy.
+    pub energy_correct: bool,
+    /// Answer further outside the training speeds than a third of their range.
+    pub extrapolate: bool,
+}
+
+impl Query {
+    /// The curve at a speed, everything else as the model has it.
+    pub fn at(speed_m_per_s: f64) -> Self {
+        Self {
+            speed_m_per_s,
+            mass_kg: None,
+            rule: None,
+            parameters: BTreeMap::new(),
+            energy_correct: false,
+            extrapolate: false,
+        }
+    }
+
+    /// The same with a rule for the maximal crush.
+    pub fn with_rule(self, rule: MaxCrushRule) -> Self {
+        Self { rule: Some(rule), ..self }
+    }
+}
+
+/// A query with everything that follows from it and the model alone.
+pub(super) struct Asked<'a> {
+    pub model: &'a Model,
+    pub v: f64,
+    pub masses: Masses,
+    /// That the motion follows.
+    pub mass_kg: f64,
+    pub same_mass: bool,
+    pub parameters: BTreeMap<String, Parameter>,
+    pub features: Vec<f64>,
+    pub kinetic_energy_j: f64,
+}
+
+impl<'a> Asked<'a> {
+    pub fn new(model: &'a Model, query: &Query) -> Result<Self, PredictError> {
+        let v = query.speed_m_per_s;
+        if !(v > 0.0 && v.is_finite()) {
+            return Err(PredictError::Speed { speed_m_per_s: v });
+        }
+        let (low, high) = model.range_m_per_s();
+        if !query.extrapolate && is_far_outside(v, low, high) {
+            return Err(PredictError::FarOutside { outside: outside_of(v, low, high) });
+        }
+        let mut parameters = query.parameters.clone();
+        let other = match parameters.get(OTHER_MASS) {
+            Some(Parameter::Number(mass)) if *mass > 0.0 && mass.is_finite() => Some(*mass),
+            _ => None,
+        };
+        let masses = match query.mass_kg {
+            Some(mass) => {
+                let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
+                Masses { body_kg: mass, other_kg }
+            }
+            None => Masses {
+                other_kg: model.other_mass_kg.map(|trained| other.unwrap_or(trained)),
+                ..model.masses()
+            },
+        };
+        if let Some(mass) = query.mass_kg {
+            parameters.insert(MASS.into(), Parameter::Number(mass));
+        }
+        if let Some(other) = masses.other_kg {
+            parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other));
+        }
+        let known = |name: &str| {
+            let of_pairs = name == OTHER_MASS && model.other_mass_kg.is_some();
+            name == MASS || of_pairs || model.features.iter().any(|f| f.parameter == name)
+        };
+        if let Some(name) = query.parameters.keys().find(|name| !known(name)) {
+            let mut names: Vec<&str> =
+                model.features.iter().map(|f| f.parameter.as_str()).collect();
+            names.dedup();
+            return Err(PredictError::UnknownParameter {
+                name: name.clone(),
+                known: if names.is_empty() { "none".into() } else { names.join(", ") },
+            });
+        }
+        let features = feature_values(&model.features, &parameters)
+            .map_err(|e| PredictError::Parameters(Box::new(e)))?;
+        let mass_kg = masses.effective_kg();
+        let same_mass = (mass_kg / model.masses().effective_kg() - 1.0).abs() <= SAME_MASS;
+        let kinetic_energy_j =
+            masses.kinetic_energy_j(Speed { m_per_s: v, kind: model.speed_kind });
+        Ok(Self { model, v, masses, mass_kg, same_mass, parameters, features, kinetic_energy_j })
+    }
+
+    pub fn at(&self) -> At<'_> {
+        At {
+            speed_m_per_s: self.v,
+            features: &self.features,
+            mass_kg: self.mass_kg,
+            closing_m_per_s: None,
+        }
+    }
+
+    /// The rule for the maximal crush.
+    pub fn rule(&self, query: &Query) -> MaxCrushRule {
+        let (low, high) = self.model.range_m_per_s();
+        query.rule.unwrap_or(match self.model.max_crush_rule {
+            // Crush over speed is that of the trained mass and speeds; the motion knows both.
+            MaxCrushRule::Spline | MaxCrushRule::Monotone
+                if !(self.same_mass && (low..=high).contains(&self.v)) =>
+            {
+                MaxCrushRule::Motion
+            }
+            rule => rule,
+        })
+    }
+
+    /// The rebound after the body's force was `top_n` at the maximal crush.
+    pub fn rebound(&self, top_n: f64) -> Option<Rebound> {
+        // Another mass gets the same energy back: the structure's, not the car's.
+        let trained_kg = self.model.masses().effective_kg();
+        let speed = rebound_speed(self.model, self.v)?;
+        Some(Rebound {
+            speed_m_per_s: speed * (trained_kg / self.mass_kg).sqrt(),
+            stiffness_n_per_m: rebound_stiffness_n_per_m(top_n, trained_kg, speed)?,
+        })
+    }
+
+    /// The maximal crush by every rule.
+    pub fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
+        max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
+    }
+
+    /// What must be said of unloading, mass, and of an energy over the kinetic energy.
+    pub fn warnings(&self, unloading: Option<f64>, energy: f64) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if unloading.is_none() {
+            warnings.push(Warning::no_unloading());
+        }
+        let mass_is_feature = self.model.features.iter().any(|f| f.parameter == MASS);
+        if !mass_is_feature && !self.same_mass {
+            let trained_kg = self.model.masses().effective_kg();
+            warnings.push(Warning::other_mass(self.mass_kg, trained_kg));
+        }
+        if (energy - 1.0).abs() > EnergyAudit::TOLERANCE {
+            warnings.push(Warning::energy_mismatch(energy));
+        }
+        warnings
+    }
+}
+
+/// The speed of separation, as a power of the impact speed between training speeds, and
+/// the outermost share of it beyond them.
+fn rebound_speed(model: &Model, v: f64) -> Option<f64> {
+    let logarithm = |c: &ModelCase| Some((c.rebound_speed_m_per_s? / c.speed_m_per_s).ln());
+    let share = over_speed_by(model, v.ln(), |c| Some((c.speed_m_per_s.ln(), logarithm(c)?)))?;
+    Some(v * share.exp())
+}
+
+/// A value of the cases interpolated linearly in speed, held at both ends; the mean of
+/// cases of equal speed.
+pub(super) fn over_speed(
+    model: &Model,
+    v: f64,
+    value: impl Fn(&ModelCase) -> Option<f64>,
+) -> Option<f64> {
+    over_speed_by(model, v, |c| Some((c.speed_m_per_s, value(c)?)))
+}
+
+fn over_speed_by(
+    model: &Model,
+    x: f64,
+    point: impl Fn(&ModelCase) -> Option<(f64, f64)>,
+) -> Option<f64> {
+    let mut known: Vec<(f64, f64, f64)> = Vec::new();
+    for (x, y) in model.cases.iter().filter_map(point) {
+        match known.last_mut() {
+            Some(last) if last.0 == x => {
+                last.1 += y;
+                last.2 += 1.0;
+            }
+            _ => known.push((x, y, 1.0)),
+        }
+    }
+    let points: Vec<(f64, f64)> = known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect();
+    interpolate_held(&points, x)
+}
