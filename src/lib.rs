@@ -45,7 +45,7 @@ pub mod build;
 
 pub mod dataset;
 
-mod separated;
+mod table;
 
 mod stream;
 
@@ -57,7 +57,7 @@ pub mod multibody;
 
 pub mod nsdm;
 
-pub mod export;
+pub mod formats;
 
 pub mod plan;
 

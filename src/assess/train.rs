@@ -103,6 +103,8 @@ pub struct TrainRow {
     /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
     /// each interface's own).
     pub method: String,
+    /// What drives its interfaces: `body force`, `recipe's force`, `spring and damper`.
+    pub driven_by: String,
     /// Means over the vehicles of the two below.
     pub mean_velocity_l1: f64,
     pub mean_acceleration_l1: f64,
@@ -173,6 +175,7 @@ const SAME_SPEED: f64 = 0.02;
 /// A method: what it makes of the scenario and its sources.
 struct Method<'a> {
     name: &'a str,
+    driven_by: &'static str,
     scenario: Scenario,
     sources: Sources,
     fit_time_s: f64,
@@ -265,11 +268,11 @@ fn methods<'a>(
         scenario
     };
     let mut methods = Vec::new();
-    let mut add = |name, scenario, sources, fit_time_s| {
-        methods.push(Method { name, scenario, sources, fit_time_s });
+    let mut add = |name, driven_by, scenario, sources, fit_time_s| {
+        methods.push(Method { name, driven_by, scenario, sources, fit_time_s });
     };
-    add("fe_body", with_body(), sources.clone(), 0.0);
-    add("fdrm", with_declared(), sources.clone(), 0.0);
+    add("fe_body", "body force", with_body(), sources.clone(), 0.0);
+    add("fdrm", "recipe's force", with_declared(), sources.clone(), 0.0);
 
     if settings.nsdm_seeds > 0 {
         let start = Instant::now();
@@ -289,7 +292,7 @@ fn methods<'a>(
                 Source::Curve(Box::new(DrivingCurve::of_body(fit.model.envelope()?))),
             );
         }
-        add("nsdm", changed, springs, start.elapsed().as_secs_f64());
+        add("nsdm", "spring and damper", changed, springs, start.elapsed().as_secs_f64());
     }
 
     let start = Instant::now();
@@ -301,7 +304,7 @@ fn methods<'a>(
     }
     let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
-    add("ddtcm", paper, forests, start.elapsed().as_secs_f64());
+    add("ddtcm", "recipe's force", paper, forests, start.elapsed().as_secs_f64());
 
     let start = Instant::now();
     let mut best = sources.clone();
@@ -316,7 +319,7 @@ fn methods<'a>(
     {
         let mut changed = with_body();
         changed.run.interface_speed = speed;
-        add(name, changed, best.clone(), fit_s);
+        add(name, "body force", changed, best.clone(), fit_s);
     }
     Ok(methods)
 }
@@ -364,6 +367,7 @@ fn row(
     warnings.extend(run.all_warnings());
     Ok(TrainRow {
         method: method.name.into(),
+        driven_by: method.driven_by.into(),
         mean_velocity_l1: mean(|v| v.velocity_l1),
         mean_acceleration_l1: mean(|v| v.acceleration_l1),
         interface_speeds_m_per_s: names

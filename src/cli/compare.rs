@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::assess::compare::{self, Comparison, Settings};
 use crumple::assess::train::{TrainComparison, compare_train};
+use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::nsdm::Start;
 use crumple::scenario;
@@ -24,8 +25,8 @@ use super::{CommandResult, Failure, Manners, Outcome};
   crumple compare curves.h5 --group lead-car-wall                 # every inner speed, and means
   crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
   crumple compare --train train-set.toml
-Rows: fe and fe_body are FE's own curves in the one-mass model, the floors for contact forces and
-for the body's motion; fdrm is the FE curve of one speed, nsdm the spring and damper fitted to that
+Rows: fe is FE's own curve in the one-mass model, the floor for predictions of that force; fe_body is
+made from FE's own speeds and checks that curve, force law and run are consistent; fdrm is the FE curve of one speed, nsdm the spring and damper fitted to that
 run; ddtcm the reference method's forest and spline; best the model that leaving speeds out chooses
 among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
 largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
@@ -80,6 +81,8 @@ struct Document {
 #[derive(Serialize)]
 struct Mean {
     method: String,
+    /// Which force drives its runs; null for a spring and damper.
+    driven_by: Option<ForceKind>,
     velocity_l1: f64,
     acceleration_l1: f64,
     acceleration_unfiltered_l1: f64,
@@ -166,6 +169,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         .map(|row| {
             vec![
                 row.method.clone(),
+                row.driven_by.map_or("spring and damper", ForceKind::name).into(),
                 row.curve.clone(),
                 percent(row.velocity_l1),
                 format!(
@@ -187,6 +191,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         .collect();
     let heading = [
         "method",
+        "driven by",
         "curve",
         "velocity",
         "acceleration",
@@ -248,6 +253,7 @@ fn means(comparisons: &[Comparison]) -> Vec<Mean> {
             };
             Mean {
                 method: row.method.clone(),
+                driven_by: row.driven_by,
                 velocity_l1: mean(&|r| r.velocity_l1),
                 acceleration_l1: mean(&|r| r.acceleration_l1),
                 acceleration_unfiltered_l1: mean(&|r| r.acceleration_unfiltered_l1),
@@ -269,6 +275,7 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
         .map(|m| {
             vec![
                 m.method.clone(),
+                m.driven_by.map_or("spring and damper", ForceKind::name).into(),
                 format!("{:.1} %", m.velocity_l1 * 100.0),
                 format!(
                     "{:.1} % ({:.1})",
@@ -280,7 +287,14 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
             ]
         })
         .collect();
-    let heading = ["method", "velocity", "acceleration", "ISO/TS 18571 v", "a"];
+    let heading = [
+        "method",
+        "driven by",
+        "velocity",
+        "acceleration",
+        "ISO/TS 18571 velocity",
+        "acceleration",
+    ];
     output::table(out, &heading, &rows)
 }
 
@@ -321,8 +335,11 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
         .iter()
         .map(|row| {
             let cell = |v: f64, a: f64| format!("{:.1} % ({:.0})", v * 100.0, a * 100.0);
-            let mut cells =
-                vec![row.method.clone(), cell(row.mean_velocity_l1, row.mean_acceleration_l1)];
+            let mut cells = vec![
+                row.method.clone(),
+                row.driven_by.clone(),
+                cell(row.mean_velocity_l1, row.mean_acceleration_l1),
+            ];
             cells.extend(row.vehicles.iter().map(|v| cell(v.velocity_l1, v.acceleration_l1)));
             let speeds: Vec<String> = row
                 .interface_speeds_m_per_s
@@ -333,7 +350,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
             cells
         })
         .collect();
-    let mut heading = vec!["method", "mean"];
+    let mut heading = vec!["method", "driven by", "mean"];
     heading.extend(vehicles.iter().map(|v| v.as_str()));
     heading.push("curves at");
     output::table(out, &heading, &rows)?;

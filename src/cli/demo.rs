@@ -8,8 +8,8 @@ use crumple::assess::validate::{train_chosen, validate};
 use crumple::build::{self, RunOutcome};
 use crumple::curve::{Case, ForceKind};
 use crumple::database::Database;
-use crumple::export;
 use crumple::file::{WriteError, write_at, write_whole};
+use crumple::formats;
 use crumple::multibody::{Run, simulate};
 use crumple::scenario;
 use crumple::surrogate::leave_one_out::Validation;
@@ -198,12 +198,12 @@ impl Flow<'_> {
         let curve = predict(model, &Query::at(SPEED_M_PER_S))?;
         for name in ["lead50.json", "lead50.csv", "lead50.k"] {
             let path = self.path(name);
-            let format = export::by_extension(&path)?;
+            let format = formats::by_extension(&path)?;
             let bytes = match format.holds_both_forces() {
-                true => format.encode(&curve, &export::Options::default())?,
+                true => format.encode(&curve, &formats::Options::default())?,
                 false => {
                     let body = curve.of_force(ForceKind::Body)?;
-                    format.encode(&body, &export::Options::default())?
+                    format.encode(&body, &formats::Options::default())?
                 }
             };
             write_whole(&path, &bytes)?;
@@ -269,7 +269,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     let p = &document.prediction;
     writeln!(
         out,
-        "errors as sum|p-r|/sum|r|: force along FE's crush; velocity v and acceleration a (CFC 60; in brackets not filtered) in one multi-body model to 30 ms after max crush\n\
+        "errors as sum|p-r|/sum|r|: force along FE's crush; velocity and acceleration (CFC 60; in brackets not filtered) in one multi-body model to 30 ms after max crush\n\
          {GROUP} at {} by the model {}: peak force {:.3} MN, max crush {:.4} m, energy {:.2} %; multi-body run: crush {:.4} m, energy off by {:.0e}\n",
         km_per_h(p.speed_m_per_s),
         p.model,

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crumple::curve::ForceKind;
-use crumple::export::{self, ExportError, FORMATS, Format, Options};
 use crumple::file::write_whole;
+use crumple::formats::{self, ExportError, FORMATS, Format, Options};
 use crumple::surrogate::predict::PredictError;
 use crumple::surrogate::{Model, PredictedCurve};
 use crumple::unit::UnitSystem;
@@ -74,8 +74,8 @@ impl Target {
     /// The format by `--to`, else by the extension of the file.
     pub fn format(&self, path: Option<&Path>) -> Result<&'static Format, Failure> {
         let found = match (&self.to, path) {
-            (Some(name), _) => export::by_name(name),
-            (None, Some(path)) => export::by_extension(path),
+            (Some(name), _) => formats::by_name(name),
+            (None, Some(path)) => formats::by_extension(path),
             (None, None) => {
                 let names: Vec<&str> = FORMATS.iter().map(|f| f.name).collect();
                 return Err(Failure::Usage(format!(
@@ -151,7 +151,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     }
     let bytes = match format.takes_model() {
         true => format.encode_model(&Model::read(input)?)?,
-        false => args.target.encode(format, &export::json::read(input)?)?,
+        false => args.target.encode(format, &formats::json::read(input)?)?,
     };
     match output {
         None if manners.json && format.takes_model() => {

@@ -25,11 +25,12 @@ use super::{CommandResult, Failure, Manners, Outcome};
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
 Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (in
-the means by spline, monotone, energy and motion, the model's own rule marked);
-peaks are the first two of FE's curve (force and place); v and a are velocity and acceleration
-(CFC 60; in brackets not filtered) of a multi-body run of one mass, driven by the model's body
-force, sum|p-r|/sum|r| to 30 ms after FE's largest crush. The means are over inner speeds; the
-ends of the range are extrapolation and stand apart. forest is the reference method (DDTCM),
+the means by each rule for the crush, the model's own marked); peaks are the first two of FE's curve
+(force and place); velocity and acceleration (CFC 60; in brackets not filtered) are those of a
+multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to 30 ms after FE's
+largest crush. The means are over inner speeds; the ends of the range are extrapolation and stand
+apart. FE contact (floor) is FE's own contact force in that run: what no prediction of it beats but
+for luck; FE body (check) is made from FE's own speeds and checks curve, force law and run. forest is the reference method (DDTCM),
 nearest is FDRM. --nested adds auto: model and rule chosen without the speed that is left out.")]
 pub struct Args {
     /// Curve database
@@ -160,7 +161,15 @@ fn print_group(
         if !rows.is_empty() {
             writeln!(out, "\n{}: {title}", validation.group)?;
             let heading = [
-                "model", "speed", "force", "energy", "crush", "peak 1", "peak 2", "v", "a",
+                "model",
+                "speed",
+                "force",
+                "energy",
+                "crush",
+                "peak 1",
+                "peak 2",
+                "velocity",
+                "acceleration",
                 "in band",
             ];
             output::table(out, &heading, &rows)?;
@@ -202,8 +211,17 @@ fn peak(peak: &PeakError) -> String {
     }
 }
 
+/// What the row of FE's own curve is called. That of the body's force is made from FE's speeds, so
+/// it is no floor for predictions.
+fn own_curve(force: &str) -> String {
+    match force {
+        "body" => "FE body (check)".into(),
+        force => format!("FE {force} (floor)"),
+    }
+}
+
 fn floor(floor: &Floor) -> Vec<String> {
-    let mut cells = vec![format!("FE's own, {}", floor.force), km_per_h(floor.speed_m_per_s)];
+    let mut cells = vec![own_curve(&floor.force), km_per_h(floor.speed_m_per_s)];
     cells.extend(["-"; 5].map(String::from));
     cells.push(percent(floor.velocity_l1));
     cells.push(acceleration(floor.acceleration_l1, floor.acceleration_unfiltered_l1));
@@ -216,8 +234,14 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
         let speeds = first.speeds;
-        writeln!(out, "{group}: means over {speeds} inner speeds left out in turn")?;
-        let heading = ["model", "force", "energy", "crush", "spl/mon/ene/mot", "v", "a"];
+        writeln!(
+            out,
+            "{group}: means over {speeds} inner speeds left out in turn; the body's force drives the runs"
+        )?;
+        let by_rule = MaxCrushRule::ALL.map(|rule| format!("by {}", rule.name()));
+        let mut heading = vec!["model", "force", "energy", "crush"];
+        heading.extend(by_rule.iter().map(String::as_str));
+        heading.extend(["velocity", "acceleration"]);
         let rows: Vec<Vec<String>> = validation
             .means
             .iter()
@@ -262,25 +286,20 @@ fn band_line(band: &Band) -> String {
 
 fn means(means: &Means, chosen: &str) -> Vec<String> {
     let mark = if means.model == chosen { " *" } else { "" };
-    vec![
+    let mut cells = vec![
         format!("{}{mark}", means.model),
         percent(means.force_l1),
         percent(means.energy_error),
         percent(means.max_crush_error),
-        by_rule(means),
-        percent(means.velocity_l1),
-        acceleration(means.acceleration_l1, means.acceleration_unfiltered_l1),
-    ]
-}
-
-/// The crush by every rule in per cent, the model's own marked.
-fn by_rule(means: &Means) -> String {
-    let cell = |rule: &MaxCrushRule| {
-        let mark = if *rule == means.max_crush_rule { "*" } else { "" };
+    ];
+    cells.extend(MaxCrushRule::ALL.iter().map(|rule| {
+        let mark = if *rule == means.max_crush_rule { " *" } else { "" };
         let error = means.max_crush_errors.get(rule);
-        error.map_or("-".into(), |e| format!("{:.1}{mark}", e * 100.0))
-    };
-    MaxCrushRule::ALL.iter().map(cell).collect::<Vec<_>>().join("/")
+        error.map_or("-".into(), |e| format!("{}{mark}", percent(*e)))
+    }));
+    cells.push(percent(means.velocity_l1));
+    cells.push(acceleration(means.acceleration_l1, means.acceleration_unfiltered_l1));
+    cells
 }
 
 /// FE's own curves over the inner speeds.
@@ -290,8 +309,8 @@ fn mean_floor(validation: &Validation, force: &str) -> Option<Vec<String>> {
     let mean =
         |of: fn(&Floor) -> f64| inner.iter().map(|f| of(f)).sum::<f64>() / inner.len() as f64;
     (!inner.is_empty()).then(|| {
-        let mut cells = vec![format!("FE's own, {force}")];
-        cells.extend(["-"; 4].map(String::from));
+        let mut cells = vec![own_curve(force)];
+        cells.extend(["-"; 7].map(String::from));
         cells.push(percent(mean(|f| f.velocity_l1)));
         cells.push(acceleration(
             mean(|f| f.acceleration_l1),

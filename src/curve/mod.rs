@@ -248,7 +248,7 @@ impl Case {
         self.original.deflection_m[self.loading_end()]
     }
 
-    /// Largest contact force, in N.
+    /// Largest force of the original states, in N: contact or body force, as the recipe has it.
     pub fn peak_force_n(&self) -> f64 {
         self.original.force_n.iter().copied().fold(0.0, f64::max)
     }

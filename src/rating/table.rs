@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::separated::separator;
+use crate::table::{CsvTable, NoNumber};
 
 /// Columns of a table that hold a signal: its times as they stand, and its values.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub enum TableError {
     #[error("line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"")]
     NotANumber { line: u64, column: usize, name: String, found: String },
     #[error(
-        "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": leave out the lines without a value"
+        "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"
     )]
     NotFinite { line: u64, column: usize, name: String, found: String },
     #[error(
@@ -56,15 +56,8 @@ pub enum TableError {
 pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, TableError> {
     let mut text = Vec::new();
     source.read_to_end(&mut text).map_err(csv::Error::from)?;
-    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&text);
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .delimiter(separator(text))
-        .from_reader(text);
-    let header = reader.headers()?.clone();
-    let line = header.position().map_or(1, csv::Position::line);
+    let mut table = CsvTable::open(&text, 0)?;
+    let (header, line) = (table.header().clone(), table.header_line());
     if header.iter().all(str::is_empty) {
         return Err(TableError::Empty);
     }
@@ -76,23 +69,17 @@ pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, Tabl
     }
     let column = column(&header, wanted)?;
     let (mut time, mut values) = (Vec::<f64>::new(), Vec::new());
-    for record in reader.records() {
-        let record = record?;
-        let line = record.position().map_or(0, csv::Position::line);
+    for row in table.rows() {
+        let row = row?;
+        let line = row.line;
         let number = |field: usize| {
-            let found = record.get(field).unwrap_or_default();
-            let place = || (field + 1, header[field].to_string(), found.to_string());
-            match found.parse::<f64>() {
-                Ok(number) if number.is_finite() => Ok(number),
-                Ok(_) => {
-                    let (column, name, found) = place();
-                    Err(TableError::NotFinite { line, column, name, found })
+            row.number(field).map_err(|NoNumber { line, column, found, is_number }| {
+                let name = header[field].to_string();
+                match is_number {
+                    true => TableError::NotFinite { line, column, name, found },
+                    false => TableError::NotANumber { line, column, name, found },
                 }
-                Err(_) => {
-                    let (column, name, found) = place();
-                    Err(TableError::NotANumber { line, column, name, found })
-                }
-            }
+            })
         };
         let (at, value) = (number(0)?, number(column)?);
         if let Some(&before) = time.last().filter(|&&before| before >= at) {
@@ -156,7 +143,7 @@ mod tests {
         t(
             "t,a\n0,NaN\n",
             None,
-            "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": leave out the lines without a value",
+            "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": remove the lines without a value",
         );
         t(
             "#\nt,a\n0,1\n2,1\n1,1\n",

@@ -15,7 +15,7 @@ pub use sources::{Source, Sources};
 pub use tables::*;
 
 use crate::database::DatabaseError;
-use crate::export::{csv, json};
+use crate::formats::{csv, json};
 use crate::manifest::{self, ManifestError};
 use crate::multibody::{Chain, ChainError, RunSettings, SimulationError};
 use crate::surrogate::ModelError;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{CurveTable, Scenario, ScenarioError, StageTable};
 use crate::curve::{Case, DrivingCurve, Envelope};
 use crate::database::Database;
-use crate::export::{csv, json};
+use crate::formats::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
 
 /// What the curves of a scenario are made of: the same for every variation of it.

@@ -57,8 +57,9 @@ pub struct PeakError {
     pub shift_m: Option<f64>,
 }
 
-/// FE's own curve in the same multi-body model: what no prediction of that force beats,
-/// but for luck.
+/// FE's own curve in the same multi-body model. That of a contact force is the floor for its
+/// predictions; that of the body's force is made from FE's own speeds, and checks that curve, force
+/// law and run are consistent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Floor {
     /// `contact` or `body`.

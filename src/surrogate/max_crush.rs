@@ -15,7 +15,7 @@ use crate::curve::Envelope;
 pub enum MaxCrushRule {
     /// Cubic spline through the training cases (reference method).
     Spline,
-    /// Monotone cubic through (0, 0) and the training cases (default).
+    /// Monotone cubic through (0, 0) and the training cases.
     #[default]
     Monotone,
     /// Where the predicted curve has taken up the kinetic energy.

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::{ExportError, MAX_CURVE_BYTES, Options, facts, nine_digits};
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope, EnvelopeError, ForceKind};
 use crate::file;
-use crate::separated::separator;
 use crate::surrogate::PredictedCurve;
+use crate::table::{CsvTable, NoNumber};
 use crate::unit::{Dimension, FORCE, LENGTH, SpeedKind, UnitSystem};
 
 pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
@@ -76,21 +76,14 @@ pub fn read(path: &Path) -> Result<DrivingCurve, CsvError> {
     let malformed = |source| CsvError::Csv { path: path.into(), source };
     let bytes = file::read(path, MAX_CURVE_BYTES).map_err(io)?;
     let facts = Facts::read(path, &bytes)?;
-    let rest = &bytes[facts.bytes..];
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .delimiter(separator(rest))
-        .from_reader(rest);
-    let header = reader.headers().map_err(malformed)?.clone();
-    let line_of =
-        |position: Option<&csv::Position>| facts.lines + position.map_or(1, csv::Position::line);
+    let mut table = CsvTable::open(&bytes[facts.bytes..], facts.lines).map_err(malformed)?;
+    let (header, header_line) = (table.header().clone(), table.header_line());
     let unit = |field: usize, prefixes: &[&str], of: &Dimension, wanted, example| {
         let found = header.get(field).unwrap_or_default();
         let size = prefixes.iter().find_map(|prefix| of.size_of(found.strip_prefix(prefix)?));
         size.ok_or_else(|| CsvError::Header {
             path: path.into(),
-            line: line_of(header.position()),
+            line: header_line,
             wanted,
             example,
             found: found.into(),
@@ -99,15 +92,14 @@ pub fn read(path: &Path) -> Result<DrivingCurve, CsvError> {
     let length = unit(0, &["d_", "deflection_"], &LENGTH, "deflection", "d_m or d_mm")?;
     let force = unit(1, &["force_"], &FORCE, "force", "force_N or force_kN")?;
     let (mut deflection_m, mut force_n) = (Vec::new(), Vec::new());
-    for record in reader.records() {
-        let record = record.map_err(malformed)?;
+    for row in table.rows() {
+        let row = row.map_err(malformed)?;
         let number = |field: usize| {
-            let found = record.get(field).unwrap_or_default();
-            found.parse::<f64>().map_err(|_| CsvError::Number {
+            row.number(field).map_err(|NoNumber { line, column, found, .. }| CsvError::Number {
                 path: path.into(),
-                line: line_of(record.position()),
-                field: field + 1,
-                found: found.into(),
+                line,
+                field: column,
+                found,
             })
         };
         deflection_m.push(number(0)? * length);

@@ -1,0 +1,123 @@
+//! CSV tables that somebody else has written: a header line, then rows, with the place of what is
+//! wrong.
+
+use csv::StringRecord;
+
+/// The rows below a header line. Separated by commas, semicolons or tabs, whichever stand in the
+/// header; lines that begin with `#` are comments.
+pub struct CsvTable<'a> {
+    reader: csv::Reader<&'a [u8]>,
+    header: StringRecord,
+    /// Lines of the file in front of the text.
+    lines_before: u64,
+}
+
+/// One row.
+pub struct Row {
+    record: StringRecord,
+    /// Line in the file, counted from 1.
+    pub line: u64,
+}
+
+/// A field that holds no number, or none that is finite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoNumber {
+    /// Line in the file, counted from 1.
+    pub line: u64,
+    /// Field of the row, counted from 1.
+    pub column: usize,
+    /// What stands there.
+    pub found: String,
+    /// Whether it is a number, but NaN or infinite.
+    pub is_number: bool,
+}
+
+impl<'a> CsvTable<'a> {
+    /// The table in `text`, which `lines_before` other lines of its file precede.
+    ///
+    /// # Errors
+    /// If the header is no UTF-8.
+    pub fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
+        let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .delimiter(separator(text))
+            .from_reader(text);
+        let header = reader.headers()?.clone();
+        Ok(Self { reader, header, lines_before })
+    }
+
+    /// The names of the columns.
+    pub fn header(&self) -> &StringRecord {
+        &self.header
+    }
+
+    /// Line of the header in the file, counted from 1.
+    pub fn header_line(&self) -> u64 {
+        self.lines_before + self.header.position().map_or(1, csv::Position::line)
+    }
+
+    /// The rows in their order.
+    pub fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
+        let before = self.lines_before;
+        self.reader.records().map(move |record| {
+            let record = record?;
+            let line = before + record.position().map_or(0, csv::Position::line);
+            Ok(Row { record, line })
+        })
+    }
+}
+
+impl Row {
+    /// The finite number in a field, counted from 0.
+    ///
+    /// # Errors
+    /// [`NoNumber`] with its place.
+    pub fn number(&self, field: usize) -> Result<f64, NoNumber> {
+        let found = self.record.get(field).unwrap_or_default();
+        let parsed = found.parse::<f64>();
+        match parsed {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(NoNumber {
+                line: self.line,
+                column: field + 1,
+                found: found.into(),
+                is_number: parsed.is_ok(),
+            }),
+        }
+    }
+}
+
+/// What separates the columns of the first line of `text` that is no comment (`#`): the first
+/// comma, semicolon or tab outside of quotes.
+fn separator(text: &[u8]) -> u8 {
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+    let mut lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
+    let header = lines.find(|line| !line.is_empty() && line[0] != b'#').unwrap_or_default();
+    let mut quoted = false;
+    let found = header.iter().find(|&&byte| {
+        quoted ^= byte == b'"';
+        !quoted && matches!(byte, b',' | b';' | b'\t')
+    });
+    found.copied().unwrap_or(b',')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_header_decides() {
+        let t =
+            |text: &str, expected: u8| assert_eq!(separator(text.as_bytes()), expected, "{text}");
+        t("d_m,force_N\n0;0\n", b',');
+        t("d_m;force_N;\"a, b\"\n", b';');
+        t("\"a, b\"\td\n", b'\t');
+        t("\u{feff}# by hand; run 3\r\n\r\nd_m,force_N\n", b',');
+        t("\r\nd_m;force_N\n", b';');
+        t("d_m\n", b',');
+        t("", b',');
+    }
+}
