@@ -1,11 +1,13 @@
 //! Building a database: every run of a study becomes a case; unchanged runs are kept.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use crate::curve::Case;
-use crate::database::{Database, DatabaseError, LockError, WriterLock};
+use crate::database::{Database, DatabaseError};
+use crate::file::{LockError, WriterLock};
 use crate::manifest::ManifestError;
 use crate::study::{self, RunError, Study};
 
@@ -89,16 +91,22 @@ pub fn build(
         true => Database::read(path)?,
         false => Database::default(),
     };
+    let before: HashMap<&str, &Case> =
+        database.cases(study.group()).iter().map(|case| (case.name.as_str(), case)).collect();
     let results: Vec<(String, Result<Option<Case>, RunFailure>)> = study
         .runs()
         .par_iter()
         .map(|entry| {
             let name = entry.case_name();
-            let result = case(&study, entry, &database);
+            // A case that somebody has changed since is made anew.
+            let is_altered = database.is_altered(study.group(), &name);
+            let before = before.get(name.as_str()).filter(|_| !is_altered);
+            let result = case(&study, entry, before.map(|case| case.fingerprint.as_str()));
             progress(&name);
             (name, result)
         })
         .collect();
+    let before: HashSet<String> = before.into_keys().map(String::from).collect();
     if results.iter().all(|(_, r)| r.is_err()) {
         let reasons: Vec<String> = results
             .iter()
@@ -106,23 +114,25 @@ pub fn build(
             .collect();
         return Err(BuildError::NoRun { path: manifest.into(), reasons: reasons.join("\n") });
     }
-    let mut runs = Vec::new();
+    let (mut runs, mut built) = (Vec::new(), Vec::new());
     for (name, result) in results {
         let outcome = match result {
             Ok(Some(case)) => {
-                database.put(case)?;
+                built.push(case);
                 RunOutcome::Built
             }
             Ok(None) => RunOutcome::Kept,
             Err(reason) => {
-                let earlier_kept = database.cases(study.group()).iter().any(|c| c.name == name);
+                let earlier_kept = before.contains(&name);
                 RunOutcome::Failed { reason, earlier_kept }
             }
         };
         runs.push((name, outcome));
     }
+    database.put_all(built)?;
+    let names: HashSet<&str> = runs.iter().map(|(name, _)| name.as_str()).collect();
     let removed = database.retain(study.group(), |case| {
-        case.study != study.name() || runs.iter().any(|(name, _)| *name == case.name)
+        case.study != study.name() || names.contains(case.name.as_str())
     });
     let changed = !removed.is_empty() || runs.iter().any(|(_, o)| matches!(o, RunOutcome::Built));
     if changed || !path.is_file() {
@@ -131,22 +141,15 @@ pub fn build(
     Ok(BuildReport { group: study.group().into(), runs, removed, database })
 }
 
-/// The run's case, or `None` if the database already has it.
+/// The run's case, or `None` if its fingerprint is the one it had before.
 fn case(
     study: &Study,
     entry: &study::RunEntry,
-    database: &Database,
+    before: Option<&str>,
 ) -> Result<Option<Case>, RunFailure> {
     let located =
         study.locate(entry).map_err(|reason| RunFailure { reason, problems: Vec::new() })?;
-    let name = entry.case_name();
-    let kept = database
-        .cases(study.group())
-        .iter()
-        .any(|c| c.name == name && c.fingerprint == located.fingerprint)
-        // A case that somebody has changed since is made anew.
-        && !database.is_altered(study.group(), &name);
-    if kept {
+    if before == Some(&*located.fingerprint) {
         return Ok(None);
     }
     let failure = |reason| RunFailure { reason, problems: located.problems() };

@@ -12,8 +12,7 @@ use super::row::{Head, Line, MAX_HEAD_BYTES, Status, bad_row};
 use super::run::{self, Chunk, Written};
 use super::statistics::Statistics;
 use super::{Report, Shard, Sweep, SweepError};
-use crate::database::WriterLock;
-use crate::file::{self, WriteError};
+use crate::file::{self, WriteError, WriterLock};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use super::draft::{Tally, each_line};
 use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
 use super::{Shard, SweepError};
-use crate::database::DatabaseError;
-use crate::database::table::{Attribute, Column, Put, Table, Values, write_table};
 use crate::file;
+use crate::hdf5::table::{Attribute, Column, Put, Table, TableError, Values, write_table};
 
 /// Number of a row's message; 0 is the empty one.
 const MESSAGE_NUMBER: &str = "message_number";
@@ -242,7 +241,7 @@ impl Shelf {
         let mut first = 0;
         while first < self.rows() {
             let rows = ROWS.min(self.rows() - first);
-            let columns: Result<Vec<Vec<u8>>, DatabaseError> =
+            let columns: Result<Vec<Vec<u8>>, TableError> =
                 (0..messages).map(|c| self.table.read(c, first, rows)).collect();
             let mut columns = columns?;
             for (k, item) in columns[0].chunks_exact(8).enumerate() {
@@ -299,7 +298,7 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
 }
 
 /// The head that a file's attributes and columns tell.
-fn head(table: &Table) -> Result<Option<Head>, DatabaseError> {
+fn head(table: &Table) -> Result<Option<Head>, TableError> {
     let mut texts = Vec::new();
     for name in ["written_by", "hash", "shard"] {
         match table.attribute(name)? {

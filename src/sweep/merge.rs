@@ -7,8 +7,7 @@ use super::draft::{Tally, each_line, is_hdf5};
 use super::hdf5::{self, Shelf};
 use super::row::Head;
 use super::{Report, Shard, SweepError};
-use crate::database::WriterLock;
-use crate::file::{self, write_at};
+use crate::file::{self, WriterLock, write_at};
 
 /// First bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::database::{DatabaseError, LockError};
-use crate::file::{self, WriteError};
+use crate::file::{self, LockError, WriteError};
+use crate::hdf5::TableError;
 use crate::manifest::{self, ManifestError};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
@@ -80,7 +80,7 @@ pub enum SweepError {
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error(transparent)]
-    Database(#[from] DatabaseError),
+    Table(#[from] TableError),
     #[error(transparent)]
     Lock(#[from] LockError),
     #[error("{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it")]
