@@ -161,7 +161,7 @@ fn files_are_opened_where_their_kind_is_asked() {
         "src/file/write.rs",
         "src/solver/source.rs",
         "src/solver/decks.rs",
-        "src/sweep/draft.rs",
+        "src/sweep/journal.rs",
         "src/cli/sweep.rs",
     ];
     for path in files(&root().join("src"), "rs") {

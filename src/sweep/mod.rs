@@ -5,12 +5,14 @@
 //! nothing grows with their number. The file under work is its own journal: a run that was
 //! stopped goes on behind its last whole row.
 
-mod draft;
-mod hdf5;
+mod journal;
 mod merge;
 mod row;
 mod run;
+mod shard_file;
 mod statistics;
+mod tally;
+mod to_hdf5;
 mod variables;
 
 use std::io;
@@ -24,8 +26,8 @@ use crate::manifest::{self, ManifestError};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
 use crate::scenario::{self, Prepared, Scenario, ScenarioError, Sources};
-pub use draft::{Settings, write, write_rows};
-pub use merge::merge;
+pub use journal::{WriteOptions, write, write_rows};
+pub use merge::{MergeError, merge};
 pub use row::{Head, Row, Status};
 pub use run::Chunk;
 pub use statistics::{ColumnStatistics, Statistics};
@@ -89,8 +91,8 @@ pub enum SweepError {
     Foreign { path: PathBuf },
     #[error("{path}: {message}")]
     Damaged { path: PathBuf, message: String },
-    #[error("{message}")]
-    Merge { message: String },
+    #[error(transparent)]
+    Merge(#[from] MergeError),
 }
 
 /// What has been done.
