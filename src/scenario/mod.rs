@@ -10,7 +10,9 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-pub use assemble::{adjust, assemble};
+pub use assemble::{AssemblyError, adjust};
+pub use check::{CheckError, CheckedScenario};
+pub use local::assemble;
 pub use sources::{Source, Sources};
 pub use tables::*;
 
@@ -53,8 +55,30 @@ pub struct Used {
 pub enum ScenarioError {
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// It is wrong as a whole.
+    #[error("{path}: {source}")]
+    Check {
+        /// The scenario.
+        path: PathBuf,
+        /// What is wrong.
+        source: CheckError,
+    },
+    /// A curve's source is wrong.
     #[error("{path}: {message}")]
-    Invalid { path: PathBuf, message: String },
+    Invalid {
+        /// The scenario.
+        path: PathBuf,
+        /// What is wrong, with the curve.
+        message: String,
+    },
+    /// A curve cannot stand where the scenario puts it.
+    #[error("{path}: {source}")]
+    Assembly {
+        /// The scenario.
+        path: PathBuf,
+        /// Which curve, and why not.
+        source: AssemblyError,
+    },
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error("curve \"{curve}\": {source}")]
@@ -74,23 +98,29 @@ pub enum ScenarioError {
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
 ///
 /// # Errors
-/// [`ScenarioError`] as of [`load`].
-pub fn parse(path: &Path, text: &str) -> Result<Scenario, ScenarioError> {
-    checked(path, manifest::parse(path, text)?)
+/// [`ScenarioError`] names the key.
+pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
+    let scenario: Scenario = manifest::parse(path, text)?;
+    Ok(check(path, &scenario)?.into_owned())
 }
 
-fn checked(path: &Path, scenario: Scenario) -> Result<Scenario, ScenarioError> {
-    check::check(&scenario)
-        .map_err(|message| ScenarioError::Invalid { path: path.into(), message })?;
-    Ok(scenario)
+/// Checks a scenario as [`Scenario::check`] does, with its path in the message.
+///
+/// # Errors
+/// [`ScenarioError::Check`] names the key.
+pub fn check<'a>(
+    path: &Path,
+    scenario: &'a Scenario,
+) -> Result<CheckedScenario<'a>, ScenarioError> {
+    scenario.check().map_err(|source| ScenarioError::Check { path: path.into(), source })
 }
 
 /// Reads and checks a scenario; curves are not read.
 ///
 /// # Errors
 /// [`ScenarioError`] names the key.
-pub fn read(path: &Path) -> Result<Scenario, ScenarioError> {
-    checked(path, manifest::load(path)?)
+pub fn read(path: &Path) -> Result<CheckedScenario<'static>, ScenarioError> {
+    parse(path, &manifest::read_text(path)?)
 }
 
 /// Loads a scenario and everything it names.

@@ -25,7 +25,7 @@ use crate::hdf5::TableError;
 use crate::manifest::{self, ManifestError};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
-use crate::scenario::{self, Prepared, Scenario, ScenarioError, Sources};
+use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
 pub use journal::{WriteOptions, write, write_rows};
 pub use merge::{MergeError, merge};
 pub use row::{Head, Row, Status};
@@ -124,7 +124,7 @@ impl Report {
 /// A scenario with a plan, checked, its files read.
 pub struct Sweep {
     path: PathBuf,
-    scenario: Scenario,
+    scenario: CheckedScenario<'static>,
     sources: Sources,
     design: Design,
     variables: Vec<Variable>,
@@ -141,14 +141,14 @@ impl Sweep {
     /// [`SweepError`] names file and key.
     pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, SweepError> {
         let text = manifest::read_text(path)?;
-        let mut scenario = scenario::parse(path, &text)?;
+        let scenario = scenario::parse(path, &text)?;
         let plan_path = plan.unwrap_or(path);
         let of_file = match plan {
             Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
             None => None,
         };
         let invalid = |message: String| SweepError::Plan { path: plan_path.into(), message };
-        let plan = of_file.or(scenario.sweep.take()).ok_or_else(|| {
+        let plan = of_file.or_else(|| scenario.sweep.clone()).ok_or_else(|| {
             invalid("there is no [sweep]: add one, or give it in another file with --plan".into())
         })?;
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
