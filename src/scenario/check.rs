@@ -37,9 +37,7 @@ pub enum CheckError {
         trains: usize,
     },
     /// There is nothing to meet, or too much.
-    #[error(
-        "expected two [[train]], or one and a [wall], found {trains} [[train]] and no [wall]"
-    )]
+    #[error("expected two [[train]], or one and a [wall], found {trains} [[train]] and no [wall]")]
     Trains {
         /// Number of trains.
         trains: usize,
@@ -315,7 +313,11 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), CheckError> {
     }
     let no_model = table.model.is_none();
     let foreign = [
-        ("force", "a model, predicted curve or case", table.stages.is_some() && table.force.is_some()),
+        (
+            "force",
+            "a model, predicted curve or case",
+            table.stages.is_some() && table.force.is_some(),
+        ),
         ("case", "a database", table.database.is_none() && table.case.is_some()),
         ("max_crush", "a model", no_model && table.max_crush.is_some()),
         ("parameters", "a model", no_model && !table.parameters.is_empty()),

@@ -32,7 +32,7 @@ pub use row::{Head, Row, Status};
 pub use run::Chunk;
 pub use statistics::{ColumnStatistics, Statistics};
 use variables::Variable;
-pub use variables::VariableSummary;
+pub use variables::{BindError, VariableError, VariableSummary};
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///
@@ -75,8 +75,10 @@ pub enum SweepError {
     Manifest(#[from] ManifestError),
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    #[error("{path}: {message}")]
-    Plan { path: PathBuf, message: String },
+    #[error("{path}: there is no [sweep]: add one, or give it in another file with --plan")]
+    NoPlan { path: PathBuf },
+    #[error("{path}: {source}")]
+    Plan { path: PathBuf, source: BindError },
     #[error("{path}: {source}")]
     Read { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -147,10 +149,10 @@ impl Sweep {
             Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
             None => None,
         };
-        let invalid = |message: String| SweepError::Plan { path: plan_path.into(), message };
-        let plan = of_file.or_else(|| scenario.sweep.clone()).ok_or_else(|| {
-            invalid("there is no [sweep]: add one, or give it in another file with --plan".into())
-        })?;
+        let invalid = |source| SweepError::Plan { path: plan_path.into(), source };
+        let plan = of_file
+            .or_else(|| scenario.sweep.clone())
+            .ok_or_else(|| SweepError::NoPlan { path: plan_path.into() })?;
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
         let results = results(&plan).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
@@ -199,12 +201,12 @@ impl Sweep {
     }
 }
 
-fn results(plan: &Plan) -> Result<Vec<ResultName>, String> {
+fn results(plan: &Plan) -> Result<Vec<ResultName>, BindError> {
     let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
     match kept.len() == asked.len() && !kept.is_empty() {
         true => Ok(kept),
-        false => Err("sweep.results: name each result once, and at least one".into()),
+        false => Err(BindError::Results),
     }
 }
 
