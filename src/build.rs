@@ -14,20 +14,30 @@ use crate::study::{self, RunError, Study};
 /// Why nothing could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
+    /// The manifest is wrong.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// The database is not ours, or damaged.
     #[error(transparent)]
     Database(#[from] DatabaseError),
+    /// Another process writes the database.
     #[error(transparent)]
     Lock(#[from] LockError),
+    /// No run is usable.
     #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
-    NoRun { path: PathBuf, reasons: String },
+    NoRun {
+        /// The manifest.
+        path: PathBuf,
+        /// A line for each run.
+        reasons: String,
+    },
 }
 
 /// Why a run could not be used, and what is wrong with its files, which may be the cause.
 #[derive(Debug, thiserror::Error)]
 #[error("{reason}{}", listed(.problems))]
 pub struct RunFailure {
+    /// Why the run is not usable.
     #[source]
     pub reason: RunError,
     /// As `crumple inspect` finds them.
@@ -57,17 +67,24 @@ pub enum RunOutcome {
     /// Unchanged since it was built.
     Kept,
     /// Not usable, with the reason; an earlier build of it stays in the database.
-    Failed { reason: RunFailure, earlier_kept: bool },
+    Failed {
+        /// Why, with the damage of its files.
+        reason: RunFailure,
+        /// Whether the database has the run from an earlier build.
+        earlier_kept: bool,
+    },
 }
 
 /// What a build did.
 #[derive(Debug)]
 pub struct BuildReport {
+    /// Group of the study.
     pub group: String,
     /// Name and end of every run, in the order of the manifest.
     pub runs: Vec<(String, RunOutcome)>,
     /// Cases that the study no longer has.
     pub removed: Vec<String>,
+    /// The database as it is now.
     pub database: Database,
 }
 

@@ -16,8 +16,11 @@ use crate::history::time_gaps;
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
+    /// Group of the case.
     pub group: String,
+    /// Name of the case.
     pub case: String,
+    /// Kind of finding, such as `altered` or `time_gap`.
     pub code: &'static str,
     /// Path of the dataset in the case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -25,13 +28,16 @@ pub struct Finding {
     /// Index of the value in it, counted from 0 as HDF5's tools do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub index: Option<usize>,
+    /// What was found, in words.
     pub message: String,
 }
 
 /// What a check has found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checked {
+    /// Number of cases.
     pub cases: usize,
+    /// What was found, in the order of the file.
     pub findings: Vec<Finding>,
 }
 

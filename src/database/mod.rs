@@ -28,34 +28,106 @@ pub struct Database {
 /// Why a database cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
+    /// It cannot be read.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is no HDF5 file.
     #[error("{path}: {detail}: give a database made by crumple build")]
-    NotHdf5 { path: PathBuf, detail: String },
+    NotHdf5 {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, in words.
+        detail: String,
+    },
+    /// It is an HDF5 file of something else.
     #[error("{path}: this HDF5 file is no curve database (its root has no attribute format = \"{expected}\"): give one made by crumple build", expected = layout::FORMAT)]
-    NotOurs { path: PathBuf },
+    NotOurs {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It has another layout.
     #[error("{path}: its layout has version {found}, this program reads version {known}: build the database anew with crumple build", known = layout::VERSION)]
-    Version { path: PathBuf, found: i64 },
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// The version that was found.
+        found: i64,
+    },
+    /// What it holds is not what it should.
     #[error("{path}: {place}: {detail}")]
-    Damaged { path: PathBuf, place: String, detail: String },
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Group, case and dataset.
+        place: String,
+        /// What is wrong, in the words of the library.
+        detail: String,
+    },
+    /// There is no such group.
     #[error("{path}: there is no group \"{group}\": it has {known}")]
-    NoGroup { path: PathBuf, group: String, known: String },
+    NoGroup {
+        /// The file.
+        path: PathBuf,
+        /// The group.
+        group: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// There is no such case.
     #[error("{path}: group \"{group}\" has no case \"{case}\": it has {known}")]
-    NoCase { path: PathBuf, group: String, case: String, known: String },
+    NoCase {
+        /// The file.
+        path: PathBuf,
+        /// The group.
+        group: String,
+        /// The case.
+        case: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// The name is taken by another study.
+    /// Writing would lose what others have put into it.
     #[error(
         "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": if the study was renamed, build into a new database; else name this run or group differently"
     )]
-    OtherStudy { group: String, name: String, other: String },
+    OtherStudy {
+        /// The group.
+        group: String,
+        /// Name of the case.
+        name: String,
+        /// The study that has the name.
+        other: String,
+    },
+    /// A group has to be named.
     #[error("{path} has several groups: choose one with --group: {known}")]
-    WhichGroup { path: PathBuf, known: String },
+    WhichGroup {
+        /// The file.
+        path: PathBuf,
+        /// What there is instead.
+        known: String,
+    },
+    /// There is nothing in it.
     #[error("{path} has no groups: build a study into it")]
-    Empty { path: PathBuf },
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     #[error(
         "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
     )]
     WouldDrop { path: PathBuf, what: String },
+    /// HDF5 cannot hold it.
     #[error("cannot encode the database: {detail}")]
-    Encode { detail: String },
+    Encode {
+        /// What is wrong, in the words of the library.
+        detail: String,
+    },
+    /// It cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }

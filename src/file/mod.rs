@@ -14,6 +14,7 @@ pub use write::{WriteError, write_all_whole, write_at, write_by_path, write_whol
 /// What can be read at a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// It has a size, and can be read again.
     File,
     /// A named pipe or the output of another program: it can be read once and has no size.
     Pipe,

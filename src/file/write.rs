@@ -11,9 +11,11 @@ use super::lock::{is_at, lock};
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}{}", if *.is_old_kept { "; what was there before is unchanged" } else { "" })]
 pub struct WriteError {
+    /// The file.
     pub path: PathBuf,
     /// Whether there was anything before.
     is_old_kept: bool,
+    /// Why not.
     #[source]
     pub source: io::Error,
 }

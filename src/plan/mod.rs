@@ -22,6 +22,7 @@ pub const MAX_ITEMS: u64 = 1_000_000_000_000;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
+    /// What is varied.
     pub sweep: Plan,
 }
 
@@ -38,10 +39,12 @@ pub struct Plan {
     pub seed: u64,
     /// Draws at each point of the grid; needed as soon as one variable has a distribution.
     pub samples: Option<u64>,
+    /// How distributions are drawn.
     #[serde(default)]
     pub sampling: Sampling,
     /// Results to keep; all if absent.
     pub results: Option<Vec<ResultName>>,
+    /// What is varied, in the order of the columns.
     pub vary: Vec<Vary>,
 }
 
@@ -63,14 +66,19 @@ pub enum Sampling {
 pub enum ResultName {
     /// Of each interface.
     PeakForce,
+    /// Of each interface.
     MaxDeflection,
+    /// Of each interface.
     MaxDeflectionTime,
+    /// Of each interface.
     Restitution,
     /// Of each body.
     FinalSpeed,
+    /// Of each body.
     MeanDeceleration,
     /// Of the run.
     EnergyError,
+    /// Of the run.
     MomentumError,
 }
 
@@ -90,6 +98,7 @@ pub const RESULTS: [ResultName; 8] = [
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
+    /// What is varied.
     pub what: What,
     /// Of a speed: the train.
     pub train: Option<String>,
@@ -115,6 +124,7 @@ pub struct Vary {
     pub to: Option<Entry>,
     /// Number of even values, both ends among them.
     pub steps: Option<u64>,
+    /// How values are drawn, if they are.
     pub distribution: Option<DistributionName>,
     /// Of the quantity itself, also of a lognormal one, before it is truncated.
     pub mean: Option<Entry>,
@@ -148,6 +158,7 @@ pub enum What {
 }
 
 impl What {
+    /// Its name in a plan.
     pub fn name(self) -> &'static str {
         match self {
             Self::Speed => "speed",
@@ -164,7 +175,9 @@ impl What {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
 pub enum Vehicles {
+    /// By name.
     List(Vec<String>),
+    /// `all`.
     Word(String),
 }
 
@@ -225,15 +238,20 @@ impl JsonSchema for Entry {
 /// The values of one variable, in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spread {
+    /// These.
     List(Vec<f64>),
     /// Names, of which an item has one by its index.
     Names(Vec<String>),
     /// `steps` even values from `from` to `to`.
     Even {
+        /// First value.
         from: f64,
+        /// Last value.
         to: f64,
+        /// Number of values, 2 or more.
         steps: u64,
     },
+    /// Drawn anew for each item.
     Drawn(Distribution),
 }
 
@@ -295,10 +313,12 @@ impl Plan {
 }
 
 impl Design {
+    /// Number of items.
     pub fn items(&self) -> u64 {
         self.items
     }
 
+    /// The values of each variable.
     pub fn spreads(&self) -> &[Spread] {
         &self.spreads
     }

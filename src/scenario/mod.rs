@@ -26,12 +26,15 @@ use crate::surrogate::predict::PredictError;
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
 pub struct Prepared {
+    /// Bodies and interfaces.
     pub chain: Chain,
+    /// Times and method of the run.
     pub settings: RunSettings,
     /// Bodies as the scenario lists them: indices into the chain, first train first.
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
     pub used: Vec<Used>,
+    /// Limits that results are held against.
     pub limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
     pub limited: Vec<usize>,
@@ -53,6 +56,7 @@ pub struct Used {
 /// Why a scenario cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
+    /// It is no TOML, or has other keys.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
     /// It is wrong as a whole.
@@ -79,20 +83,42 @@ pub enum ScenarioError {
         /// Which curve, and why not.
         source: AssemblyError,
     },
+    /// A model file cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A model gives no curve.
     #[error("curve \"{curve}\": {source}")]
-    Predict { curve: String, source: PredictError },
+    Predict {
+        /// Name of the curve.
+        curve: String,
+        /// Why.
+        source: PredictError,
+    },
+    /// A database cannot be used.
     #[error(transparent)]
     Database(#[from] DatabaseError),
+    /// A predicted curve cannot be used.
     #[error(transparent)]
     CurveFile(#[from] json::CurveFileError),
+    /// A table of a curve cannot be used.
     #[error(transparent)]
     Csv(#[from] csv::CsvError),
+    /// Its bodies make no chain.
     #[error("{path}: {source}")]
-    Chain { path: PathBuf, source: ChainError },
+    Chain {
+        /// The scenario.
+        path: PathBuf,
+        /// Why.
+        source: ChainError,
+    },
+    /// The run that looks for the speeds of the interfaces failed.
     #[error("{path}: while the interfaces' speeds were sought: {source}")]
-    Local { path: PathBuf, source: SimulationError },
+    Local {
+        /// The scenario.
+        path: PathBuf,
+        /// Why.
+        source: SimulationError,
+    },
 }
 
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.

@@ -52,10 +52,12 @@ impl Shard {
         (1 <= index && index <= count).then_some(Self { index, count })
     }
 
+    /// Which block, counted from 1.
     pub fn index(self) -> u64 {
         self.index
     }
 
+    /// How many blocks there are.
     pub fn count(self) -> u64 {
         self.count
     }
@@ -71,28 +73,66 @@ impl Shard {
 /// Why a sweep was not run, not written or not merged.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
+    /// A TOML file is wrong.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// The scenario is wrong, or a file it names.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// Nobody says what is varied.
     #[error("{path}: there is no [sweep]: add one, or give it in another file with --plan")]
-    NoPlan { path: PathBuf },
+    NoPlan {
+        /// The scenario, or the file of `--plan`.
+        path: PathBuf,
+    },
+    /// The plan does not go with the scenario.
     #[error("{path}: {source}")]
-    Plan { path: PathBuf, source: BindError },
+    Plan {
+        /// The file with the plan.
+        path: PathBuf,
+        /// Why.
+        source: BindError,
+    },
+    /// A file cannot be read.
     #[error("{path}: {source}")]
-    Read { path: PathBuf, source: io::Error },
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// HDF5 cannot be written or read.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// Another process writes the output.
     #[error(transparent)]
     Lock(#[from] LockError),
+    /// What is there is of another sweep.
     #[error("{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it")]
-    Changed { path: PathBuf, differs: String },
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// What is not the same.
+        differs: String,
+    },
+    /// What is there is of nobody we know.
     #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
-    Foreign { path: PathBuf },
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Rows are missing or not whole.
     #[error("{path}: {message}")]
-    Damaged { path: PathBuf, message: String },
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// The files are not the shards of one sweep.
     #[error(transparent)]
     Merge(#[from] MergeError),
 }
@@ -102,6 +142,7 @@ pub enum SweepError {
 pub struct Report {
     /// Items of the whole sweep.
     pub items: u64,
+    /// Which part of them was to be run.
     pub shard: Shard,
     /// Rows of this shard.
     pub rows: u64,
@@ -109,10 +150,13 @@ pub struct Report {
     pub resumed: u64,
     /// Rows there are now: fewer than `rows` if the run was stopped.
     pub done: u64,
+    /// Rows without a result.
     pub failed: u64,
+    /// Rows with a warning.
     pub warned: u64,
     /// The first few messages of rows that failed, by item.
     pub messages: Vec<(u64, String)>,
+    /// Statistics of the columns of numbers.
     pub columns: Vec<ColumnStatistics>,
 }
 

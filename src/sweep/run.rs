@@ -17,6 +17,7 @@ use crate::scenario::{self, Prepared, Scenario};
 pub enum Chunk {
     /// As many as take this long.
     Time(Duration),
+    /// So many.
     Items(u64),
 }
 
