@@ -4,7 +4,7 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use crumple::sweep::{Settings, Sweep, write_rows};
+use crumple::sweep::{Sweep, WriteOptions, write_rows};
 use divan::counter::ItemsCount;
 
 const ITEMS: u32 = 4000;
@@ -56,6 +56,6 @@ fn rows(bencher: divan::Bencher<'_, '_>, what: &str) {
         let go_on = |_| ControlFlow::Continue(());
         let mut sink = std::io::sink();
         let name = Path::new("sink");
-        write_rows(&sweep, &mut sink, name, &Settings::default(), go_on).expect("rows").failed
+        write_rows(&sweep, &mut sink, name, &WriteOptions::default(), go_on).expect("rows").failed
     });
 }

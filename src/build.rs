@@ -1,31 +1,43 @@
 //! Building a database: every run of a study becomes a case; unchanged runs are kept.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use crate::curve::Case;
-use crate::database::{Database, DatabaseError, LockError, WriterLock};
+use crate::database::{Database, DatabaseError};
+use crate::file::{LockError, WriterLock};
 use crate::manifest::ManifestError;
 use crate::study::{self, RunError, Study};
 
 /// Why nothing could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
+    /// The manifest is wrong.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// The database is not ours, or damaged.
     #[error(transparent)]
     Database(#[from] DatabaseError),
+    /// Another process writes the database.
     #[error(transparent)]
     Lock(#[from] LockError),
+    /// No run is usable.
     #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
-    NoRun { path: PathBuf, reasons: String },
+    NoRun {
+        /// The manifest.
+        path: PathBuf,
+        /// A line for each run.
+        reasons: String,
+    },
 }
 
 /// Why a run could not be used, and what is wrong with its files, which may be the cause.
 #[derive(Debug, thiserror::Error)]
 #[error("{reason}{}", listed(.problems))]
 pub struct RunFailure {
+    /// Why the run is not usable.
     #[source]
     pub reason: RunError,
     /// As `crumple inspect` finds them.
@@ -55,17 +67,24 @@ pub enum RunOutcome {
     /// Unchanged since it was built.
     Kept,
     /// Not usable, with the reason; an earlier build of it stays in the database.
-    Failed { reason: RunFailure, earlier_kept: bool },
+    Failed {
+        /// Why, with the damage of its files.
+        reason: RunFailure,
+        /// Whether the database has the run from an earlier build.
+        earlier_kept: bool,
+    },
 }
 
 /// What a build did.
 #[derive(Debug)]
 pub struct BuildReport {
+    /// Group of the study.
     pub group: String,
     /// Name and end of every run, in the order of the manifest.
     pub runs: Vec<(String, RunOutcome)>,
     /// Cases that the study no longer has.
     pub removed: Vec<String>,
+    /// The database as it is now.
     pub database: Database,
 }
 
@@ -89,16 +108,22 @@ pub fn build(
         true => Database::read(path)?,
         false => Database::default(),
     };
+    let before: HashMap<&str, &Case> =
+        database.cases(study.group()).iter().map(|case| (case.name.as_str(), case)).collect();
     let results: Vec<(String, Result<Option<Case>, RunFailure>)> = study
         .runs()
         .par_iter()
         .map(|entry| {
             let name = entry.case_name();
-            let result = case(&study, entry, &database);
+            // A case that somebody has changed since is made anew.
+            let is_altered = database.is_altered(study.group(), &name);
+            let before = before.get(name.as_str()).filter(|_| !is_altered);
+            let result = case(&study, entry, before.map(|case| case.fingerprint.as_str()));
             progress(&name);
             (name, result)
         })
         .collect();
+    let before: HashSet<String> = before.into_keys().map(String::from).collect();
     if results.iter().all(|(_, r)| r.is_err()) {
         let reasons: Vec<String> = results
             .iter()
@@ -106,23 +131,25 @@ pub fn build(
             .collect();
         return Err(BuildError::NoRun { path: manifest.into(), reasons: reasons.join("\n") });
     }
-    let mut runs = Vec::new();
+    let (mut runs, mut built) = (Vec::new(), Vec::new());
     for (name, result) in results {
         let outcome = match result {
             Ok(Some(case)) => {
-                database.put(case)?;
+                built.push(case);
                 RunOutcome::Built
             }
             Ok(None) => RunOutcome::Kept,
             Err(reason) => {
-                let earlier_kept = database.cases(study.group()).iter().any(|c| c.name == name);
+                let earlier_kept = before.contains(&name);
                 RunOutcome::Failed { reason, earlier_kept }
             }
         };
         runs.push((name, outcome));
     }
+    database.put_all(built)?;
+    let names: HashSet<&str> = runs.iter().map(|(name, _)| name.as_str()).collect();
     let removed = database.retain(study.group(), |case| {
-        case.study != study.name() || runs.iter().any(|(name, _)| *name == case.name)
+        case.study != study.name() || names.contains(case.name.as_str())
     });
     let changed = !removed.is_empty() || runs.iter().any(|(_, o)| matches!(o, RunOutcome::Built));
     if changed || !path.is_file() {
@@ -131,22 +158,15 @@ pub fn build(
     Ok(BuildReport { group: study.group().into(), runs, removed, database })
 }
 
-/// The run's case, or `None` if the database already has it.
+/// The run's case, or `None` if its fingerprint is the one it had before.
 fn case(
     study: &Study,
     entry: &study::RunEntry,
-    database: &Database,
+    before: Option<&str>,
 ) -> Result<Option<Case>, RunFailure> {
     let located =
         study.locate(entry).map_err(|reason| RunFailure { reason, problems: Vec::new() })?;
-    let name = entry.case_name();
-    let kept = database
-        .cases(study.group())
-        .iter()
-        .any(|c| c.name == name && c.fingerprint == located.fingerprint)
-        // A case that somebody has changed since is made anew.
-        && !database.is_altered(study.group(), &name);
-    if kept {
+    if before == Some(&*located.fingerprint) {
         return Ok(None);
     }
     let failure = |reason| RunFailure { reason, problems: located.problems() };

@@ -39,6 +39,10 @@ pub mod manifest;
 
 pub mod study;
 
+pub mod hdf5;
+
+pub mod history_hdf5;
+
 pub mod database;
 
 pub mod build;

@@ -234,7 +234,6 @@ fn db_check_finds_nothing_in_what_was_just_built() {
         let folder = tempfile::tempdir().unwrap();
         build_fixture(folder.path(), group);
         let document = json(&crumple_ok(folder.path(), &["db", "check", "curves.h5", "--json"]));
-        assert_eq!(document["without_hashes"], 0);
         for finding in document["findings"].as_array().unwrap() {
             let code = finding["code"].as_str().unwrap();
             assert!(["extraction", "energy_mismatch"].contains(&code), "{finding}");
@@ -392,32 +391,57 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
     );
 }
 
-/// Databases of earlier programs have no hashes: they are read, and it is said.
+/// There is one layout: what is of another is not guessed at.
 #[test]
-fn a_database_without_hashes_is_read_and_said() {
+fn other_layouts_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), WALL);
-    let before = crumple::database::Database::read(&path).unwrap();
     edited(&path, |file| {
-        let group = file.group(WALL).unwrap();
-        for case in group.groups().unwrap() {
-            group.group(&case).unwrap().remove_attr("hashes").unwrap();
-        }
+        let case = file.group("lead-car-wall/36kmh").unwrap();
+        case.remove_attr("hashes").unwrap();
     });
-    assert!(crumple::database::Database::read(&path).unwrap() == before);
-    let text = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
-    let cases = before.cases(WALL).len();
-    assert!(text.contains(&format!("note: {cases} of {cases} cases have no hashes")), "{text}");
-    // What follows from the curves is found all the same.
+    let error = crumple_fails(folder.path(), 1, &["db", "ls", "curves.h5"]);
+    let expected = "lead-car-wall/36kmh: attribute hashes is missing or no text";
+    assert!(error.contains(expected), "{error}");
+    assert!(findings(folder.path()).iter().any(|f| f["code"] == "damaged"));
+    for version in [1, 3] {
+        edited(&path, |file| {
+            file.root().set_attr("layout_version", AttrValue::I64(version)).unwrap();
+        });
+        let error = crumple_fails(folder.path(), 1, &["db", "ls", "curves.h5"]);
+        let expected = format!(
+            "curves.h5: its layout has version {version}, this program reads version 2: build the database anew"
+        );
+        assert!(error.contains(&expected), "{error}");
+    }
+}
+
+/// One case is read by itself: damage of another is no hindrance.
+#[test]
+fn a_case_is_shown_without_reading_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = build_fixture(folder.path(), WALL);
+    let show = |extra: &[&str]| {
+        let arguments = [&["db", "show", "curves.h5", "--json", "--case", "36kmh"], extra].concat();
+        crumple_ok(folder.path(), &arguments)
+    };
+    let before = show(&[]);
+    assert!(show(&["--group", WALL]) == before);
     edited(&path, |file| {
-        let mut force = file.dataset("lead-car-wall/36kmh/original/force_N").unwrap();
-        let mut values = force.read_f64().unwrap();
-        values[40] = 1e300;
-        force.write(&values).unwrap();
+        file.group("lead-car-wall/48kmh").unwrap().remove_attr("recipe").unwrap();
     });
-    let found = findings(folder.path());
-    assert!(found.iter().any(|f| f["code"] == "audit_differs"), "{found:?}");
-    assert!(found.iter().any(|f| f["code"] == "sampled_differs"), "{found:?}");
+    assert!(show(&[]) == before);
+    let fails = |arguments: &[&str], expected: &str| {
+        let error =
+            crumple_fails(folder.path(), 1, &[&["db", "show", "curves.h5"], arguments].concat());
+        assert!(error.contains(expected), "{error}");
+    };
+    fails(&["--case", "48kmh"], "48kmh: attribute recipe is missing");
+    fs::remove_file(&path).unwrap();
+    build_fixture(folder.path(), WALL);
+    fails(&["--case", "1kmh"], "group \"lead-car-wall\" has no case \"1kmh\": it has 12kmh");
+    fails(&["--group", "a/b", "--case", "36kmh"], "there is no group \"a/b\"");
+    fails(&["--case", "36kmh/original"], "has no case \"36kmh/original\"");
 }
 
 /// Damage is not made good by writing it again; the study's own runs are read anew.

@@ -718,7 +718,7 @@ fn histories_of_many_interfaces_as_hdf5() {
     let mut odd = file.histories[0].clone();
     odd.component = "a/b".into();
     file.histories.push(odd);
-    let bytes = crumple::database::histories_to_hdf5(&file).unwrap();
+    let bytes = crumple::history_hdf5::encode(&file).unwrap();
     let hdf5 = hdf5_pure::File::from_bytes(bytes).unwrap();
     assert_eq!(hdf5.dataset("x_force").unwrap().shape().unwrap(), [1, 8001]);
     let ids = hdf5.dataset("ids/x_force").unwrap().read_i64().unwrap();

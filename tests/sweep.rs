@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::common::{crumple_fails, crumple_in, crumple_ok, python, root};
-use crumple::sweep::{Chunk, Settings, Shard, Sweep, SweepError, merge, write};
+use crumple::sweep::{Chunk, Shard, Sweep, SweepError, WriteOptions, merge, write};
 use serde_json::Value;
 
 /// Two trains with two cars each; short, with long steps.
@@ -85,8 +85,8 @@ impl Folder {
         Sweep::load(&self.path().join("s.toml"), None).unwrap()
     }
 
-    fn write(&self, sweep: &Sweep, name: &str, settings: &Settings) -> Result<u64, SweepError> {
-        write(sweep, &self.path().join(name), settings, |_| ControlFlow::Continue(()))
+    fn write(&self, sweep: &Sweep, name: &str, options: &WriteOptions) -> Result<u64, SweepError> {
+        write(sweep, &self.path().join(name), options, |_| ControlFlow::Continue(()))
             .map(|report| report.resumed)
     }
 }
@@ -330,29 +330,24 @@ fn the_same_bytes_for_any_threads_pieces_and_shards() {
         let sweep = folder.load();
         for items in [1, 3, 1000] {
             let name = format!("by{items}.csv");
-            let settings = Settings { chunk: Chunk::Items(items), ..Settings::default() };
-            folder.write(&sweep, &name, &settings).unwrap();
+            let options = WriteOptions { chunk: Chunk::Items(items), ..WriteOptions::default() };
+            folder.write(&sweep, &name, &options).unwrap();
             assert!(folder.read(&name) == whole, "in pieces of {items}");
         }
         for count in [1, 2, 3, 7, 100] {
-            for extension in ["csv", "h5"] {
-                let mut parts = Vec::new();
-                for index in 1..=count {
-                    let name = format!("{index}of{count}.{extension}");
-                    let shard = Shard::new(index, count).unwrap();
-                    let settings = Settings { shard, ..Settings::default() };
-                    folder.write(&sweep, &name, &settings).unwrap();
-                    parts.push(folder.path().join(name));
-                }
-                parts.rotate_left(count as usize / 2);
-                let merged = folder.path().join(format!("merged{count}.{extension}"));
-                let report = merge(&parts, &merged).unwrap();
-                assert_eq!(report.done, sweep.items());
-                let expected = if extension == "csv" { &whole } else { &whole_h5 };
-                assert!(fs::read(&merged).unwrap() == *expected, "{count} shards of {extension}");
+            let mut parts = Vec::new();
+            for index in 1..=count {
+                let name = format!("{index}of{count}.csv");
+                let shard = Shard::new(index, count).unwrap();
+                let options = WriteOptions { shard, ..WriteOptions::default() };
+                folder.write(&sweep, &name, &options).unwrap();
+                parts.push(folder.path().join(name));
             }
-            let parts: Vec<_> =
-                (1..=count).map(|i| folder.path().join(format!("{i}of{count}.csv"))).collect();
+            parts.rotate_left(count as usize / 2);
+            let merged = folder.path().join(format!("merged{count}.csv"));
+            let report = merge(&parts, &merged).unwrap();
+            assert_eq!(report.done, sweep.items());
+            assert!(fs::read(&merged).unwrap() == whole, "{count} shards");
             let merged = folder.path().join("converted.h5");
             merge(&parts, &merged).unwrap();
             assert!(fs::read(&merged).unwrap() == whole_h5);
@@ -381,9 +376,9 @@ fn large_hdf5_holds_what_csv_holds() {
     compare_with_csv(&folder, python);
     assert!(!folder.text("out.csv").contains("warning"), "no row has a message");
     for k in 1..=2 {
-        folder.ok(&format!("sweep s.toml -q --shard {k}/2 -o p{k}.h5"));
+        folder.ok(&format!("sweep s.toml -q --shard {k}/2 -o p{k}.csv"));
     }
-    folder.ok("sweep merge -q -o all.h5 p1.h5 p2.h5");
+    folder.ok("sweep merge -q -o all.h5 p1.csv p2.csv");
     folder.ok("sweep merge -q -o converted.h5 out.csv");
     let whole = folder.read("out.h5");
     assert!(whole.len() > 1 << 20);
@@ -566,13 +561,13 @@ fn what_a_kill_left_of_the_last_form_is_cleared() {
 fn a_torn_end_is_cut() {
     let folder = Folder::new(GRID);
     let sweep = folder.load();
-    let settings = Settings::default();
-    folder.write(&sweep, "whole.csv", &settings).unwrap();
+    let options = WriteOptions::default();
+    folder.write(&sweep, "whole.csv", &options).unwrap();
     let whole = folder.read("whole.csv");
     let part = folder.path().join("out.csv.part");
     let go_on = |left: &[u8]| {
         fs::write(&part, left).unwrap();
-        let resumed = folder.write(&sweep, "out.csv", &settings).unwrap();
+        let resumed = folder.write(&sweep, "out.csv", &options).unwrap();
         assert!(folder.read("out.csv") == whole, "after {} bytes", left.len());
         assert!(!part.exists());
         fs::remove_file(folder.path().join("out.csv")).unwrap();
@@ -605,7 +600,8 @@ fn another_sweeps_file_is_not_taken_up() {
     let folder = Folder::new(GRID);
     let sweep = folder.load();
     let stop = |_| ControlFlow::Break(());
-    let report = write(&sweep, &folder.path().join("out.csv"), &Settings::default(), stop).unwrap();
+    let report =
+        write(&sweep, &folder.path().join("out.csv"), &WriteOptions::default(), stop).unwrap();
     assert!(!report.is_complete());
     let begun = folder.read("out.csv.part");
     let text = folder.text("s.toml");
@@ -678,7 +674,7 @@ fn a_second_writer_is_told() {
     let folder = Folder::new(GRID);
     let sweep = folder.load();
     let out = folder.path().join("out.csv");
-    write(&sweep, &out, &Settings::default(), |_| {
+    write(&sweep, &out, &WriteOptions::default(), |_| {
         let error = folder.fails(1, "sweep s.toml -q -o out.csv");
         assert!(error.contains("out.csv is being written by another process"), "{error}");
         ControlFlow::Continue(())
@@ -720,42 +716,40 @@ fn an_interrupt_ends_behind_the_rows_that_are_done() {
 #[test]
 fn only_all_shards_of_one_sweep_are_merged() {
     let folder = Folder::new(GRID);
-    for extension in ["csv", "h5"] {
-        for shard in 1..=3 {
-            folder.ok(&format!("sweep s.toml -q --shard {shard}/3 -o p{shard}.{extension}"));
-        }
+    for shard in 1..=3 {
+        folder.ok(&format!("sweep s.toml -q --shard {shard}/3 -o p{shard}.csv"));
+    }
+    for output in ["all.csv", "all.h5"] {
         let fails = |parts: &str, expected: &str| {
-            let parts = parts.replace('*', extension);
-            let error = folder.fails(1, &format!("sweep merge -o all.{extension} {parts}"));
+            let parts = parts.replace('*', "csv");
+            let error = folder.fails(1, &format!("sweep merge -o {output} {parts}"));
             assert!(error.contains(expected), "{parts}: {error}");
             assert!(!folder.names().iter().any(|n| n.starts_with("all.")), "nothing is written");
         };
         fails("p1.* p3.*", "of 3 shards 2 are given: missing 2");
         fails("p2.*", "of 3 shards 1 is given: missing 1, 3");
         fails("p1.* p2.* p1.* p3.*", "are both shard 1: give each once");
-        folder.ok(&format!("sweep s.toml -q --shard 2/2 -o half.{extension}"));
+        folder.ok("sweep s.toml -q --restart --shard 2/2 -o half.csv");
         fails("p1.* half.*", "is one of 2 shards, ");
         let old = folder.text("s.toml");
         folder.put("s.toml", &old.replace("\"30t\"", "\"31t\""));
-        folder.ok(&format!("sweep s.toml -q --shard 3/3 -o foreign.{extension}"));
+        folder.ok("sweep s.toml -q --restart --shard 3/3 -o foreign.csv");
         folder.put("s.toml", &old);
         fails("p1.* p2.* foreign.*", "are of different sweeps");
-        let whole = folder.read(&format!("p2.{extension}"));
-        let cut = format!("cut.{extension}");
-        fs::write(folder.path().join(&cut), &whole[..whole.len() - 700]).unwrap();
-        fails("p1.* cut.* p3.*", &cut);
-        fs::write(folder.path().join(&cut), &whole[..8]).unwrap();
-        fails("p1.* cut.* p3.*", &cut);
+        let whole = folder.read("p2.csv");
+        fs::write(folder.path().join("cut.csv"), &whole[..whole.len() - 700]).unwrap();
+        fails("p1.* cut.* p3.*", "cut.csv");
+        fs::write(folder.path().join("cut.csv"), &whole[..8]).unwrap();
+        fails("p1.* cut.* p3.*", "cut.csv");
         folder.put("s.csv", "d_m,force_N\n0,0\n1,1\n");
         fails("s.csv", "s.csv is no result of crumple sweep");
         folder.put("empty.csv", "");
         fails("empty.csv", "empty.csv is no result of crumple sweep");
         fails("no.csv", "no.csv: No such file");
     }
-    let error = folder.fails(1, "sweep merge -o all.csv p1.csv p2.h5 p3.csv");
-    assert!(error.contains("p1.csv is CSV, p2.h5 is HDF5: merge files of one kind"), "{error}");
-    let error = folder.fails(1, "sweep merge -o all.csv p1.h5 p2.h5 p3.h5");
-    assert!(error.contains("name all.csv .h5 or .hdf5"), "{error}");
+    folder.ok("sweep s.toml -q -o finished.h5");
+    let error = folder.fails(1, "sweep merge -o all.csv p1.csv finished.h5 p3.csv");
+    assert!(error.contains("finished.h5 is HDF5: merge the shards as .csv"), "{error}");
     let error = folder.fails(2, "sweep merge -o p1.csv p1.csv p2.csv p3.csv");
     assert!(error.contains("names the input itself"), "{error}");
     // Rows that end early, named by the first that is missing; those of a run that goes on, too.
@@ -914,6 +908,7 @@ fn wrong_plans_are_named_by_file_and_key() {
         ("sweep s.toml", "--output"),
         ("sweep", "SCENARIO"),
         ("sweep s.toml -o out.xyz", "-o out.xyz: results are written as .csv, .h5 or .hdf5"),
+        ("sweep s.toml --shard 1/3 -o a.h5", "-o a.h5: a shard is written as .csv, which merge"),
         ("sweep s.toml --shard 0/3 -o a.csv", "\"0/3\" is no shard: write for example 2/3"),
         ("sweep s.toml --shard 4/3 -o a.csv", "\"4/3\" is no shard"),
         ("sweep s.toml --json -o -", "both write to standard output"),

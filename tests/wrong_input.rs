@@ -461,7 +461,7 @@ fn a_second_writer_is_told_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), "lead-car-wall");
     let before = fs::read(&path).unwrap();
-    let lock = crumple::database::WriterLock::take(&path).unwrap();
+    let lock = crumple::file::WriterLock::take(&path).unwrap();
     let study = fixture("fe/lead-car-pair/study.toml");
     let error =
         crumple_fails(folder.path(), 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);

@@ -331,7 +331,8 @@ fn row(
     time_s: &[f64],
 ) -> Result<TrainRow, CompareError> {
     let start = Instant::now();
-    let prepared = scenario::assemble(path, &method.scenario, &method.sources)?;
+    let scenario = scenario::check(path, &method.scenario)?;
+    let prepared = scenario::assemble(path, &scenario, &method.sources)?;
     let run = simulate(&prepared.chain, &prepared.settings)?;
     let simulation_time_s = start.elapsed().as_secs_f64();
     let bodies = prepared.chain.bodies();

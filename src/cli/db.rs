@@ -167,19 +167,16 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     match &args.command {
         Command::Ls { database } => ls(&Database::read(database)?, manners),
         Command::Show { database: path, group, case } => {
-            let database = Database::read(path)?;
-            let groups: Vec<&str> = match (group, case) {
-                (None, None) => database.groups().collect(),
-                (group, _) => vec![database.group_or_only(path, group.as_deref())?.0],
-            };
-            let mut shown = BTreeMap::new();
-            for group in groups {
-                let cases: Vec<&Case> = match case {
-                    Some(name) => vec![database.case(path, group, name)?],
-                    None => database.group(path, group)?.iter().collect(),
-                };
-                shown.insert(group.to_string(), cases);
+            if let Some(name) = case {
+                let case = Database::read_case(path, group.as_deref(), name)?;
+                return show(&BTreeMap::from([(case.group.clone(), &[case][..])]), manners);
             }
+            let database = Database::read(path)?;
+            let groups: Vec<&str> = match group {
+                None => database.groups().collect(),
+                Some(group) => vec![database.group_or_only(path, Some(group))?.0],
+            };
+            let shown = groups.into_iter().map(|g| (g.to_string(), database.cases(g))).collect();
             show(&shown, manners)
         }
         Command::Check { database } => check(database, manners),
@@ -219,12 +216,12 @@ fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result
     writeln!(out)
 }
 
-fn show(shown: &BTreeMap<String, Vec<&Case>>, manners: Manners) -> CommandResult {
+fn show(shown: &BTreeMap<String, &[Case]>, manners: Manners) -> CommandResult {
     if manners.json {
         let groups = shown
             .iter()
             .map(|(group, cases)| {
-                let cases: Result<Vec<_>, Failure> = cases.iter().map(|c| full(c)).collect();
+                let cases: Result<Vec<_>, Failure> = cases.iter().map(full).collect();
                 Ok((group.clone(), cases?))
             })
             .collect::<Result<_, Failure>>()?;
@@ -233,7 +230,7 @@ fn show(shown: &BTreeMap<String, Vec<&Case>>, manners: Manners) -> CommandResult
     }
     output::print(|out| {
         for (group, cases) in shown {
-            for case in cases {
+            for case in *cases {
                 print_case(out, group, case)?;
             }
         }
@@ -294,19 +291,13 @@ fn print_case(out: &mut dyn Write, group: &str, case: &Case) -> io::Result<()> {
 
 fn check(path: &Path, manners: Manners) -> CommandResult {
     let checked = check::check(path)?;
-    let Checked { cases, without_hashes, findings } = &checked;
+    let Checked { cases, findings } = &checked;
     if manners.json {
         output::print_json(&checked)?;
     } else {
         output::print(|out| {
             for f in findings {
                 writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
-            }
-            if *without_hashes > 0 {
-                writeln!(
-                    out,
-                    "note: {without_hashes} of {cases} cases have no hashes, as an earlier crumple wrote them, so not every change of a value can be found: build them again into a new database"
-                )?;
             }
             writeln!(out, "{cases} cases checked, {} findings", findings.len())
         })?;

@@ -56,7 +56,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     if let Some(output) = output {
         solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
-        if !args.force && crumple::database::is_other_hdf5(output) {
+        if !args.force && crumple::history_hdf5::is_other_hdf5(output) {
             return Err(Failure::Usage(format!(
                 "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
                 output.display()
@@ -69,7 +69,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let format = args.format.as_deref();
     let bar = Bar::new(manners, "reading");
     let read = match straight {
-        Some(path) => crumple::database::convert_histories(&args.file, format, &selection, path)
+        Some(path) => crumple::history_hdf5::convert(&args.file, format, &selection, path)
             .map_err(Failure::from),
         None => solver::read(&args.file, format, &selection).map_err(Failure::from),
     };
@@ -127,7 +127,7 @@ fn write(path: &Path, target: Target, file: &SolverFile) -> Result<(), Failure> 
             write_csv(&mut csv, file)?;
             csv
         }
-        Target::Hdf5 => crumple::database::histories_to_hdf5(file)?,
+        Target::Hdf5 => crumple::history_hdf5::encode(file)?,
     };
     Ok(write_whole(path, &bytes)?)
 }

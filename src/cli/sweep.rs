@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crumple::sweep::{
-    self, ColumnStatistics, Report, Settings, Shard, Sweep, SweepError, VariableSummary,
+    self, ColumnStatistics, Report, Shard, Sweep, SweepError, VariableSummary, WriteOptions,
 };
 use serde::Serialize;
 
@@ -61,9 +61,9 @@ enum Command {
     /// Join the files of all shards of a sweep, given in any order
     #[command(after_help = "Examples:
   crumple sweep merge -o results.csv part*.csv
-  crumple sweep merge -o results.h5 part*.h5")]
+  crumple sweep merge -o results.h5 part*.csv")]
     Merge {
-        /// Files of all shards
+        /// Files of all shards (.csv)
         #[arg(required = true)]
         shards: Vec<PathBuf>,
         /// Where to write: .csv, .h5 or .hdf5
@@ -98,6 +98,12 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             keep_input(plan, output)?;
         }
         check_output(output)?;
+        if args.shard.is_some_and(|shard| shard != Shard::WHOLE) && is_hdf5(output) {
+            return Err(Failure::Usage(format!(
+                "-o {}: a shard is written as .csv, which merge joins and writes as .csv, .h5 or .hdf5",
+                output.display()
+            )));
+        }
         if is_stdout(output) && manners.json {
             let message = "-o - and --json both write to standard output: give one of them";
             return Err(Failure::Usage(message.into()));
@@ -113,8 +119,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         Some(output) if !args.dry_run => output,
         _ => return dry_run(&sweep, shard, manners),
     };
-    let settings = Settings { shard, restart: args.restart, ..Settings::default() };
-    let report = write(&sweep, output, &settings, manners)?;
+    let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
+    let report = write(&sweep, output, &options, manners)?;
     if !report.is_complete() {
         let message = format!(
             "stopped behind {} of {} rows; the same command goes on there",
@@ -124,6 +130,10 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     }
     let document = Document::new(&report, begun, output);
     say(&document, manners, is_stdout(output))
+}
+
+fn is_hdf5(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e == "h5" || e == "hdf5")
 }
 
 /// Both kinds of results, by the name of the file; a device takes CSV.
@@ -142,10 +152,10 @@ fn check_output(output: &Path) -> Result<(), Failure> {
 fn write(
     sweep: &Sweep,
     output: &Path,
-    settings: &Settings,
+    options: &WriteOptions,
     manners: Manners,
 ) -> Result<Report, Failure> {
-    let items = settings.shard.items(sweep.items());
+    let items = options.shard.items(sweep.items());
     let bar = Count::new(manners, items.end - items.start);
     let mut begun = false;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
@@ -159,7 +169,7 @@ fn write(
             ControlFlow::Continue(())
         };
         let mut write =
-            |out: &mut dyn Write| sweep::write_rows(sweep, out, output, settings, &mut progress);
+            |out: &mut dyn Write| sweep::write_rows(sweep, out, output, options, &mut progress);
         match is_stdout(output) {
             true => output::print_data(write),
             false => {
@@ -170,7 +180,7 @@ fn write(
         }
     } else {
         let stop = stop_flag();
-        sweep::write(sweep, output, settings, |done| {
+        sweep::write(sweep, output, options, |done| {
             step(done);
             match stop.load(Ordering::Relaxed) {
                 true => ControlFlow::Break(()),

@@ -1,23 +1,26 @@
 //! Checking a database file: every dataset is read, and what is stored twice or follows from
 //! the curves is held against each other.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use hdf5_pure::AttrValue;
 use serde::Serialize;
 
-use super::layout::{self, ATTRIBUTES, Content, Found, Opened};
-use super::{Database, DatabaseError, listed};
+use super::layout::{self, ATTRIBUTES, Content, FoundCase, FoundGroup, Opened};
+use super::{DatabaseError, listed};
 use crate::curve::resample::interpolate;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
+use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
 
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
+    /// Group of the case.
     pub group: String,
+    /// Name of the case.
     pub case: String,
+    /// Kind of finding, such as `altered` or `time_gap`.
     pub code: &'static str,
     /// Path of the dataset in the case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -25,15 +28,16 @@ pub struct Finding {
     /// Index of the value in it, counted from 0 as HDF5's tools do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub index: Option<usize>,
+    /// What was found, in words.
     pub message: String,
 }
 
 /// What a check has found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checked {
+    /// Number of cases.
     pub cases: usize,
-    /// Cases of earlier programs, whose values nothing vouches for.
-    pub without_hashes: usize,
+    /// What was found, in the order of the file.
     pub findings: Vec<Finding>,
 }
 
@@ -45,25 +49,22 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
     // Each has its own bound of bytes, and every dataset is read twice.
     let (raw, decoded) = (layout::open(path)?, layout::open(path)?);
     let mut checked = Checked::default();
-    for (group, cases) in raw.groups()? {
-        let mut readable = Database::default();
-        for case in &cases {
+    for group in raw.groups()? {
+        let mut readable = Vec::new();
+        for (name, case) in &group.cases {
             checked.cases += 1;
-            let mut findings = Findings { group: &group, case, list: &mut checked.findings };
-            let hashes = findings.datasets(&raw);
-            if !hashes {
-                checked.without_hashes += 1;
-            }
-            let mut findings = Findings { group: &group, case, list: &mut checked.findings };
-            match decoded.case(&group, case) {
+            let mut findings =
+                Findings { group: &group.name, case: name, list: &mut checked.findings };
+            findings.datasets(&raw, case);
+            match decoded.case(&group.name, name, case) {
                 Ok(found) => {
                     findings.case(&found)?;
-                    readable.put(found.case)?;
+                    readable.push(found.case);
                 }
                 // Its datasets have said so already, with their indices.
                 Err(_) if findings.has_damage() => {}
                 Err(DatabaseError::Damaged { place, detail, .. }) => {
-                    let own = format!("{group}/{case}");
+                    let own = format!("{}/{name}", group.name);
                     let within = place.strip_prefix(&own).unwrap_or(&place).trim_matches('/');
                     let colon = if within.is_empty() { "" } else { ": " };
                     findings.add("damaged", None, None, format!("{within}{colon}{detail}"));
@@ -71,13 +72,8 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
                 Err(error) => return Err(error),
             }
         }
-        let stored = raw.file.group(&group).map_err(|e| DatabaseError::Damaged {
-            path: path.into(),
-            place: group.clone(),
-            detail: e.to_string(),
-        })?;
-        let stored = raw.listed(&group, &stored)?;
-        of_group(&group, &cases, stored, readable.cases(&group), &mut checked.findings);
+        super::sort(&mut readable);
+        of_group(&group, &readable, &mut checked.findings);
     }
     Ok(checked)
 }
@@ -126,12 +122,12 @@ impl Findings<'_> {
         self.list.iter().rev().take_while(own).any(|f| DAMAGE.contains(&f.code))
     }
 
-    /// Looks at every value; whether the case has hashes.
-    fn datasets(&mut self, opened: &Opened<'_>) -> bool {
-        let hashes = opened.hashes(self.group, self.case);
+    /// Looks at every value.
+    fn datasets(&mut self, opened: &Opened<'_>, case: &Group) {
+        let hashes = opened.hashes(case);
         let mut states = 0;
         for path in DATASETS {
-            let values = match opened.values(self.group, self.case, path) {
+            let values = match opened.values(case, path) {
                 Ok(values) => values,
                 Err(detail) => {
                     self.add("unreadable", Some(path), None, detail);
@@ -174,16 +170,13 @@ impl Findings<'_> {
                 self.add("altered", Some(path), odd, message);
             }
         }
-        hashes.is_some()
     }
 
     /// Holds what is stored against what follows from the curves.
-    fn case(&mut self, found: &Found) -> Result<(), DatabaseError> {
-        let Found { case, attributes, hashes } = found;
+    fn case(&mut self, found: &FoundCase) -> Result<(), DatabaseError> {
+        let FoundCase { case, attributes, hashes } = found;
         let content = Content::of(case)?;
-        if let Some(hashes) = hashes
-            && hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES)
-        {
+        if hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES) {
             let message = "its attributes are not those that were written".into();
             self.add("altered", None, None, message);
         }
@@ -319,14 +312,9 @@ fn least_like_neighbours(values: &[f64]) -> Option<usize> {
     (0..values.len()).max_by(|&a, &b| oddness(a).total_cmp(&oddness(b)))
 }
 
-/// What concerns several cases of a group.
-fn of_group(
-    group: &str,
-    there: &[String],
-    listed_names: Option<Vec<String>>,
-    cases: &[Case],
-    list: &mut Vec<Finding>,
-) {
+/// What concerns several cases of a group; `cases` are those that can be read, by speed.
+fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
+    let group = &found.name;
     let mut add = |case: &str, code, message: String| {
         Findings { group, case, list }.add(code, None, None, message);
     };
@@ -347,14 +335,16 @@ fn of_group(
             add(&case.name, "speed_kinds", message);
         }
     }
-    let names = listed_names.unwrap_or_default();
-    for name in names.iter().filter(|name| !there.contains(name)) {
+    let in_list: Vec<&str> = found.listed.iter().flatten().map(String::as_str).collect();
+    let there: Vec<&str> = found.cases.iter().map(|(name, _)| name.as_str()).collect();
+    let (is_listed, is_there): (HashSet<&str>, HashSet<&str>) =
+        (in_list.iter().copied().collect(), there.iter().copied().collect());
+    for name in in_list.iter().filter(|name| !is_there.contains(*name)) {
         add(name, "case_list", "is listed in the group's cases, but is not there".into());
     }
-    for name in there.iter().filter(|name| !names.contains(name)) {
+    for name in there.iter().filter(|name| !is_listed.contains(*name)) {
         add(name, "case_list", "is not listed in the group's cases".into());
     }
-    let in_list: Vec<&str> = names.iter().map(String::as_str).collect();
     let by_speed: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
     if in_list.len() == by_speed.len() && in_list != by_speed {
         let message = format!(

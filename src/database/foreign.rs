@@ -1,36 +1,34 @@
 //! What others have put into a database file: found, and kept when the database is written again.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::path::Path;
 
-use hdf5_pure::{Dataset, File, FileAccessProperties, FileLocking, Group};
-
-use super::layout::{self, CASE_ATTRIBUTES, CASES, Content, ORIGINAL, Opened, ROOT};
+use super::layout::{self, CASE_ATTRIBUTES, CASES, Content, FoundGroup, ORIGINAL, Opened, ROOT};
 use super::{Database, DatabaseError};
 use crate::curve::Case;
 use crate::file::write_by_path;
+use crate::hdf5::{self, Dataset, File, FileAccessProperties, FileLocking, Group};
 
 /// Attributes, datasets, groups and types of a file that are not the layout's, as a message
 /// names them.
 pub fn found(opened: &Opened<'_>) -> Result<BTreeSet<String>, DatabaseError> {
-    let damaged = |e: hdf5_pure::Error| DatabaseError::Damaged {
+    let damaged = |e: hdf5::Error| DatabaseError::Damaged {
         path: opened.path.into(),
         place: "/".into(),
         detail: e.to_string(),
     };
     let ours = opened.groups()?;
     let mut foreign = Foreign(BTreeSet::new());
-    let mut walk = || -> Result<(), hdf5_pure::Error> {
+    let mut walk = || -> Result<(), hdf5::Error> {
         let root = opened.file.root();
-        let groups: Vec<&str> = ours.iter().map(|(name, _)| name.as_str()).collect();
-        foreign.members("", &root, |name| ROOT.contains(&name), &groups, &[])?;
-        for (name, cases) in &ours {
-            let group = root.group(name)?;
-            let cases: Vec<&str> = cases.iter().map(String::as_str).collect();
-            foreign.members(name, &group, |name| name == CASES, &cases, &[])?;
-            for case in cases {
-                foreign.of_case(&format!("{name}/{case}"), &group.group(case)?)?;
+        let names = ours.iter().map(|group| group.name.as_str()).collect();
+        foreign.members("", &root, |name| ROOT.contains(&name), &names, &[])?;
+        for FoundGroup { name, cases, .. } in &ours {
+            let names = cases.iter().map(|(name, _)| name.as_str()).collect();
+            foreign.members(name, &root.group(name)?, |name| name == CASES, &names, &[])?;
+            for (case, group) in cases {
+                foreign.of_case(&format!("{name}/{case}"), group)?;
             }
         }
         Ok(())
@@ -50,14 +48,14 @@ impl Foreign {
         self.0.insert(format!("{what} {place}/{name}"));
     }
 
-    fn of_case(&mut self, place: &str, group: &Group) -> Result<(), hdf5_pure::Error> {
+    fn of_case(&mut self, place: &str, group: &Group) -> Result<(), hdf5::Error> {
         let is_ours = |name: &str| CASE_ATTRIBUTES.contains(&name);
-        self.members(place, group, is_ours, &[ORIGINAL], &OF_A_CASE)?;
+        self.members(place, group, is_ours, &HashSet::from([ORIGINAL]), &OF_A_CASE)?;
         self.members(
             &format!("{place}/{ORIGINAL}"),
             &group.group(ORIGINAL)?,
             |_| false,
-            &[],
+            &HashSet::new(),
             &CURVE,
         )
     }
@@ -68,13 +66,13 @@ impl Foreign {
         place: &str,
         group: &Group,
         is_ours: impl Fn(&str) -> bool,
-        groups: &[&str],
+        groups: &HashSet<&str>,
         datasets: &[&str],
-    ) -> Result<(), hdf5_pure::Error> {
+    ) -> Result<(), hdf5::Error> {
         for name in group.attr_datatypes()?.keys().filter(|name| !is_ours(name)) {
             self.add("attribute", place, name);
         }
-        for name in group.groups()?.iter().filter(|name| !groups.contains(&name.as_str())) {
+        for name in group.groups()?.iter().filter(|name| !groups.contains(name.as_str())) {
             self.add("group", place, name);
         }
         for name in group.named_datatypes()? {
@@ -89,7 +87,7 @@ impl Foreign {
         Ok(())
     }
 
-    fn of_dataset(&mut self, place: &str, dataset: &Dataset) -> Result<(), hdf5_pure::Error> {
+    fn of_dataset(&mut self, place: &str, dataset: &Dataset) -> Result<(), hdf5::Error> {
         for name in dataset.attr_datatypes()?.keys() {
             self.add("attribute", place, name);
         }
@@ -141,12 +139,12 @@ fn listed(places: &BTreeSet<String>) -> String {
 }
 
 enum EditError {
-    Hdf5(hdf5_pure::Error),
+    Hdf5(hdf5::Error),
     Content(DatabaseError),
 }
 
-impl From<hdf5_pure::Error> for EditError {
-    fn from(error: hdf5_pure::Error) -> Self {
+impl From<hdf5::Error> for EditError {
+    fn from(error: hdf5::Error) -> Self {
         Self::Hdf5(error)
     }
 }
@@ -166,14 +164,15 @@ fn edit(path: &Path, old: &Database, new: &Database) -> Result<(), EditError> {
     for (name, value) in layout::root_attributes() {
         root.set_attr(name, value)?;
     }
-    let is_in = |database: &Database, case: &Case| {
-        database.cases(&case.group).iter().any(|c| c.name == case.name)
+    let by_name = |database, group| -> HashMap<&str, &Case> {
+        Database::cases(database, group).iter().map(|case| (case.name.as_str(), case)).collect()
     };
     for name in old.groups() {
-        for case in old.cases(name).iter().filter(|case| !is_in(new, case)) {
+        let kept = by_name(new, name);
+        for case in old.cases(name).iter().filter(|case| !kept.contains_key(&*case.name)) {
             root.delete(&format!("{name}/{}", case.name))?;
         }
-        if new.cases(name).is_empty() {
+        if kept.is_empty() {
             root.group(name)?.remove_attr(CASES)?;
         }
     }
@@ -184,9 +183,10 @@ fn edit(path: &Path, old: &Database, new: &Database) -> Result<(), EditError> {
             false => root.create_group(name)?,
         };
         group.set_attr(CASES, layout::case_names(new.cases(name)))?;
+        let before = by_name(old, name);
         for case in new.cases(name) {
-            match old.cases(name).iter().find(|c| c.name == case.name) {
-                Some(before) if before == case => {}
+            match before.get(&*case.name) {
+                Some(before) if *before == case => {}
                 Some(_) => replace(&group, case, layout::with_hashes(new, case)?)?,
                 None => add(&group, case, layout::with_hashes(new, case)?)?,
             }

@@ -2,19 +2,18 @@
 
 use std::borrow::Cow;
 use std::cell::Cell;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
-
-use hdf5_pure::{AttrValue, Dataset, File, FileBuilder, Group};
 
 use super::{Database, DatabaseError, damaged_curve};
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, Source};
 use crate::file;
+use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
 pub const FORMAT: &str = "crumple curve database";
-/// Layout version this program writes; it reads this and every older one.
+/// Layout version this program writes and reads.
 pub const VERSION: i64 = 2;
 
 /// Attributes of the root that are this layout's.
@@ -230,71 +229,80 @@ const DECLARED_PER_BYTE: u64 = 32;
 /// Opens a database file; values are not read yet.
 ///
 /// # Errors
-/// [`DatabaseError`] if it is no file, not HDF5, not a curve database, or of a newer layout.
+/// [`DatabaseError`] if it is no file, not HDF5, not a curve database, or of another layout.
 pub fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
-    let io = |source| DatabaseError::Io { path: path.into(), source };
-    let size = file::open(path).and_then(|file| file.metadata()).map_err(io)?.len();
-    let not_hdf5 = |detail: String| DatabaseError::NotHdf5 { path: path.into(), detail };
-    match hdf5_pure::is_hdf5(path) {
-        Ok(true) => {}
-        Ok(false) => return Err(not_hdf5("its signature is missing".into())),
-        Err(error) => return Err(io(error)),
-    }
-    let file = File::open_streaming(path).map_err(|e| not_hdf5(e.to_string()))?;
-    let attrs = file.root().attrs().map_err(|e| not_hdf5(e.to_string()))?;
-    if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
-        return Err(DatabaseError::NotOurs { path: path.into() });
-    }
-    let found = attrs.get("layout_version").and_then(AttrValue::as_i64).unwrap_or(0);
-    if !(1..=VERSION).contains(&found) {
-        return Err(DatabaseError::Version { path: path.into(), found });
-    }
-    let left = Cell::new(DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(size));
-    Ok(Opened { path, file, left })
+    let file = hdf5::open(path).map_err(|e| match e {
+        OpenError::Io(source) => DatabaseError::Io { path: path.into(), source },
+        other => DatabaseError::NotHdf5 { path: path.into(), detail: other.to_string() },
+    })?;
+    Opened::of(path, file)
+}
+
+/// A group that holds cases, as it is found in a file.
+pub struct FoundGroup {
+    pub name: String,
+    /// The names that its attribute `cases` lists.
+    pub listed: Option<Vec<String>>,
+    /// Names and groups of its cases. The links of a group are read once, here: to find one by
+    /// its name, HDF5 reads all of them each time.
+    pub cases: Vec<(String, Group)>,
 }
 
 /// A case that was read, and what it was read from.
-pub struct Found {
+pub struct FoundCase {
     pub case: Case,
     pub attributes: HashMap<String, AttrValue>,
-    /// The hashes that are stored with it, if there are.
-    pub hashes: Option<BTreeMap<String, String>>,
+    /// The hashes that are stored with it.
+    pub hashes: BTreeMap<String, String>,
 }
 
-impl Opened<'_> {
+impl<'a> Opened<'a> {
+    /// The database in an open file; `path` is for messages.
+    pub fn of(path: &'a Path, file: File) -> Result<Self, DatabaseError> {
+        let attrs = file.root().attrs().map_err(|e| DatabaseError::NotHdf5 {
+            path: path.into(),
+            detail: format!("this is no HDF5 file ({e})"),
+        })?;
+        if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
+            return Err(DatabaseError::NotOurs { path: path.into() });
+        }
+        let found = attrs.get("layout_version").and_then(AttrValue::as_i64).unwrap_or(0);
+        if found != VERSION {
+            return Err(DatabaseError::Version { path: path.into(), found });
+        }
+        let left = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(file.file_size());
+        Ok(Self { path, file, left: Cell::new(left) })
+    }
+
     fn damaged(&self, place: &str, detail: String) -> DatabaseError {
         DatabaseError::Damaged { path: self.path.into(), place: place.into(), detail }
     }
 
-    fn check<T>(
-        &self,
-        place: &str,
-        result: Result<T, hdf5_pure::Error>,
-    ) -> Result<T, DatabaseError> {
+    fn check<T>(&self, place: &str, result: Result<T, hdf5::Error>) -> Result<T, DatabaseError> {
         result.map_err(|e| self.damaged(place, e.to_string()))
     }
 
-    /// Groups that hold cases, with the names of these. What others put beside them is none.
-    pub fn groups(&self) -> Result<Vec<(String, Vec<String>)>, DatabaseError> {
+    /// Groups that hold cases, with these. What others put beside them is none.
+    pub fn groups(&self) -> Result<Vec<FoundGroup>, DatabaseError> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
             let listed = self.listed(&name, &group)?;
+            let names: HashSet<&str> = listed.iter().flatten().map(String::as_str).collect();
             let mut cases = Vec::new();
             for (case, group) in self.check(&name, group.iter_groups())? {
-                let is_listed = listed.as_ref().is_some_and(|names| names.contains(&case));
-                if is_listed || self.is_case(&format!("{name}/{case}"), &group)? {
-                    cases.push(case);
+                if names.contains(case.as_str()) || self.is_case(&name, &case, &group)? {
+                    cases.push((case, group));
                 }
             }
             if listed.is_some() || !cases.is_empty() {
-                groups.push((name, cases));
+                groups.push(FoundGroup { name, listed, cases });
             }
         }
         Ok(groups)
     }
 
     /// The names that a group's attribute `cases` lists.
-    pub fn listed(&self, name: &str, group: &Group) -> Result<Option<Vec<String>>, DatabaseError> {
+    fn listed(&self, name: &str, group: &Group) -> Result<Option<Vec<String>>, DatabaseError> {
         let attributes = self.check(name, group.attrs())?;
         Ok(attributes
             .get(CASES)
@@ -303,50 +311,70 @@ impl Opened<'_> {
     }
 
     /// Whether a group has what every case has; one of it is enough, so that damage shows.
-    fn is_case(&self, place: &str, group: &Group) -> Result<bool, DatabaseError> {
-        let attributes = self.check(place, group.attrs())?;
+    fn is_case(&self, group: &str, case: &str, found: &Group) -> Result<bool, DatabaseError> {
+        let attributes = self.check(&format!("{group}/{case}"), found.attr_datatypes())?;
         Ok(["study", "speed_m_per_s", "fingerprint"].iter().any(|n| attributes.contains_key(*n)))
     }
 
+    /// The group of a case, found by name without looking at any other case; `None` if there is
+    /// no such case, or if other names have to be known to tell.
+    pub fn find(&self, group: Option<&str>, case: &str) -> Option<(String, Group)> {
+        let root = self.file.root();
+        let name = match group {
+            Some(name) => name.to_string(),
+            // The only group there is, if others have put none beside it.
+            None => <[String; 1]>::try_from(root.groups().ok()?).ok()?.into_iter().next()?,
+        };
+        // A name is no path.
+        if [&*name, case].iter().any(|name| name.contains('/') || ["", "."].contains(name)) {
+            return None;
+        }
+        let found = root.group(&name).ok()?.group(case).ok()?;
+        self.is_case(&name, case, &found).ok()?.then_some((name, found))
+    }
+
     /// The values of one dataset of a case; why not, in words.
-    pub fn values(&self, group: &str, case: &str, path: &str) -> Result<Vec<f64>, String> {
-        let place = Place { opened: self, name: format!("{group}/{case}") };
-        let values = place.check(self.file.group(&place.name));
-        values.and_then(|found| numbers(&found, path, &place)).map_err(|e| match e {
+    pub fn values(&self, case: &Group, path: &str) -> Result<Vec<f64>, String> {
+        let place = Place { opened: self, name: String::new() };
+        numbers(case, path, &place).map_err(|e| match e {
             DatabaseError::Damaged { detail, .. } => detail,
             other => other.to_string(),
         })
     }
 
     /// The hashes that are stored with a case, if they are there and can be read.
-    pub fn hashes(&self, group: &str, case: &str) -> Option<BTreeMap<String, String>> {
-        let attributes = self.file.group(&format!("{group}/{case}")).ok()?.attrs().ok()?;
+    pub fn hashes(&self, case: &Group) -> Option<BTreeMap<String, String>> {
+        let attributes = case.attrs().ok()?;
         serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
     }
 
-    /// Reads one case.
-    pub fn case(&self, group: &str, case: &str) -> Result<Found, DatabaseError> {
-        let place = Place { opened: self, name: format!("{group}/{case}") };
-        let found = place.check(self.file.group(&place.name))?;
-        decode_case(group, case, &found, &place)
+    /// Reads one case from its group.
+    pub fn case(&self, group: &str, name: &str, case: &Group) -> Result<FoundCase, DatabaseError> {
+        let place = Place { opened: self, name: format!("{group}/{name}") };
+        decode_case(group, name, case, &place)
     }
 }
 
 /// Reads all cases of the file at `path`.
 pub fn decode(path: &Path) -> Result<Database, DatabaseError> {
     let opened = open(path)?;
+    decode_opened(&opened)
+}
+
+fn decode_opened(opened: &Opened<'_>) -> Result<Database, DatabaseError> {
     let mut database = Database::default();
-    for (group, cases) in opened.groups()? {
-        for name in cases {
-            let Found { case, hashes, .. } = opened.case(&group, &name)?;
-            let altered = match hashes {
-                Some(hashes) => (Content::of(&case)?.hashes() != hashes).then_some(hashes),
-                None => None,
-            };
-            database.put(case)?;
-            if let Some(hashes) = altered {
-                database.altered.insert((group.clone(), name), hashes);
+    for group in opened.groups()? {
+        let mut cases = Vec::with_capacity(group.cases.len());
+        for (name, case) in group.cases {
+            let FoundCase { case, hashes, .. } = opened.case(&group.name, &name, &case)?;
+            if Content::of(&case)?.hashes() != hashes {
+                database.altered.insert((group.name.clone(), name), hashes);
             }
+            cases.push(case);
+        }
+        if !cases.is_empty() {
+            super::sort(&mut cases);
+            database.groups.insert(group.name, cases);
         }
     }
     Ok(database)
@@ -363,7 +391,7 @@ impl Place<'_> {
         self.opened.damaged(&self.name, detail.into())
     }
 
-    fn check<T>(&self, result: Result<T, hdf5_pure::Error>) -> Result<T, DatabaseError> {
+    fn check<T>(&self, result: Result<T, hdf5::Error>) -> Result<T, DatabaseError> {
         self.opened.check(&self.name, result)
     }
 }
@@ -415,7 +443,7 @@ fn decode_case(
     name: &str,
     group: &Group,
     place: &Place<'_>,
-) -> Result<Found, DatabaseError> {
+) -> Result<FoundCase, DatabaseError> {
     let attrs = Attrs { map: place.check(group.attrs())?, place };
     let kind = match attrs.text("speed_kind")? {
         "wall" => SpeedKind::Wall,
@@ -455,11 +483,7 @@ fn decode_case(
                 false => None,
             },
         },
-        // Layout version 1 has none.
-        parameters: match attrs.map.contains_key("parameters") {
-            true => attrs.json("parameters")?,
-            false => BTreeMap::new(),
-        },
+        parameters: attrs.json("parameters")?,
         force_kind,
         sampled,
         closing_speed_m_per_s,
@@ -477,12 +501,8 @@ fn decode_case(
         notes: attrs.json("notes")?,
         warnings: attrs.json("warnings")?,
     };
-    // Databases of earlier programs have none.
-    let hashes = match attrs.map.contains_key(HASHES) {
-        true => Some(attrs.json(HASHES)?),
-        false => None,
-    };
-    Ok(Found { case, attributes: attrs.map, hashes })
+    let hashes = attrs.json(HASHES)?;
+    Ok(FoundCase { case, attributes: attrs.map, hashes })
 }
 
 fn decode_curve(group: &Group, place: &Place<'_>) -> Result<Curve, DatabaseError> {
@@ -494,7 +514,7 @@ fn decode_curve(group: &Group, place: &Place<'_>) -> Result<Curve, DatabaseError
 }
 
 fn numbers(group: &Group, name: &str, place: &Place<'_>) -> Result<Vec<f64>, DatabaseError> {
-    let failed = |e: hdf5_pure::Error| place.damaged(format!("{name}: {e}"));
+    let failed = |e: hdf5::Error| place.damaged(format!("{name}: {e}"));
     let dataset = group.dataset(name).map_err(failed)?;
     let bytes = declared_bytes(&dataset).map_err(failed)?;
     let left = &place.opened.left;
@@ -514,8 +534,89 @@ fn numbers(group: &Group, name: &str, place: &Place<'_>) -> Result<Vec<f64>, Dat
     dataset.read_f64().map_err(failed)
 }
 
-/// Bytes of a dataset's values as doubles.
-pub fn declared_bytes(dataset: &Dataset) -> Result<u64, hdf5_pure::Error> {
-    let size = dataset.element_size()?.max(8);
-    Ok(dataset.shape()?.iter().fold(size, |bytes, &n| bytes.saturating_mul(n)))
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use hdf5::FormatError;
+
+    use super::*;
+
+    /// Bytes of a file that count how many of them are read.
+    struct Counting {
+        bytes: Vec<u8>,
+        read: Arc<AtomicU64>,
+    }
+
+    impl hdf5::Source for Counting {
+        fn len(&self) -> u64 {
+            self.bytes.len() as u64
+        }
+
+        fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), FormatError> {
+            self.read.fetch_add(buffer.len() as u64, Ordering::Relaxed);
+            let from = offset as usize;
+            buffer.copy_from_slice(&self.bytes[from..from + buffer.len()]);
+            Ok(())
+        }
+    }
+
+    fn case(name: String) -> Case {
+        let curve = |d: f64| Curve::new(vec![0.0, 0.1], vec![0.0, d], vec![0.0, 1e6]).unwrap();
+        Case {
+            study: "s".into(),
+            group: "g".into(),
+            name,
+            speed: Speed { m_per_s: 10.0, kind: SpeedKind::Wall },
+            masses: Masses { body_kg: 24e3, other_kg: None },
+            parameters: BTreeMap::new(),
+            force_kind: ForceKind::Contact,
+            sampled: curve(0.5),
+            closing_speed_m_per_s: vec![10.0, 0.0],
+            original: curve(0.5),
+            contact_time_s: 0.0,
+            solver_wall_time_s: None,
+            unloading_stiffness_n_per_m: None,
+            audit: EnergyAudit { work_j: 1.0, kinetic_j: 1.0 },
+            recipe: "{}".into(),
+            fingerprint: "f".into(),
+            sources: Vec::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Bytes that are read of a database of so many cases: for all of them, and for one.
+    fn bytes_read(cases: usize) -> (u64, u64) {
+        let mut database = Database::default();
+        database.put_all((0..cases).map(|k| case(format!("case {k:05}")))).unwrap();
+        let bytes = encode(&database).unwrap();
+        let count = |work: &dyn Fn(&Opened<'_>)| {
+            let read = Arc::new(AtomicU64::new(0));
+            let source = Counting { bytes: bytes.clone(), read: read.clone() };
+            work(&Opened::of(Path::new("a.h5"), File::from_source(source).unwrap()).unwrap());
+            read.load(Ordering::Relaxed)
+        };
+        let all = count(&|opened| assert!(decode_opened(opened).unwrap() == database));
+        let one = count(&|opened| {
+            let name = format!("case {:05}", cases / 2);
+            for group in [None, Some("g")] {
+                let (group, found) = opened.find(group, &name).unwrap();
+                let found = opened.case(&group, &name, &found).unwrap();
+                assert_eq!(&found.case, &database.cases("g")[cases / 2]);
+            }
+        });
+        (all, one)
+    }
+
+    #[test]
+    fn reading_grows_with_the_number_of_cases_and_one_case_needs_its_own_bytes_only() {
+        let ((few, one_of_few), (many, one_of_many)) = (bytes_read(100), bytes_read(1600));
+        assert!(many < 17 * few, "{few} bytes of 100 cases, {many} of 1600");
+        // The names of all cases are read, and of the others nothing else.
+        let names = 1500 * 300;
+        assert!(one_of_many < one_of_few + names, "{one_of_few} of 100, {one_of_many} of 1600");
+        assert!(30 * one_of_many < many, "{one_of_many} bytes for one, {many} for all");
+    }
 }

@@ -1,25 +1,19 @@
 //! Curve database: cases in HDF5, by group and impact speed.
 //!
-//! The only module that names HDF5. The layout is described in
-//! `schemas/curve_database.md`. A file is always written whole and renamed into place,
+//! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
+//! writes what it is made of. A file is always written whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 
 pub mod check;
 mod foreign;
-mod histories;
 mod layout;
-mod lock;
-mod skeleton;
-pub mod table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::curve::{Case, CurveError};
 use crate::file::{WriteError, write_whole};
-pub use histories::{ConvertError, convert_histories, histories_to_hdf5, is_other_hdf5};
-pub use lock::{LockError, WriterLock};
 
 /// The cases of one database file.
 ///
@@ -34,34 +28,106 @@ pub struct Database {
 /// Why a database cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
+    /// It cannot be read.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
-    #[error("{path}: this is no HDF5 file ({detail}): give a database made by crumple build")]
-    NotHdf5 { path: PathBuf, detail: String },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is no HDF5 file.
+    #[error("{path}: {detail}: give a database made by crumple build")]
+    NotHdf5 {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, in words.
+        detail: String,
+    },
+    /// It is an HDF5 file of something else.
     #[error("{path}: this HDF5 file is no curve database (its root has no attribute format = \"{expected}\"): give one made by crumple build", expected = layout::FORMAT)]
-    NotOurs { path: PathBuf },
-    #[error("{path}: layout version {found} is not known: this program reads up to version {known}", known = layout::VERSION)]
-    Version { path: PathBuf, found: i64 },
+    NotOurs {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It has another layout.
+    #[error("{path}: its layout has version {found}, this program reads version {known}: build the database anew with crumple build", known = layout::VERSION)]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// The version that was found.
+        found: i64,
+    },
+    /// What it holds is not what it should.
     #[error("{path}: {place}: {detail}")]
-    Damaged { path: PathBuf, place: String, detail: String },
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Group, case and dataset.
+        place: String,
+        /// What is wrong, in the words of the library.
+        detail: String,
+    },
+    /// There is no such group.
     #[error("{path}: there is no group \"{group}\": it has {known}")]
-    NoGroup { path: PathBuf, group: String, known: String },
+    NoGroup {
+        /// The file.
+        path: PathBuf,
+        /// The group.
+        group: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// There is no such case.
     #[error("{path}: group \"{group}\" has no case \"{case}\": it has {known}")]
-    NoCase { path: PathBuf, group: String, case: String, known: String },
+    NoCase {
+        /// The file.
+        path: PathBuf,
+        /// The group.
+        group: String,
+        /// The case.
+        case: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// The name is taken by another study.
+    /// Writing would lose what others have put into it.
     #[error(
         "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": if the study was renamed, build into a new database; else name this run or group differently"
     )]
-    OtherStudy { group: String, name: String, other: String },
+    OtherStudy {
+        /// The group.
+        group: String,
+        /// Name of the case.
+        name: String,
+        /// The study that has the name.
+        other: String,
+    },
+    /// A group has to be named.
     #[error("{path} has several groups: choose one with --group: {known}")]
-    WhichGroup { path: PathBuf, known: String },
+    WhichGroup {
+        /// The file.
+        path: PathBuf,
+        /// What there is instead.
+        known: String,
+    },
+    /// There is nothing in it.
     #[error("{path} has no groups: build a study into it")]
-    Empty { path: PathBuf },
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     #[error(
         "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
     )]
     WouldDrop { path: PathBuf, what: String },
+    /// HDF5 cannot hold it.
     #[error("cannot encode the database: {detail}")]
-    Encode { detail: String },
+    Encode {
+        /// What is wrong, in the words of the library.
+        detail: String,
+    },
+    /// It cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -70,10 +136,27 @@ impl Database {
     /// Reads a database file.
     ///
     /// # Errors
-    /// [`DatabaseError`] if the file is missing, not HDF5, not a curve database, of a
-    /// newer layout, or damaged; it names the case and dataset.
+    /// [`DatabaseError`] if the file is missing, not HDF5, not a curve database, of
+    /// another layout, or damaged; it names the case and dataset.
     pub fn read(path: &Path) -> Result<Self, DatabaseError> {
         layout::decode(path)
+    }
+
+    /// Reads one case of a database file, and no other: of `group`, or of the only group there
+    /// is.
+    ///
+    /// # Errors
+    /// [`DatabaseError`] as of [`Database::read`], [`Database::group_or_only`] and
+    /// [`Database::case`].
+    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, DatabaseError> {
+        let opened = layout::open(path)?;
+        if let Some((group, found)) = opened.find(group, case) {
+            return Ok(opened.case(&group, case, &found)?.case);
+        }
+        // What there is instead, for the message; or a database with groups of others in it.
+        let all = Self::read(path)?;
+        let (group, _) = all.group_or_only(path, group)?;
+        all.case(path, group, case).cloned()
     }
 
     /// Writes the database to `path` as a whole. What others have put into the file that is
@@ -165,22 +248,41 @@ impl Database {
     /// # Errors
     /// [`DatabaseError::OtherStudy`] if the name is taken by another study.
     pub fn put(&mut self, case: Case) -> Result<(), DatabaseError> {
-        let cases = self.groups.entry(case.group.clone()).or_default();
-        if let Some(old) = cases.iter().find(|c| c.name == case.name)
-            && old.study != case.study
-        {
-            return Err(DatabaseError::OtherStudy {
-                group: case.group,
-                name: case.name,
-                other: old.study.clone(),
+        self.put_all([case])
+    }
+
+    /// Adds cases or replaces those of the same group, name and study, as [`Database::put`]; the
+    /// work grows with the number of cases, not with its square.
+    ///
+    /// # Errors
+    /// [`DatabaseError::OtherStudy`] if a name is taken by another study; some cases may have been
+    /// put by then.
+    pub fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), DatabaseError> {
+        let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
+        for case in cases {
+            let there = self.groups.entry(case.group.clone()).or_default();
+            let places = places.entry(case.group.clone()).or_insert_with(|| {
+                there.iter().enumerate().map(|(k, case)| (case.name.clone(), k)).collect()
             });
+            let Some(&k) = places.get(&case.name) else {
+                places.insert(case.name.clone(), there.len());
+                there.push(case);
+                continue;
+            };
+            if there[k].study != case.study {
+                let other = there[k].study.clone();
+                return Err(DatabaseError::OtherStudy {
+                    group: case.group,
+                    name: case.name,
+                    other,
+                });
+            }
+            self.altered.remove(&(case.group.clone(), case.name.clone()));
+            there[k] = case;
         }
-        cases.retain(|c| c.name != case.name);
-        self.altered.remove(&(case.group.clone(), case.name.clone()));
-        cases.push(case);
-        cases.sort_by(|a, b| {
-            a.speed.m_per_s.total_cmp(&b.speed.m_per_s).then_with(|| a.name.cmp(&b.name))
-        });
+        for group in places.keys() {
+            self.groups.get_mut(group).into_iter().for_each(|cases| sort(cases));
+        }
         Ok(())
     }
 
@@ -196,6 +298,13 @@ impl Database {
         }
         removed
     }
+}
+
+/// Puts the cases of a group into their order: by speed, then name.
+fn sort(cases: &mut [Case]) {
+    cases.sort_by(|a, b| {
+        a.speed.m_per_s.total_cmp(&b.speed.m_per_s).then_with(|| a.name.cmp(&b.name))
+    });
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {

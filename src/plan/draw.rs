@@ -41,18 +41,49 @@ pub fn permuted(k: u64, n: u64, key_of_order: u64) -> u64 {
     }
 }
 
+/// Why numbers make no distribution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DistributionError {
+    /// The ends are not in order.
+    #[error("from must lie below to")]
+    Ends,
+    /// The three points are not in order.
+    #[error("from, mode and to must rise")]
+    Triangle,
+    /// The bounds are not in order.
+    #[error("min must lie below max")]
+    Bounds,
+    /// No deviation.
+    #[error("sd must be above 0")]
+    Deviation,
+    /// A lognormal quantity is above 0.
+    #[error("a lognormal distribution needs mean and max above 0")]
+    NotPositive,
+    /// Hardly anything lies between the bounds.
+    #[error("min and max leave nothing of the distribution")]
+    NothingLeft,
+}
+
 /// A distribution by its quantile function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distribution {
+    /// Every value between the ends is equally likely.
     Uniform {
+        /// Lower end.
         from: f64,
+        /// Upper end.
         to: f64,
     },
+    /// The density rises to the mode and falls behind it.
     Triangular {
+        /// Lower end.
         from: f64,
+        /// Likeliest value.
         mode: f64,
+        /// Upper end.
         to: f64,
     },
+    /// Of the quantity itself.
     Normal(Truncated),
     /// Of the logarithm.
     Lognormal(Truncated),
@@ -74,13 +105,13 @@ pub struct Truncated {
 }
 
 impl Truncated {
-    fn new(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, String> {
+    fn new(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
         let (low, high) = ((min - mean) / sd, (max - mean) / sd);
         let (signed_sd, low, high) = if low > 0.0 { (-sd, -high, -low) } else { (sd, low, high) };
         let below = normal_share(low);
         let between = normal_share(high) - below;
         if between.is_nan() || between <= LEAST_SHARE {
-            return Err("min and max leave nothing of the distribution".into());
+            return Err(DistributionError::NothingLeft);
         }
         Ok(Self { mean, sd: signed_sd, min, max, below, between })
     }
@@ -93,29 +124,33 @@ impl Truncated {
 }
 
 impl Distribution {
+    /// Every value between the ends is equally likely.
+    ///
     /// # Errors
-    /// A message, if the ends are not in order.
-    pub fn uniform(from: f64, to: f64) -> Result<Self, String> {
+    /// [`DistributionError`] if the ends are not in order.
+    pub fn uniform(from: f64, to: f64) -> Result<Self, DistributionError> {
         match from < to {
             true => Ok(Self::Uniform { from, to }),
-            false => Err("from must lie below to".into()),
+            false => Err(DistributionError::Ends),
         }
     }
 
+    /// The density rises from 0 at `from` to `mode`, and falls to 0 at `to`.
+    ///
     /// # Errors
-    /// A message, if the three are not in order.
-    pub fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, String> {
+    /// [`DistributionError`] if the three are not in order.
+    pub fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, DistributionError> {
         match from < to && from <= mode && mode <= to {
             true => Ok(Self::Triangular { from, mode, to }),
-            false => Err("from, mode and to must rise".into()),
+            false => Err(DistributionError::Triangle),
         }
     }
 
     /// Normal of mean and standard deviation, truncated to `[min, max]` (infinite: not).
     ///
     /// # Errors
-    /// A message, if the deviation is not above 0 or the bounds leave nothing.
-    pub fn normal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, String> {
+    /// [`DistributionError`] if the deviation is not above 0 or the bounds leave nothing.
+    pub fn normal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
@@ -126,12 +161,12 @@ impl Distribution {
     ///
     /// # Errors
     /// As of [`Distribution::normal`], and if mean or `max` is not above 0.
-    pub fn lognormal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, String> {
+    pub fn lognormal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
         if !(mean > 0.0 && max > 0.0) {
-            return Err("a lognormal distribution needs mean and max above 0".into());
+            return Err(DistributionError::NotPositive);
         }
         let variance = libm::log1p((sd / mean) * (sd / mean));
         let log = |bound: f64| if bound > 0.0 { libm::log(bound) } else { f64::NEG_INFINITY };
@@ -157,8 +192,8 @@ impl Distribution {
     }
 }
 
-fn order(sd: f64) -> String {
-    if sd > 0.0 { "min must lie below max".into() } else { "sd must be above 0".into() }
+fn order(sd: f64) -> DistributionError {
+    if sd > 0.0 { DistributionError::Bounds } else { DistributionError::Deviation }
 }
 
 /// Share of the standard normal distribution below `z`.

@@ -4,6 +4,7 @@
 //! item `k` its values.
 
 pub mod draw;
+mod error;
 
 use std::fmt;
 
@@ -12,6 +13,7 @@ use serde::Deserialize;
 
 use crate::unit::{LENGTH, MASS, SPEED};
 use draw::Distribution;
+pub use error::{PlanError, VaryError};
 
 /// More items than any cluster could run; keeps a mistyped number from passing.
 pub const MAX_ITEMS: u64 = 1_000_000_000_000;
@@ -20,6 +22,7 @@ pub const MAX_ITEMS: u64 = 1_000_000_000_000;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
+    /// What is varied.
     pub sweep: Plan,
 }
 
@@ -36,10 +39,12 @@ pub struct Plan {
     pub seed: u64,
     /// Draws at each point of the grid; needed as soon as one variable has a distribution.
     pub samples: Option<u64>,
+    /// How distributions are drawn.
     #[serde(default)]
     pub sampling: Sampling,
     /// Results to keep; all if absent.
     pub results: Option<Vec<ResultName>>,
+    /// What is varied, in the order of the columns.
     pub vary: Vec<Vary>,
 }
 
@@ -61,14 +66,19 @@ pub enum Sampling {
 pub enum ResultName {
     /// Of each interface.
     PeakForce,
+    /// Of each interface.
     MaxDeflection,
+    /// Of each interface.
     MaxDeflectionTime,
+    /// Of each interface.
     Restitution,
     /// Of each body.
     FinalSpeed,
+    /// Of each body.
     MeanDeceleration,
     /// Of the run.
     EnergyError,
+    /// Of the run.
     MomentumError,
 }
 
@@ -88,6 +98,7 @@ pub const RESULTS: [ResultName; 8] = [
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
+    /// What is varied.
     pub what: What,
     /// Of a speed: the train.
     pub train: Option<String>,
@@ -113,6 +124,7 @@ pub struct Vary {
     pub to: Option<Entry>,
     /// Number of even values, both ends among them.
     pub steps: Option<u64>,
+    /// How values are drawn, if they are.
     pub distribution: Option<DistributionName>,
     /// Of the quantity itself, also of a lognormal one, before it is truncated.
     pub mean: Option<Entry>,
@@ -146,6 +158,7 @@ pub enum What {
 }
 
 impl What {
+    /// Its name in a plan.
     pub fn name(self) -> &'static str {
         match self {
             Self::Speed => "speed",
@@ -162,7 +175,9 @@ impl What {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
 pub enum Vehicles {
+    /// By name.
     List(Vec<String>),
+    /// `all`.
     Word(String),
 }
 
@@ -223,15 +238,20 @@ impl JsonSchema for Entry {
 /// The values of one variable, in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spread {
+    /// These.
     List(Vec<f64>),
     /// Names, of which an item has one by its index.
     Names(Vec<String>),
     /// `steps` even values from `from` to `to`.
     Even {
+        /// First value.
         from: f64,
+        /// Last value.
         to: f64,
+        /// Number of values, 2 or more.
         steps: u64,
     },
+    /// Drawn anew for each item.
     Drawn(Distribution),
 }
 
@@ -266,57 +286,39 @@ impl Plan {
     /// The design of these spreads, one per variable.
     ///
     /// # Errors
-    /// A message that names the key, if `samples` is missing or without use, or the items are
-    /// too many.
-    pub fn design(&self, spreads: Vec<Spread>) -> Result<Design, String> {
+    /// [`PlanError`] if `samples` is missing or without use, or the items are too many.
+    pub fn design(&self, spreads: Vec<Spread>) -> Result<Design, PlanError> {
         let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
         let samples = match (self.samples, drawn) {
-            (Some(0), _) => return Err("sweep.samples is 0: expected 1 or more".into()),
+            (Some(0), _) => return Err(PlanError::NoSample),
             (Some(samples), true) => samples,
-            (None, true) => {
-                return Err(
-                    "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid".into(),
-                );
-            }
-            (Some(_), false) => {
-                return Err(
-                    "sweep.samples is given, but no variable has a distribution: leave samples away".into(),
-                );
-            }
+            (None, true) => return Err(PlanError::SamplesMissing),
+            (Some(_), false) => return Err(PlanError::SamplesUnused),
             (None, false) => 1,
         };
         if self.sampling == Sampling::LatinHypercube && !drawn {
-            return Err(
-                "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"
-                    .into(),
-            );
+            return Err(PlanError::SamplingUnused);
         }
         let items = spreads
             .iter()
             .try_fold(samples, |items, spread| items.checked_mul(spread.len()))
             .filter(|items| *items <= MAX_ITEMS);
-        let items = items.ok_or_else(|| {
-            let factors: Vec<String> = [samples]
-                .into_iter()
-                .chain(spreads.iter().map(Spread::len))
-                .filter(|n| *n > 1)
-                .map(|n| n.to_string())
-                .collect();
-            format!(
-                "the sweep has {} items: {MAX_ITEMS} at most; shorten values, steps or samples",
-                factors.join(" × ")
-            )
-        })?;
+        let Some(items) = items else {
+            let factors = [samples].into_iter().chain(spreads.iter().map(Spread::len));
+            return Err(PlanError::TooMany { factors: factors.filter(|n| *n > 1).collect() });
+        };
         let (seed, sampling) = (self.seed, self.sampling);
         Ok(Design { spreads, samples, items, seed, sampling })
     }
 }
 
 impl Design {
+    /// Number of items.
     pub fn items(&self) -> u64 {
         self.items
     }
 
+    /// The values of each variable.
     pub fn spreads(&self) -> &[Spread] {
         &self.spreads
     }
@@ -369,8 +371,8 @@ impl Vary {
     /// Its values or distribution.
     ///
     /// # Errors
-    /// A message that names the key.
-    pub fn spread(&self) -> Result<Spread, String> {
+    /// [`VaryError`] names the key.
+    pub fn spread(&self) -> Result<Spread, VaryError> {
         if let Some(name) = self.distribution {
             self.refuse("distribution", &["values", "steps"])?;
             return Ok(Spread::Drawn(self.drawn(name)?));
@@ -379,70 +381,71 @@ impl Vary {
         match (&self.values, &self.from, &self.to, self.steps) {
             (Some(values), None, None, None) => {
                 if values.is_empty() {
-                    return Err("values is empty: give one or more".into());
+                    return Err(VaryError::NoValues);
                 }
                 if self.what == What::Curve {
                     return Ok(Spread::Names(values.iter().map(|v| v.0.clone()).collect()));
                 }
-                let numbers: Result<Vec<f64>, String> =
+                let numbers: Result<Vec<f64>, VaryError> =
                     values.iter().map(|value| self.number("values", value)).collect();
                 Ok(Spread::List(numbers?))
             }
             (None, Some(from), Some(to), Some(steps)) => {
                 if self.what == What::Curve {
-                    return Err("a curve needs values = [\"…\"], names in [curves]".into());
+                    return Err(VaryError::CurveValues);
                 }
                 if steps < 2 {
-                    return Err(format!("steps is {steps}: expected 2 or more"));
+                    return Err(VaryError::Steps { found: steps });
                 }
                 let (from, to) = (self.number("from", from)?, self.number("to", to)?);
                 Ok(Spread::Even { from, to, steps })
             }
-            _ => Err("give values = […], or from, to and steps, or a distribution".into()),
+            _ => Err(VaryError::NoSpread),
         }
     }
 
-    fn drawn(&self, name: DistributionName) -> Result<Distribution, String> {
+    fn drawn(&self, name: DistributionName) -> Result<Distribution, VaryError> {
         if self.what == What::Curve {
-            return Err("a curve needs values = [\"…\"], names in [curves]".into());
+            return Err(VaryError::CurveValues);
         }
-        let ends = || Ok::<_, String>((self.need("from", &self.from)?, self.need("to", &self.to)?));
+        let ends =
+            || Ok::<_, VaryError>((self.need("from", &self.from)?, self.need("to", &self.to)?));
         match name {
             DistributionName::Uniform => {
                 self.refuse("uniform", &["mean", "sd", "mode", "min", "max"])?;
                 let (from, to) = ends()?;
-                Distribution::uniform(from, to)
+                Ok(Distribution::uniform(from, to)?)
             }
             DistributionName::Triangular => {
                 self.refuse("triangular", &["mean", "sd", "min", "max"])?;
                 let (from, to) = ends()?;
-                Distribution::triangular(from, self.need("mode", &self.mode)?, to)
+                Ok(Distribution::triangular(from, self.need("mode", &self.mode)?, to)?)
             }
             DistributionName::Normal | DistributionName::Lognormal => {
                 self.refuse("normal and lognormal", &["from", "to", "mode"])?;
                 let (mean, sd) = (self.need("mean", &self.mean)?, self.need("sd", &self.sd)?);
-                let bound = |key, entry: &Option<Entry>, open: f64| {
+                let bound = |key: &'static str, entry: &Option<Entry>, open: f64| {
                     entry.as_ref().map_or(Ok(open), |entry| self.number(key, entry))
                 };
                 let min = bound("min", &self.min, f64::NEG_INFINITY)?;
                 let max = bound("max", &self.max, f64::INFINITY)?;
                 match name {
-                    DistributionName::Normal => Distribution::normal(mean, sd, min, max),
-                    _ => Distribution::lognormal(mean, sd, min, max),
+                    DistributionName::Normal => Ok(Distribution::normal(mean, sd, min, max)?),
+                    _ => Ok(Distribution::lognormal(mean, sd, min, max)?),
                 }
             }
         }
     }
 
-    fn need(&self, key: &'static str, entry: &Option<Entry>) -> Result<f64, String> {
+    fn need(&self, key: &'static str, entry: &Option<Entry>) -> Result<f64, VaryError> {
         match entry {
             Some(entry) => self.number(key, entry),
-            None => Err(format!("the distribution needs {key} = …")),
+            None => Err(VaryError::Missing { key }),
         }
     }
 
     /// Refuses keys that do not go with `with`.
-    fn refuse(&self, with: &str, keys: &[&str]) -> Result<(), String> {
+    fn refuse(&self, with: &'static str, keys: &[&'static str]) -> Result<(), VaryError> {
         let given = |key: &str| match key {
             "values" => self.values.is_some(),
             "from" => self.from.is_some(),
@@ -455,13 +458,13 @@ impl Vary {
             _ => self.max.is_some(),
         };
         match keys.iter().find(|key| given(key)) {
-            Some(key) => Err(format!("{key} does not go with {with}: leave one of them away")),
+            Some(&key) => Err(VaryError::Together { key, with }),
             None => Ok(()),
         }
     }
 
     /// SI value of an entry.
-    fn number(&self, key: &str, entry: &Entry) -> Result<f64, String> {
+    fn number(&self, key: &'static str, entry: &Entry) -> Result<f64, VaryError> {
         let text = &entry.0;
         let dimension = match (self.what, self.factor) {
             (What::Speed, false) => Some(&SPEED),
@@ -470,10 +473,15 @@ impl Vary {
             _ => None,
         };
         let value = match dimension {
-            Some(dimension) => dimension.parse(text).map_err(|e| format!("{key}: {e}"))?,
-            None => text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
-                format!("{key}: \"{text}\" is no number: write a plain one, such as 0.9")
-            })?,
+            Some(dimension) => {
+                dimension.parse(text).map_err(|source| VaryError::Unit { key, source })?
+            }
+            None => text
+                .trim()
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .ok_or_else(|| VaryError::NoNumber { key, text: text.clone() })?,
         };
         let (low, high) = match (self.what, self.factor) {
             // How far values scatter has no sign of its own to check here.
@@ -488,11 +496,7 @@ impl Vary {
             _ => (0.0, f64::INFINITY),
         };
         if value < low || value > high {
-            let expected = match high.is_finite() {
-                true => format!("from {low} to {high}"),
-                false => format!("{low} or more"),
-            };
-            return Err(format!("{key}: {text} is out of range: expected {expected}"));
+            return Err(VaryError::Range { key, text: text.clone(), low, high });
         }
         Ok(value)
     }
@@ -504,8 +508,8 @@ mod tests {
 
     fn design(text: &str) -> Result<Design, String> {
         let plan: Plan = toml::from_str(text).map_err(|e| e.message().to_string())?;
-        let spreads: Result<Vec<Spread>, String> = plan.vary.iter().map(Vary::spread).collect();
-        plan.design(spreads?)
+        let spreads: Result<Vec<Spread>, VaryError> = plan.vary.iter().map(Vary::spread).collect();
+        plan.design(spreads.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
     }
 
     fn values(design: &Design, item: u64) -> Vec<f64> {

@@ -1,53 +1,66 @@
-//! Assembly: bodies, interfaces and their laws become a chain.
+//! Assembly: bodies, interfaces and their laws become a chain, for given speeds.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use super::check::check;
 use super::layout::{Layout, Role, Slot, layout};
 use super::spring::{SpringError, spring};
-use super::{
-    InterfaceSpeed, LimitsTable, Prepared, Scenario, ScenarioError, Source, Sources, Used, local,
-};
+use super::{CheckedScenario, LimitsTable, Prepared, ScenarioError, Source, Sources, Used};
+use crate::multibody::damping::DampingError;
 use crate::multibody::{Chain, Damping, ForceLaw, Interface, Method, RunSettings, Tension};
 use crate::unit::SpeedKind;
 
-/// Puts a scenario together with what its files hold; `path` is for messages. Interfaces whose
-/// curves come from models get them for their own closing speeds, unless the scenario asks for
-/// the trains' speed.
+/// Why a curve cannot stand where the scenario puts it.
+#[derive(Debug, thiserror::Error)]
+pub enum AssemblyError {
+    /// The sources are those of another scenario.
+    #[error("curve \"{curve}\" has not been read")]
+    NotRead {
+        /// The curve.
+        curve: String,
+    },
+    /// It gives no force law.
+    #[error("curve \"{curve}\": {message}")]
+    NoSpring {
+        /// The curve.
+        curve: String,
+        /// Why not.
+        message: String,
+    },
+    /// Its damper is none.
+    #[error("curve \"{curve}\": {source}")]
+    Damping {
+        /// The curve.
+        curve: String,
+        /// What is wrong with it.
+        source: DampingError,
+    },
+    /// It was measured at speeds of the other kind.
+    #[error(
+        "curve \"{curve}\" was measured at {} speeds, but interface {interface} needs one of {} speeds",
+        .kind.name(),
+        .expected.name()
+    )]
+    Speeds {
+        /// The curve.
+        curve: String,
+        /// Kind of its speeds.
+        kind: SpeedKind,
+        /// The interface that it should stand at.
+        interface: String,
+        /// Kind of that interface's speed.
+        expected: SpeedKind,
+    },
+}
+
+/// Puts a scenario together with what its files hold, with curves for given speeds of the
+/// interfaces, in the order of the chain; `path` is for messages.
 ///
 /// # Errors
 /// [`ScenarioError`] names the key or curve.
-pub fn assemble(
-    path: &Path,
-    scenario: &Scenario,
-    sources: &Sources,
-) -> Result<Prepared, ScenarioError> {
-    let invalid = |message: String| ScenarioError::Invalid { path: path.into(), message };
-    let obstacle_speed = check(scenario).map_err(invalid)?;
-    let meeting = scenario.train[0].speed.0 - obstacle_speed;
-    let nominal = vec![meeting; layout(scenario).slots.len()];
-    let prepared = assemble_at(path, scenario, sources, &nominal)?;
-    match scenario.run.interface_speed == InterfaceSpeed::Local && has_local(scenario, sources) {
-        true => local::settle(path, scenario, sources, prepared, nominal),
-        false => Ok(prepared),
-    }
-}
-
-/// Whether some interface between vehicles takes its curve from a model.
-pub(super) fn has_local(scenario: &Scenario, sources: &Sources) -> bool {
-    layout(scenario).slots.iter().any(|slot| is_local(slot, sources))
-}
-
-/// Whether a slot's curve depends on its own closing speed.
-pub(super) fn is_local(slot: &Slot<'_>, sources: &Sources) -> bool {
-    slot.role == Role::Vehicles && matches!(sources.curves.get(slot.curve), Some(Source::Model(_)))
-}
-
-/// The same with given speeds for the curves of the interfaces, in the order of the chain.
 pub(super) fn assemble_at(
     path: &Path,
-    scenario: &Scenario,
+    scenario: &CheckedScenario<'_>,
     sources: &Sources,
     speeds_m_per_s: &[f64],
 ) -> Result<Prepared, ScenarioError> {
@@ -65,9 +78,8 @@ pub(super) fn assemble_at(
         }
         if let Some(damping) = &table.damping {
             let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
-            let damping = Damping::new(points.0, points.1).map_err(|e| ScenarioError::Invalid {
-                path: path.into(),
-                message: format!("curve \"{}\": {e}", slot.curve),
+            let damping = Damping::new(points.0, points.1).map_err(|source| {
+                builder.failed(AssemblyError::Damping { curve: slot.curve.into(), source })
             })?;
             interface.damping = Some(damping);
         }
@@ -103,7 +115,7 @@ pub(super) fn assemble_at(
 
 /// The bodies of the vehicles that limits hold for; `order` lists those of all trains, each vehicle
 /// before its crush zones.
-fn limited(scenario: &Scenario, order: &[usize], limits: &LimitsTable) -> Vec<usize> {
+fn limited(scenario: &CheckedScenario<'_>, order: &[usize], limits: &LimitsTable) -> Vec<usize> {
     let mut bodies = order.iter();
     let mut limited = Vec::new();
     for train in &scenario.train {
@@ -118,19 +130,18 @@ fn limited(scenario: &Scenario, order: &[usize], limits: &LimitsTable) -> Vec<us
     limited
 }
 
-/// Gives a chain put together by [`assemble`] the masses, speeds and gaps of `scenario`, which
+/// Gives a chain put together by [`assemble`](super::assemble) the masses, speeds and gaps of `scenario`, which
 /// differs from the one it was made of in nothing else; the force laws stay as they are. That
 /// is right wherever no law depends on these: a model's curve does, on masses and speeds, and
 /// on gaps too if it is sought for the interface's own speed.
 ///
 /// # Errors
-/// [`ScenarioError`] as of [`assemble`]; the chain is then not to be run.
+/// [`ScenarioError`] as of [`assemble`](super::assemble); the chain is then not to be run.
 pub fn adjust(
     path: &Path,
-    scenario: &Scenario,
+    scenario: &CheckedScenario<'_>,
     prepared: &mut Prepared,
 ) -> Result<(), ScenarioError> {
-    check(scenario).map_err(|message| ScenarioError::Invalid { path: path.into(), message })?;
     let Layout { bodies, slots, .. } = layout(scenario);
     let motions: Vec<(f64, f64)> = bodies.iter().map(|b| (b.mass_kg, b.speed_m_per_s)).collect();
     let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
@@ -157,28 +168,27 @@ struct Made {
 
 struct Builder<'a> {
     path: &'a Path,
-    scenario: &'a Scenario,
+    scenario: &'a CheckedScenario<'a>,
     sources: &'a Sources,
     made: Vec<Made>,
     warnings: Vec<String>,
 }
 
 impl Builder<'_> {
+    fn failed(&self, source: AssemblyError) -> ScenarioError {
+        ScenarioError::Assembly { path: self.path.into(), source }
+    }
+
+    fn no_spring(&self, curve: &str, message: String) -> ScenarioError {
+        self.failed(AssemblyError::NoSpring { curve: curve.into(), message })
+    }
+
     /// The law of a curve at a slot: made once for all slots that need the same.
     fn law(&mut self, slot: &Slot<'_>, curve: &str, speed: f64) -> Result<Made, ScenarioError> {
-        let invalid = |message: String| ScenarioError::Invalid { path: self.path.into(), message };
-        let table = self.scenario.curves.get(curve).ok_or_else(|| {
-            let known: Vec<&str> = self.scenario.curves.keys().map(String::as_str).collect();
-            invalid(format!(
-                "there is no curve \"{curve}\" in [curves]: it has {}",
-                known.join(", ")
-            ))
-        })?;
-        let source = self
-            .sources
-            .curves
-            .get(curve)
-            .ok_or_else(|| invalid(format!("curve \"{curve}\" has not been read")))?;
+        let table = &self.scenario.curves[curve];
+        let source = self.sources.curves.get(curve);
+        let source =
+            source.ok_or_else(|| self.failed(AssemblyError::NotRead { curve: curve.into() }))?;
         let is_model = matches!(source, Source::Model(_));
         let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
         let key = (
@@ -192,7 +202,7 @@ impl Builder<'_> {
             return Ok(made.clone());
         }
         let spring = spring(source, table, slot, speed).map_err(|e| match e {
-            SpringError::Message(message) => invalid(format!("curve \"{curve}\": {message}")),
+            SpringError::Message(message) => self.no_spring(curve, message),
             SpringError::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
         })?;
         let expected = match slot.role {
@@ -203,15 +213,10 @@ impl Builder<'_> {
         if let (Some(kind), Some(expected)) = (spring.curve.speed_kind, expected)
             && kind != expected
         {
-            return Err(invalid(format!(
-                "curve \"{curve}\" was measured at {} speeds, but interface {} needs one of {} speeds",
-                kind.name(),
-                slot.name,
-                expected.name()
-            )));
+            let (curve, interface) = (curve.into(), slot.name.clone());
+            return Err(self.failed(AssemblyError::Speeds { curve, kind, interface, expected }));
         }
-        let (law, of_law) =
-            spring.law(table).map_err(|m| invalid(format!("curve \"{curve}\": {m}")))?;
+        let (law, of_law) = spring.law(table).map_err(|message| self.no_spring(curve, message))?;
         let used = Used {
             curve: curve.into(),
             force: spring.curve.force.map(|f| f.name()),

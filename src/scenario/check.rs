@@ -1,169 +1,379 @@
-//! Checks of a scenario that a single key cannot show.
+//! Checks that a single key cannot show: a scenario as written becomes a [`CheckedScenario`].
 
-use super::{CurveTable, LawName, Scenario, VehicleTable};
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::ops::Deref;
+
+use super::layout::layout;
+use super::{CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
 use crate::unit::km_per_h;
 
-/// Returns the speed of what the first train meets, in m/s.
-pub(super) fn check(scenario: &Scenario) -> Result<f64, String> {
-    let obstacle_speed = match (&scenario.wall, scenario.train.as_slice()) {
-        (Some(_), [_]) => 0.0,
-        (None, [_, second]) => second.speed.0,
-        (Some(_), trains) => {
-            return Err(format!("a [wall] needs exactly one [[train]], found {}", trains.len()));
+/// A scenario that has been checked; read its tables as those of the [`Scenario`] it was.
+///
+/// Invariants: one train and a wall, or two trains, the first faster than what it meets; every
+/// train has vehicles, and between any two of them, at the contact and in every crush zone a
+/// curve of `[curves]`; names of bodies are unique; a vehicle has more mass than its crush zones.
+#[derive(Clone, Debug)]
+pub struct CheckedScenario<'a> {
+    tables: Cow<'a, Scenario>,
+    meeting_m_per_s: f64,
+}
+
+impl Deref for CheckedScenario<'_> {
+    type Target = Scenario;
+
+    fn deref(&self) -> &Scenario {
+        &self.tables
+    }
+}
+
+/// What is wrong with a scenario as a whole.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CheckError {
+    /// A wall takes the place of the second train.
+    #[error("a [wall] needs exactly one [[train]], found {trains}")]
+    WallTrains {
+        /// Number of trains.
+        trains: usize,
+    },
+    /// There is nothing to meet, or too much.
+    #[error("expected two [[train]], or one and a [wall], found {trains} [[train]] and no [wall]")]
+    Trains {
+        /// Number of trains.
+        trains: usize,
+    },
+    /// A limit that nothing keeps.
+    #[error("[limits] mean_deceleration_g = {found}: expected more than 0")]
+    Limit {
+        /// As written, in g.
+        found: f64,
+    },
+    /// Both trains have one name.
+    #[error("two trains are named \"{name}\": give them different names")]
+    TrainTwice {
+        /// The name.
+        name: String,
+    },
+    /// Limits for no train.
+    #[error("[limits] trains is empty: name one, or leave it away for all")]
+    NoLimitedTrain,
+    /// Limits for a train that is not there.
+    #[error("[limits] trains: there is no train \"{name}\": the scenario has {known}")]
+    UnknownTrain {
+        /// The train.
+        name: String,
+        /// The trains there are.
+        known: String,
+    },
+    /// Two bodies have one name.
+    #[error(
+        "two bodies are named \"{name}\": vehicles, their front and rear and the wall need different names"
+    )]
+    BodyTwice {
+        /// The name.
+        name: String,
+    },
+    /// A name that cannot stand in the columns of the result.
+    #[error("the name \"{}\" may not be empty or contain , | [ ] or quotes", .name.escape_debug())]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// A train without vehicles.
+    #[error("train \"{train}\" has no vehicles")]
+    NoVehicles {
+        /// The train.
+        train: String,
+    },
+    /// No curve between two vehicles.
+    #[error("train \"{train}\" has {vehicles} vehicles but no inner = \"…\" curve between them")]
+    NoInner {
+        /// The train.
+        train: String,
+        /// How many vehicles it has.
+        vehicles: usize,
+    },
+    /// A curve behind the last vehicle.
+    #[error("there is nothing behind the last vehicle \"{vehicle}\"")]
+    NothingBehind {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// A crush zone is joined to its body without a gap.
+    #[error(
+        "curve \"{curve}\" has a gap, but {end} of vehicle \"{vehicle}\" is joined to the body without one: give it a curve without gap"
+    )]
+    ZoneGap {
+        /// Curve of the crush zone.
+        curve: String,
+        /// `front` or `rear`.
+        end: &'static str,
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// The crush zones take the whole vehicle.
+    #[error(
+        "the crush zones of vehicle \"{vehicle}\" have all of its mass: nothing is left for the body"
+    )]
+    NoBodyMass {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// Stages that are none.
+    #[error("curve \"{curve}\": stages is empty")]
+    NoStages {
+        /// The curve.
+        curve: String,
+    },
+    /// A key that the kind of curve does not take.
+    #[error("curve \"{curve}\": {key} belongs to {of}: leave it away")]
+    ForeignKey {
+        /// The curve.
+        curve: String,
+        /// The key.
+        key: &'static str,
+        /// What takes it.
+        of: &'static str,
+    },
+    /// A tension curve that is not there.
+    #[error("curve \"{curve}\": its tension curve \"{tension}\" is not in [curves]")]
+    UnknownTension {
+        /// The curve.
+        curve: String,
+        /// Its tension curve.
+        tension: String,
+    },
+    /// A tension curve with a tension curve or a damper.
+    #[error(
+        "curve \"{tension}\" is the tension of \"{curve}\": it can have no tension or damping of its own"
+    )]
+    TensionOfTension {
+        /// The curve.
+        curve: String,
+        /// Its tension curve.
+        tension: String,
+    },
+    /// A model as a tension curve.
+    #[error(
+        "curve \"{tension}\" is the tension of \"{curve}\": models know compression only; give a file or stages"
+    )]
+    TensionModel {
+        /// The curve.
+        curve: String,
+        /// Its tension curve.
+        tension: String,
+    },
+    /// The first train does not reach what is in front of it.
+    #[error("train \"{train}\" at {} never meets what is in front of it: it must be faster", km_per_h(*.speed_m_per_s))]
+    NeverMeets {
+        /// The first train.
+        train: String,
+        /// Its speed.
+        speed_m_per_s: f64,
+    },
+    /// A curve that is used and not there.
+    #[error("there is no curve \"{curve}\" in [curves]: it has {known}")]
+    UnknownCurve {
+        /// The curve.
+        curve: String,
+        /// The curves there are.
+        known: String,
+    },
+}
+
+impl Scenario {
+    /// Checks the scenario as a whole.
+    ///
+    /// # Errors
+    /// [`CheckError`] names the key, vehicle or curve.
+    pub fn check(&self) -> Result<CheckedScenario<'_>, CheckError> {
+        check_shape(self)?;
+        if let Some(limits) = &self.limits {
+            check_limits(limits, &self.train)?;
         }
-        (None, trains) => {
-            return Err(format!(
-                "expected two [[train]], or one and a [wall], found {} [[train]] and no [wall]",
-                trains.len()
-            ));
+        check_names(self)?;
+        for (name, table) in &self.curves {
+            check_keys(name, table)?;
         }
-    };
-    if let Some(limits) = &scenario.limits
-        && !(limits.mean_deceleration_g > 0.0 && limits.mean_deceleration_g.is_finite())
-    {
-        return Err(format!(
-            "[limits] mean_deceleration_g = {}: expected more than 0",
-            limits.mean_deceleration_g
-        ));
+        let checked = check_values(self)?;
+        for slot in layout(&checked).slots {
+            if !self.curves.contains_key(slot.curve) {
+                let known: Vec<&str> = self.curves.keys().map(String::as_str).collect();
+                let (curve, known) = (slot.curve.into(), known.join(", "));
+                return Err(CheckError::UnknownCurve { curve, known });
+            }
+        }
+        Ok(checked)
     }
-    if let [first, second] = scenario.train.as_slice()
-        && first.name == second.name
-    {
-        return Err(format!("two trains are named \"{}\": give them different names", first.name));
+}
+
+impl CheckedScenario<'_> {
+    /// Speed at which the first train meets what is in front of it, in m/s; above 0.
+    pub fn meeting_m_per_s(&self) -> f64 {
+        self.meeting_m_per_s
     }
-    let trains = scenario.limits.as_ref().and_then(|limits| limits.trains.as_ref());
-    if trains.is_some_and(Vec::is_empty) {
-        return Err("[limits] trains is empty: name one, or leave it away for all".into());
+
+    /// The same with tables of its own.
+    pub fn into_owned(self) -> CheckedScenario<'static> {
+        CheckedScenario { tables: Cow::Owned(self.tables.into_owned()), ..self }
     }
-    for name in trains.into_iter().flatten() {
-        if !scenario.train.iter().any(|train| train.name == *name) {
-            let known: Vec<&str> = scenario.train.iter().map(|t| t.name.as_str()).collect();
-            return Err(format!(
-                "[limits] trains: there is no train \"{name}\": the scenario has {}",
-                known.join(", ")
-            ));
+
+    /// Checks `varied`, which differs from this scenario in numbers only and in which of its
+    /// curves stand where: what these cannot break is not looked at again.
+    ///
+    /// # Errors
+    /// [`CheckError`] as of [`Scenario::check`].
+    pub fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, CheckError> {
+        check_values(varied)
+    }
+}
+
+/// Two trains, or one and a wall.
+fn check_shape(scenario: &Scenario) -> Result<(), CheckError> {
+    let trains = scenario.train.len();
+    match (&scenario.wall, scenario.train.as_slice()) {
+        (Some(_), [_]) => Ok(()),
+        (Some(_), _) => Err(CheckError::WallTrains { trains }),
+        (None, [first, second]) if first.name == second.name => {
+            Err(CheckError::TrainTwice { name: first.name.clone() })
+        }
+        (None, [_, _]) => Ok(()),
+        (None, _) => Err(CheckError::Trains { trains }),
+    }
+}
+
+fn check_limits(limits: &LimitsTable, trains: &[TrainTable]) -> Result<(), CheckError> {
+    let found = limits.mean_deceleration_g;
+    if !(found > 0.0 && found.is_finite()) {
+        return Err(CheckError::Limit { found });
+    }
+    if limits.trains.as_ref().is_some_and(Vec::is_empty) {
+        return Err(CheckError::NoLimitedTrain);
+    }
+    for name in limits.trains.iter().flatten() {
+        if !trains.iter().any(|train| train.name == *name) {
+            let known: Vec<&str> = trains.iter().map(|t| t.name.as_str()).collect();
+            return Err(CheckError::UnknownTrain { name: name.clone(), known: known.join(", ") });
         }
     }
-    let mut names = std::collections::HashSet::new();
+    Ok(())
+}
+
+/// Names of bodies, and that every train has vehicles with something between them.
+fn check_names(scenario: &Scenario) -> Result<(), CheckError> {
+    let mut names = HashSet::new();
     let mut take = |name: String| match names.insert(name.clone()) {
         true => Ok(()),
-        false => Err(format!(
-            "two bodies are named \"{name}\": vehicles, their front and rear and the wall need different names"
-        )),
+        false => Err(CheckError::BodyTwice { name }),
     };
     if let Some(wall) = &scenario.wall {
         check_name(&wall.name)?;
         take(wall.name.clone())?;
     }
     for train in &scenario.train {
-        let Some((last, others)) = train.vehicles.split_last() else {
-            return Err(format!("train \"{}\" has no vehicles", train.name));
-        };
-        if others.iter().any(|v| v.behind.is_none()) && train.inner.is_none() {
-            return Err(format!(
-                "train \"{}\" has {} vehicles but no inner = \"…\" curve between them",
-                train.name,
-                train.vehicles.len()
-            ));
-        }
-        if last.behind.is_some() {
-            return Err(format!("there is nothing behind the last vehicle \"{}\"", last.name));
-        }
+        check_vehicles(train)?;
         for vehicle in &train.vehicles {
-            let name = &vehicle.name;
-            check_name(name)?;
-            take(name.clone())?;
-            for (zone, end) in [(&vehicle.front, "front"), (&vehicle.rear, "rear")] {
-                let Some(zone) = zone else { continue };
-                take(format!("{name} {end}"))?;
-                if scenario
-                    .curves
-                    .get(&zone.curve)
-                    .is_some_and(|c| c.gap.is_some_and(|gap| gap.0 > 0.0))
-                {
-                    return Err(format!(
-                        "curve \"{}\" has a gap, but {end} of vehicle \"{name}\" is joined to the body without one: give it a curve without gap",
-                        zone.curve
-                    ));
-                }
-            }
-            let is_split = vehicle.front.is_some() || vehicle.rear.is_some();
-            if is_split && body_mass_kg(vehicle) <= 0.0 {
-                return Err(format!(
-                    "the crush zones of vehicle \"{name}\" have all of its mass: nothing is left for the body"
-                ));
+            check_name(&vehicle.name)?;
+            take(vehicle.name.clone())?;
+            for (end, _) in vehicle.zones() {
+                take(format!("{} {end}", vehicle.name))?;
             }
         }
     }
-    for (name, table) in &scenario.curves {
-        check_curve(name, table, scenario)?;
-    }
-    if scenario.train[0].speed.0 <= obstacle_speed {
-        return Err(format!(
-            "train \"{}\" at {} never meets what is in front of it: it must be faster",
-            scenario.train[0].name,
-            km_per_h(scenario.train[0].speed.0)
-        ));
-    }
-    Ok(obstacle_speed)
+    Ok(())
 }
 
-/// Mass of a vehicle without its crush zones.
-pub(super) fn body_mass_kg(vehicle: &VehicleTable) -> f64 {
-    let zones = [&vehicle.front, &vehicle.rear].into_iter().flatten();
-    vehicle.mass.0 - zones.map(|zone| zone.mass.0).sum::<f64>()
-}
-
-fn check_curve(name: &str, table: &CurveTable, scenario: &Scenario) -> Result<(), String> {
-    let takes_nothing = |key: &str, of: &str| {
-        Err(format!("curve \"{name}\": {key} belongs to {of}: leave it away"))
+fn check_vehicles(train: &TrainTable) -> Result<(), CheckError> {
+    let (name, vehicles) = (train.name.clone(), train.vehicles.len());
+    let Some((last, others)) = train.vehicles.split_last() else {
+        return Err(CheckError::NoVehicles { train: name });
     };
-    if table.stages.as_ref().is_some_and(Vec::is_empty) {
-        return Err(format!("curve \"{name}\": stages is empty"));
+    if others.iter().any(|v| v.behind.is_none()) && train.inner.is_none() {
+        return Err(CheckError::NoInner { train: name, vehicles });
     }
-    if table.stages.is_some() && table.force.is_some() {
-        return takes_nothing("force", "a model, predicted curve or case");
-    }
-    if table.database.is_none() && table.case.is_some() {
-        return takes_nothing("case", "a database");
-    }
-    if table.model.is_none() && table.max_crush.is_some() {
-        return takes_nothing("max_crush", "a model");
-    }
-    if table.model.is_none() && !table.parameters.is_empty() {
-        return takes_nothing("parameters", "a model");
-    }
-    if table.law == LawName::Elastic && table.unloading.is_some() {
-        return takes_nothing("unloading", "law = \"memory\"");
-    }
-    if let Some(tension) = &table.tension {
-        let Some(other) = scenario.curves.get(tension) else {
-            return Err(format!(
-                "curve \"{name}\": its tension curve \"{tension}\" is not in [curves]"
-            ));
-        };
-        if other.tension.is_some() || other.damping.is_some() {
-            return Err(format!(
-                "curve \"{tension}\" is the tension of \"{name}\": it can have no tension or damping of its own"
-            ));
-        }
-        if other.model.is_some() {
-            return Err(format!(
-                "curve \"{tension}\" is the tension of \"{name}\": models know compression only; give a file or stages"
-            ));
-        }
+    if last.behind.is_some() {
+        return Err(CheckError::NothingBehind { vehicle: last.name.clone() });
     }
     Ok(())
 }
 
 /// Names stand in the columns of the result.
-fn check_name(name: &str) -> Result<(), String> {
+fn check_name(name: &str) -> Result<(), CheckError> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);
-    if name.is_empty() || name.contains(breaks) {
-        return Err(format!(
-            "the name \"{}\" may not be empty or contain , | [ ] or quotes",
-            name.escape_debug()
-        ));
+    match name.is_empty() || name.contains(breaks) {
+        true => Err(CheckError::Name { name: name.into() }),
+        false => Ok(()),
     }
-    Ok(())
+}
+
+/// Keys that only some kinds of curves take.
+fn check_keys(name: &str, table: &CurveTable) -> Result<(), CheckError> {
+    if table.stages.as_ref().is_some_and(Vec::is_empty) {
+        return Err(CheckError::NoStages { curve: name.into() });
+    }
+    let no_model = table.model.is_none();
+    let foreign = [
+        (
+            "force",
+            "a model, predicted curve or case",
+            table.stages.is_some() && table.force.is_some(),
+        ),
+        ("case", "a database", table.database.is_none() && table.case.is_some()),
+        ("max_crush", "a model", no_model && table.max_crush.is_some()),
+        ("parameters", "a model", no_model && !table.parameters.is_empty()),
+        (
+            "unloading",
+            "law = \"memory\"",
+            table.law == LawName::Elastic && table.unloading.is_some(),
+        ),
+    ];
+    match foreign.into_iter().find(|(.., is_foreign)| *is_foreign) {
+        Some((key, of, _)) => Err(CheckError::ForeignKey { curve: name.into(), key, of }),
+        None => Ok(()),
+    }
+}
+
+/// What depends on numbers and on which curve stands where.
+fn check_values(scenario: &Scenario) -> Result<CheckedScenario<'_>, CheckError> {
+    for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
+        check_zones(vehicle, scenario)?;
+    }
+    for (name, table) in &scenario.curves {
+        if let Some(tension) = &table.tension {
+            check_tension(name, tension, scenario)?;
+        }
+    }
+    let first = &scenario.train[0];
+    let speed_m_per_s = first.speed.0;
+    let meeting_m_per_s = speed_m_per_s - scenario.train.get(1).map_or(0.0, |t| t.speed.0);
+    if meeting_m_per_s <= 0.0 {
+        return Err(CheckError::NeverMeets { train: first.name.clone(), speed_m_per_s });
+    }
+    Ok(CheckedScenario { tables: Cow::Borrowed(scenario), meeting_m_per_s })
+}
+
+fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), CheckError> {
+    for (end, zone) in vehicle.zones() {
+        let gap = scenario.curves.get(&zone.curve).and_then(|curve| curve.gap);
+        if gap.is_some_and(|gap| gap.0 > 0.0) {
+            let (curve, vehicle) = (zone.curve.clone(), vehicle.name.clone());
+            return Err(CheckError::ZoneGap { curve, end, vehicle });
+        }
+    }
+    match vehicle.zones().next().is_some() && vehicle.body_mass_kg() <= 0.0 {
+        true => Err(CheckError::NoBodyMass { vehicle: vehicle.name.clone() }),
+        false => Ok(()),
+    }
+}
+
+fn check_tension(name: &str, tension: &str, scenario: &Scenario) -> Result<(), CheckError> {
+    let (curve, tension) = (name.to_string(), tension.to_string());
+    match scenario.curves.get(&tension) {
+        None => Err(CheckError::UnknownTension { curve, tension }),
+        Some(other) if other.tension.is_some() || other.damping.is_some() => {
+            Err(CheckError::TensionOfTension { curve, tension })
+        }
+        Some(other) if other.model.is_some() => Err(CheckError::TensionModel { curve, tension }),
+        Some(_) => Ok(()),
+    }
 }

@@ -1,7 +1,6 @@
 //! Layout: the bodies of a scenario in their row, and the places between them.
 
-use super::check::body_mass_kg;
-use super::{Scenario, TrainTable, VehicleTable};
+use super::{CheckedScenario, TrainTable, VehicleTable};
 use crate::multibody::{Body, Resistance};
 
 /// Bodies from the back of the first train to its nose and on, and what lies between them.
@@ -37,8 +36,8 @@ pub(super) enum Role {
     Within,
 }
 
-/// The row of a scenario that has been checked.
-pub(super) fn layout(scenario: &Scenario) -> Layout<'_> {
+/// The row of a scenario.
+pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
     let mut layout = Layout { bodies: Vec::new(), slots: Vec::new(), order: Vec::new() };
     let first = &scenario.train[0];
     let mut places = vec![[None; 3]; first.vehicles.len()];
@@ -118,7 +117,7 @@ impl<'a> Layout<'a> {
             body(place, &zone_name, zone.mass.0);
             self.slots.push(within(&zone_name, &zone.curve));
         }
-        body(0, name, body_mass_kg(vehicle));
+        body(0, name, vehicle.body_mass_kg());
         if let Some((place, zone_name, zone)) = after {
             body(place, &zone_name, zone.mass.0);
             self.slots.push(within(&zone_name, &zone.curve));

@@ -5,9 +5,9 @@
 
 use std::path::Path;
 
-use super::assemble::{assemble_at, is_local};
-use super::layout::layout;
-use super::{Prepared, Scenario, ScenarioError, Sources};
+use super::assemble::assemble_at;
+use super::layout::{Role, Slot, layout};
+use super::{CheckedScenario, InterfaceSpeed, Prepared, ScenarioError, Source, Sources};
 use crate::curve::rating::peaks;
 use crate::multibody::{Chain, Method, Run, simulate};
 use crate::unit::km_per_h;
@@ -26,16 +26,24 @@ const LONGEST_S: f64 = 5.0;
 /// No curve is asked for below this speed, in m/s: an interface that hardly closes.
 const SLOWEST_M_PER_S: f64 = 0.1;
 
-/// Starts from `prepared`, whose curves are those of `speeds_m_per_s`.
-pub(super) fn settle(
+/// Puts a scenario together with what its files hold; `path` is for messages. Interfaces whose
+/// curves come from models get them for their own closing speeds, unless the scenario asks for
+/// the trains' speed.
+///
+/// # Errors
+/// [`ScenarioError`] names the curve.
+pub fn assemble(
     path: &Path,
-    scenario: &Scenario,
+    scenario: &CheckedScenario<'_>,
     sources: &Sources,
-    mut prepared: Prepared,
-    mut speeds_m_per_s: Vec<f64>,
 ) -> Result<Prepared, ScenarioError> {
     let own: Vec<bool> =
         layout(scenario).slots.iter().map(|slot| is_local(slot, sources)).collect();
+    let mut speeds_m_per_s = vec![scenario.meeting_m_per_s(); own.len()];
+    let mut prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
+    if scenario.run.interface_speed != InterfaceSpeed::Local || !own.contains(&true) {
+        return Ok(prepared);
+    }
     let mut before = vec![0.0; own.len()];
     for _ in 0..ROUNDS {
         let mut settings = prepared.settings;
@@ -83,6 +91,11 @@ pub(super) fn settle(
         ));
     }
     Ok(prepared)
+}
+
+/// Whether a slot's curve depends on its own closing speed: between vehicles, from a model.
+fn is_local(slot: &Slot<'_>, sources: &Sources) -> bool {
+    slot.role == Role::Vehicles && matches!(sources.curves.get(slot.curve), Some(Source::Model(_)))
 }
 
 /// Largest closing speed of interface `k` from its contact to the first maximum of its force;

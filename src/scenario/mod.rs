@@ -10,7 +10,9 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-pub use assemble::{adjust, assemble};
+pub use assemble::{AssemblyError, adjust};
+pub use check::{CheckError, CheckedScenario};
+pub use local::assemble;
 pub use sources::{Source, Sources};
 pub use tables::*;
 
@@ -24,12 +26,15 @@ use crate::surrogate::predict::PredictError;
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
 pub struct Prepared {
+    /// Bodies and interfaces.
     pub chain: Chain,
+    /// Times and method of the run.
     pub settings: RunSettings,
     /// Bodies as the scenario lists them: indices into the chain, first train first.
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
     pub used: Vec<Used>,
+    /// Limits that results are held against.
     pub limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
     pub limited: Vec<usize>,
@@ -51,46 +56,97 @@ pub struct Used {
 /// Why a scenario cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
+    /// It is no TOML, or has other keys.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// It is wrong as a whole.
+    #[error("{path}: {source}")]
+    Check {
+        /// The scenario.
+        path: PathBuf,
+        /// What is wrong.
+        source: CheckError,
+    },
+    /// A curve's source is wrong.
     #[error("{path}: {message}")]
-    Invalid { path: PathBuf, message: String },
+    Invalid {
+        /// The scenario.
+        path: PathBuf,
+        /// What is wrong, with the curve.
+        message: String,
+    },
+    /// A curve cannot stand where the scenario puts it.
+    #[error("{path}: {source}")]
+    Assembly {
+        /// The scenario.
+        path: PathBuf,
+        /// Which curve, and why not.
+        source: AssemblyError,
+    },
+    /// A model file cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A model gives no curve.
     #[error("curve \"{curve}\": {source}")]
-    Predict { curve: String, source: PredictError },
+    Predict {
+        /// Name of the curve.
+        curve: String,
+        /// Why.
+        source: PredictError,
+    },
+    /// A database cannot be used.
     #[error(transparent)]
     Database(#[from] DatabaseError),
+    /// A predicted curve cannot be used.
     #[error(transparent)]
     CurveFile(#[from] json::CurveFileError),
+    /// A table of a curve cannot be used.
     #[error(transparent)]
     Csv(#[from] csv::CsvError),
+    /// Its bodies make no chain.
     #[error("{path}: {source}")]
-    Chain { path: PathBuf, source: ChainError },
+    Chain {
+        /// The scenario.
+        path: PathBuf,
+        /// Why.
+        source: ChainError,
+    },
+    /// The run that looks for the speeds of the interfaces failed.
     #[error("{path}: while the interfaces' speeds were sought: {source}")]
-    Local { path: PathBuf, source: SimulationError },
+    Local {
+        /// The scenario.
+        path: PathBuf,
+        /// Why.
+        source: SimulationError,
+    },
 }
 
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
 ///
 /// # Errors
-/// [`ScenarioError`] as of [`load`].
-pub fn parse(path: &Path, text: &str) -> Result<Scenario, ScenarioError> {
-    checked(path, manifest::parse(path, text)?)
+/// [`ScenarioError`] names the key.
+pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
+    let scenario: Scenario = manifest::parse(path, text)?;
+    Ok(check(path, &scenario)?.into_owned())
 }
 
-fn checked(path: &Path, scenario: Scenario) -> Result<Scenario, ScenarioError> {
-    check::check(&scenario)
-        .map_err(|message| ScenarioError::Invalid { path: path.into(), message })?;
-    Ok(scenario)
+/// Checks a scenario as [`Scenario::check`] does, with its path in the message.
+///
+/// # Errors
+/// [`ScenarioError::Check`] names the key.
+pub fn check<'a>(
+    path: &Path,
+    scenario: &'a Scenario,
+) -> Result<CheckedScenario<'a>, ScenarioError> {
+    scenario.check().map_err(|source| ScenarioError::Check { path: path.into(), source })
 }
 
 /// Reads and checks a scenario; curves are not read.
 ///
 /// # Errors
 /// [`ScenarioError`] names the key.
-pub fn read(path: &Path) -> Result<Scenario, ScenarioError> {
-    checked(path, manifest::load(path)?)
+pub fn read(path: &Path) -> Result<CheckedScenario<'static>, ScenarioError> {
+    parse(path, &manifest::read_text(path)?)
 }
 
 /// Loads a scenario and everything it names.

@@ -18,6 +18,7 @@ use crate::unit::{
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
+    /// Times of the run.
     pub run: RunTable,
     /// Curves, used below by name.
     pub curves: BTreeMap<String, CurveTable>,
@@ -60,6 +61,7 @@ pub struct ReferenceTable {
     /// Units of the file, such as "mm-t-s".
     #[schemars(with = "String")]
     pub units: UnitSystem,
+    /// Component of the nodes, `x_velocity` if absent.
     #[serde(default = "x_velocity")]
     pub component: String,
     /// Node of each vehicle, by the vehicle's name.
@@ -80,6 +82,7 @@ fn x_velocity() -> String {
 pub struct RunTable {
     /// From the first contact; the last output is the last whole output_interval in it.
     pub duration: TimeText,
+    /// Of the recorded states; 0.75 ms if absent.
     #[serde(default = "default_interval")]
     pub output_interval: TimeText,
     /// Longest integration step.
@@ -156,8 +159,10 @@ pub struct CurveTable {
     /// force, but not where memory has left a gap; then it only pushes. With a tension curve it
     /// acts along both and may pull.
     pub damping: Option<DampingTable>,
+    /// Force law.
     #[serde(default)]
     pub law: LawName,
+    /// What the force does beyond the curve.
     #[serde(default)]
     pub end: EndName,
     /// Of a model: the rule for the maximal crush; the model's own if absent.
@@ -182,6 +187,7 @@ pub struct CurveTable {
 pub struct StageTable {
     /// For people, such as "deformation tube".
     pub name: Option<String>,
+    /// Length of the stage.
     pub stroke: LengthText,
     /// Force at the begin of the stage, 0 if absent: it steps there from the stage before.
     pub from: Option<ForceText>,
@@ -194,8 +200,10 @@ pub struct StageTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DampingTable {
+    /// Closing speeds, rising; 0 if absent.
     #[serde(default = "zero")]
     pub speed_m_per_s: Vec<f64>,
+    /// The coefficient at each.
     #[serde(rename = "coefficient_N_s_per_m")]
     pub coefficient_n_s_per_m: Vec<f64>,
 }
@@ -232,6 +240,7 @@ pub enum EndName {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainTable {
+    /// Of the train, such as "A".
     pub name: String,
     /// In the direction in which the first train moves; below 0 if it comes against it.
     pub speed: SignedSpeedText,
@@ -247,6 +256,7 @@ pub struct TrainTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleTable {
+    /// Of the vehicle, as in the results.
     pub name: String,
     /// Of the whole vehicle.
     pub mass: MassText,
@@ -257,6 +267,19 @@ pub struct VehicleTable {
     pub front: Option<CrushZoneTable>,
     /// The same at its rear.
     pub rear: Option<CrushZoneTable>,
+}
+
+impl VehicleTable {
+    /// Its crush zones by the end at which they are, `front` before `rear`.
+    pub fn zones(&self) -> impl Iterator<Item = (&'static str, &CrushZoneTable)> {
+        let front = self.front.as_ref().map(|zone| ("front", zone));
+        front.into_iter().chain(self.rear.as_ref().map(|zone| ("rear", zone)))
+    }
+
+    /// Mass without the crush zones, in kg.
+    pub fn body_mass_kg(&self) -> f64 {
+        self.mass.0 - self.zones().map(|(_, zone)| zone.mass.0).sum::<f64>()
+    }
 }
 
 /// A mass split off a vehicle: it stands in front of the interface's spring, the body behind.
@@ -274,8 +297,11 @@ pub struct CrushZoneTable {
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
 pub struct ResistanceTable {
+    /// A.
     pub constant_m_per_s2: f64,
+    /// B.
     pub linear_per_s: f64,
+    /// C.
     pub quadratic_per_m: f64,
     /// Coefficient of friction of the brakes, over the whole weight.
     pub braking: f64,
@@ -285,6 +311,7 @@ pub struct ResistanceTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallTable {
+    /// As in the results.
     #[serde(default = "wall_name")]
     pub name: String,
 }

@@ -1,70 +1,118 @@
 //! Joining the files of all shards.
 
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::collections::BTreeSet;
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::draft::{Tally, each_line, is_hdf5};
-use super::hdf5::{self, Shelf};
 use super::row::Head;
+use super::shard_file::ShardFile;
+use super::tally::Tally;
+use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, SweepError};
-use crate::database::WriterLock;
-use crate::file::{self, write_at};
+use crate::file::{self, WriterLock, write_at};
 
-/// First bytes of an HDF5 file.
-const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
+/// Why files cannot be joined.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// No file was given.
+    #[error("there is nothing to merge: give the files of the shards")]
+    Nothing,
+    /// A file is not of this program.
+    #[error("{path} is no result of crumple sweep: give the files of its shards")]
+    NoResult {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file is HDF5, which a finished sweep is converted to and which is not joined.
+    #[error("{path} is HDF5: merge the shards as .csv and name the output .h5 or .hdf5")]
+    Hdf5 {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Two files are of two sweeps.
+    #[error(
+        "{path} and {first} are of different sweeps: plan, scenario, a file it names or crumple's version differ"
+    )]
+    OtherSweep {
+        /// The file.
+        path: PathBuf,
+        /// The file that was given first.
+        first: PathBuf,
+    },
+    /// Two files are of two divisions of one sweep.
+    #[error(
+        "{path} is one of {count} shards, {first} one of {first_count}: merge those of one division"
+    )]
+    OtherDivision {
+        /// The file.
+        path: PathBuf,
+        /// How many shards there are of its division.
+        count: u64,
+        /// The file that was given first.
+        first: PathBuf,
+        /// How many shards there are of that one's.
+        first_count: u64,
+    },
+    /// Two files are the same shard.
+    #[error("{a} and {b} are both shard {index}: give each once")]
+    Twice {
+        /// One file.
+        a: PathBuf,
+        /// The other.
+        b: PathBuf,
+        /// Which shard they are.
+        index: u64,
+    },
+    /// Some shards are not given.
+    #[error("of {count} shards {} given: missing {}", are(*.given), some(.missing, *.count - *.given))]
+    Missing {
+        /// Shards of the division.
+        count: u64,
+        /// How many are given.
+        given: u64,
+        /// The first that are not, counted from 1.
+        missing: Vec<u64>,
+    },
+}
 
-/// Joins the files of all shards of one sweep, given in any order, to what the sweep gives
-/// without shards. CSV is joined to CSV or HDF5, HDF5 to HDF5.
+/// Missing shards that a message lists.
+const LISTED: usize = 10;
+
+fn are(given: u64) -> String {
+    if given == 1 { "1 is".into() } else { format!("{given} are") }
+}
+
+fn some(listed: &[u64], all: u64) -> String {
+    let names: Vec<String> = listed.iter().map(u64::to_string).collect();
+    let more = if all > listed.len() as u64 { ", …" } else { "" };
+    names.join(", ") + more
+}
+
+/// Joins the CSV files of all shards of one sweep, given in any order, to what the sweep gives
+/// without shards: CSV, or HDF5 by the extensions `.h5` and `.hdf5`.
 ///
 /// # Errors
 /// [`SweepError::Merge`] names what is missing, twice or foreign; [`SweepError::Damaged`] the
 /// first row that is not there; [`SweepError::Lock`] another writer. The output is then unchanged.
 pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
     let _lock = WriterLock::take(output)?;
-    let mut tables = Vec::new();
-    let mut shelves = Vec::new();
-    for path in inputs {
-        match is_hdf5_file(path)? {
-            true => shelves.push((path.clone(), Shelf::open(path)?)),
-            false => tables.push((path.clone(), read_head(path)?)),
-        }
-    }
-    if let (Some((a, _)), Some((b, _))) = (tables.first(), shelves.first()) {
-        let (a, b) = (a.display(), b.display());
-        return Err(failed(format!("{a} is CSV, {b} is HDF5: merge files of one kind")));
-    }
-    if let Some((path, _)) = shelves.first() {
-        if !is_hdf5(output) {
-            let (path, output) = (path.display(), output.display());
-            return Err(failed(format!(
-                "{path} is HDF5, so its merged file is, too: name {output} .h5 or .hdf5"
-            )));
-        }
-        let whole = ordered(&mut shelves, |shelf| &shelf.head)?;
-        let mut tally = Tally::new(&whole);
-        let shelves: Vec<Shelf> = shelves.into_iter().map(|(_, shelf)| shelf).collect();
-        hdf5::join(&shelves, &whole, output)?;
-        for shelf in &shelves {
-            shelf.tally(&mut tally)?;
-        }
-        return Ok(tally.close());
-    }
-    let whole = ordered(&mut tables, |head| head)?;
+    let mut files = inputs.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
+    let whole = ordered(&mut files)?;
     let mut tally = Tally::new(&whole);
     if is_hdf5(output) {
-        for (path, head) in &tables {
-            lines(path, head, |line| tally.see_line(line).then_some(()))?;
+        for file in &files {
+            file.rows(|line| tally.see_line(line).then_some(()))?;
         }
-        hdf5::convert(&tables, &whole, output)?;
+        to_hdf5::convert(&files, &whole, output)?;
         return Ok(tally.close());
     }
     let mut failure = None;
-    let written = write_at(output, |file| {
-        let mut out = BufWriter::new(file);
+    let written = write_at(output, |target| {
+        let mut out = BufWriter::new(target);
         out.write_all(whole.text().as_bytes())?;
-        for (path, head) in &tables {
+        for file in &files {
             let mut trouble = Ok(());
-            let read = lines(path, head, |line| {
+            let read = file.rows(|line| {
                 tally.see_line(line).then_some(())?;
                 trouble = out.write_all(line);
                 trouble.is_ok().then_some(())
@@ -76,7 +124,7 @@ pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
             }
         }
         out.flush()?;
-        file.sync_all().map(Some)
+        target.sync_all().map(Some)
     });
     match (failure, written) {
         (Some(error), _) => Err(error),
@@ -85,81 +133,54 @@ pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
     }
 }
 
-fn failed(message: String) -> SweepError {
-    SweepError::Merge { message }
-}
+/// First bytes of an HDF5 file.
+const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
-fn is_hdf5_file(path: &Path) -> Result<bool, SweepError> {
+fn open(path: &Path) -> Result<ShardFile, SweepError> {
+    if let Some(file) = ShardFile::open(path)? {
+        return Ok(file);
+    }
     let io = |source| SweepError::Read { path: path.into(), source };
     let mut first = Vec::new();
     file::open(path).map_err(io)?.take(8).read_to_end(&mut first).map_err(io)?;
-    Ok(first == HDF5_SIGNATURE)
-}
-
-fn read_head(path: &Path) -> Result<Head, SweepError> {
-    let io = |source| SweepError::Read { path: path.into(), source };
-    let mut reader = BufReader::new(file::open(path).map_err(io)?);
-    let head = Head::read(&mut reader).map_err(io)?;
-    head.map(|(head, _)| head).ok_or_else(|| {
-        let path = path.display();
-        failed(format!("{path} is no result of crumple sweep: give the files of its shards"))
-    })
-}
-
-fn lines(path: &Path, head: &Head, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
-    let io = |source: io::Error| SweepError::Read { path: path.into(), source };
-    let mut reader = BufReader::with_capacity(1 << 16, file::open(path).map_err(io)?);
-    Head::read(&mut reader).map_err(io)?;
-    each_line(path, &mut reader, see, head)
+    Err(match first == HDF5_SIGNATURE {
+        true => MergeError::Hdf5 { path: path.into() },
+        false => MergeError::NoResult { path: path.into() },
+    }
+    .into())
 }
 
 /// Puts files in the order of their shards and checks that they are all of one sweep; the head
 /// of the whole.
-fn ordered<T>(files: &mut [(PathBuf, T)], head: impl Fn(&T) -> &Head) -> Result<Head, SweepError> {
-    let Some((first_path, first)) = files.first() else {
-        return Err(failed("there is nothing to merge: give the files of the shards".into()));
+fn ordered(files: &mut [ShardFile]) -> Result<Head, MergeError> {
+    let Some(ShardFile { path: first_path, head: first }) = files.first() else {
+        return Err(MergeError::Nothing);
     };
-    let (first_path, first) = (first_path.display().to_string(), head(first).clone());
-    for (path, file) in files.iter() {
-        let head = head(file);
-        let path = path.display();
+    let (first_path, first) = (first_path.clone(), first.clone());
+    for ShardFile { path, head } in files.iter() {
         if head.differs_from(&Head { shard: head.shard, ..first.clone() }).is_some() {
-            return Err(failed(format!(
-                "{path} and {first_path} are of different sweeps: plan, scenario, a file it names or crumple's version differ"
-            )));
+            return Err(MergeError::OtherSweep { path: path.clone(), first: first_path });
         }
         if head.shard.count() != first.shard.count() {
-            let (n, other) = (head.shard.count(), first.shard.count());
-            return Err(failed(format!(
-                "{path} is one of {n} shards, {first_path} one of {other}: merge those of one division"
-            )));
+            let (path, count) = (path.clone(), head.shard.count());
+            let (first, first_count) = (first_path, first.shard.count());
+            return Err(MergeError::OtherDivision { path, count, first, first_count });
         }
     }
-    files.sort_by_key(|(_, file)| head(file).shard.index());
+    files.sort_by_key(|file| file.head.shard.index());
     for pair in files.windows(2) {
-        let index = head(&pair[0].1).shard.index();
-        if index == head(&pair[1].1).shard.index() {
-            let (a, b) = (pair[0].0.display(), pair[1].0.display());
-            return Err(failed(format!("{a} and {b} are both shard {index}: give each once")));
+        let (a, b) = (&pair[0], &pair[1]);
+        let index = a.head.shard.index();
+        if index == b.head.shard.index() {
+            return Err(MergeError::Twice { a: a.path.clone(), b: b.path.clone(), index });
         }
     }
     let count = first.shard.count();
-    let there: std::collections::BTreeSet<u64> =
-        files.iter().map(|(_, file)| head(file).shard.index()).collect();
-    // Only so many are looked for as a message can hold.
-    let missing: Vec<String> = (1..=count)
-        .filter(|index| !there.contains(index))
-        .take(10)
-        .map(|index| index.to_string())
-        .collect();
-    if !missing.is_empty() {
-        let more = (count - there.len() as u64) as usize > missing.len();
-        return Err(failed(format!(
-            "of {count} shards {} given: missing {}{}",
-            if there.len() == 1 { "1 is".into() } else { format!("{} are", there.len()) },
-            missing.join(", "),
-            if more { ", …" } else { "" }
-        )));
+    let there: BTreeSet<u64> = files.iter().map(|file| file.head.shard.index()).collect();
+    let missing: Vec<u64> =
+        (1..=count).filter(|index| !there.contains(index)).take(LISTED).collect();
+    match missing.is_empty() {
+        true => Ok(Head { shard: Shard::WHOLE, ..first }),
+        false => Err(MergeError::Missing { count, given: there.len() as u64, missing }),
     }
-    Ok(Head { shard: Shard::WHOLE, ..first })
 }

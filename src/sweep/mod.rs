@@ -5,12 +5,14 @@
 //! nothing grows with their number. The file under work is its own journal: a run that was
 //! stopped goes on behind its last whole row.
 
-mod draft;
-mod hdf5;
+mod journal;
 mod merge;
 mod row;
 mod run;
+mod shard_file;
 mod statistics;
+mod tally;
+mod to_hdf5;
 mod variables;
 
 use std::io;
@@ -18,19 +20,19 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::database::{DatabaseError, LockError};
-use crate::file::{self, WriteError};
+use crate::file::{self, LockError, WriteError};
+use crate::hdf5::TableError;
 use crate::manifest::{self, ManifestError};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
-use crate::scenario::{self, Prepared, Scenario, ScenarioError, Sources};
-pub use draft::{Settings, write, write_rows};
-pub use merge::merge;
+use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
+pub use journal::{WriteOptions, write, write_rows};
+pub use merge::{MergeError, merge};
 pub use row::{Head, Row, Status};
 pub use run::Chunk;
 pub use statistics::{ColumnStatistics, Statistics};
 use variables::Variable;
-pub use variables::VariableSummary;
+pub use variables::{BindError, VariableError, VariableSummary};
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///
@@ -50,10 +52,12 @@ impl Shard {
         (1 <= index && index <= count).then_some(Self { index, count })
     }
 
+    /// Which block, counted from 1.
     pub fn index(self) -> u64 {
         self.index
     }
 
+    /// How many blocks there are.
     pub fn count(self) -> u64 {
         self.count
     }
@@ -69,28 +73,68 @@ impl Shard {
 /// Why a sweep was not run, not written or not merged.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
+    /// A TOML file is wrong.
     #[error(transparent)]
     Manifest(#[from] ManifestError),
+    /// The scenario is wrong, or a file it names.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    #[error("{path}: {message}")]
-    Plan { path: PathBuf, message: String },
+    /// Nobody says what is varied.
+    #[error("{path}: there is no [sweep]: add one, or give it in another file with --plan")]
+    NoPlan {
+        /// The scenario, or the file of `--plan`.
+        path: PathBuf,
+    },
+    /// The plan does not go with the scenario.
     #[error("{path}: {source}")]
-    Read { path: PathBuf, source: io::Error },
+    Plan {
+        /// The file with the plan.
+        path: PathBuf,
+        /// Why.
+        source: BindError,
+    },
+    /// A file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// HDF5 cannot be written or read.
     #[error(transparent)]
-    Database(#[from] DatabaseError),
+    Table(#[from] TableError),
+    /// Another process writes the output.
     #[error(transparent)]
     Lock(#[from] LockError),
+    /// What is there is of another sweep.
     #[error("{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it")]
-    Changed { path: PathBuf, differs: String },
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// What is not the same.
+        differs: String,
+    },
+    /// What is there is of nobody we know.
     #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
-    Foreign { path: PathBuf },
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Rows are missing or not whole.
     #[error("{path}: {message}")]
-    Damaged { path: PathBuf, message: String },
-    #[error("{message}")]
-    Merge { message: String },
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// The files are not the shards of one sweep.
+    #[error(transparent)]
+    Merge(#[from] MergeError),
 }
 
 /// What has been done.
@@ -98,6 +142,7 @@ pub enum SweepError {
 pub struct Report {
     /// Items of the whole sweep.
     pub items: u64,
+    /// Which part of them was to be run.
     pub shard: Shard,
     /// Rows of this shard.
     pub rows: u64,
@@ -105,10 +150,13 @@ pub struct Report {
     pub resumed: u64,
     /// Rows there are now: fewer than `rows` if the run was stopped.
     pub done: u64,
+    /// Rows without a result.
     pub failed: u64,
+    /// Rows with a warning.
     pub warned: u64,
     /// The first few messages of rows that failed, by item.
     pub messages: Vec<(u64, String)>,
+    /// Statistics of the columns of numbers.
     pub columns: Vec<ColumnStatistics>,
 }
 
@@ -122,7 +170,7 @@ impl Report {
 /// A scenario with a plan, checked, its files read.
 pub struct Sweep {
     path: PathBuf,
-    scenario: Scenario,
+    scenario: CheckedScenario<'static>,
     sources: Sources,
     design: Design,
     variables: Vec<Variable>,
@@ -139,16 +187,16 @@ impl Sweep {
     /// [`SweepError`] names file and key.
     pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, SweepError> {
         let text = manifest::read_text(path)?;
-        let mut scenario = scenario::parse(path, &text)?;
+        let scenario = scenario::parse(path, &text)?;
         let plan_path = plan.unwrap_or(path);
         let of_file = match plan {
             Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
             None => None,
         };
-        let invalid = |message: String| SweepError::Plan { path: plan_path.into(), message };
-        let plan = of_file.or(scenario.sweep.take()).ok_or_else(|| {
-            invalid("there is no [sweep]: add one, or give it in another file with --plan".into())
-        })?;
+        let invalid = |source| SweepError::Plan { path: plan_path.into(), source };
+        let plan = of_file
+            .or_else(|| scenario.sweep.clone())
+            .ok_or_else(|| SweepError::NoPlan { path: plan_path.into() })?;
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
         let results = results(&plan).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
@@ -197,12 +245,12 @@ impl Sweep {
     }
 }
 
-fn results(plan: &Plan) -> Result<Vec<ResultName>, String> {
+fn results(plan: &Plan) -> Result<Vec<ResultName>, BindError> {
     let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
     match kept.len() == asked.len() && !kept.is_empty() {
         true => Ok(kept),
-        false => Err("sweep.results: name each result once, and at least one".into()),
+        false => Err(BindError::Results),
     }
 }
 

@@ -9,6 +9,7 @@ pub const LAYOUT: i64 = 1;
 /// How an item ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
+    /// There is a result.
     Ok,
     /// There is a result, with a warning.
     Warned,
@@ -17,8 +18,10 @@ pub enum Status {
 }
 
 impl Status {
+    /// All of them.
     pub const ALL: [Self; 3] = [Self::Ok, Self::Warned, Self::Failed];
 
+    /// Its name in the column `status`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -31,9 +34,11 @@ impl Status {
 /// One item's row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// The item.
     pub item: u64,
     /// Varied values, then results, in SI; NaN where there is none.
     pub values: Vec<f64>,
+    /// How it ended.
     pub status: Status,
     /// Why it failed, or its warnings; one line.
     pub message: String,
@@ -123,10 +128,15 @@ impl<'a> Line<'a> {
 /// What stands above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Head {
+    /// Version of the program that wrote it.
     pub version: String,
+    /// What tells the sweep from any other, see [`Sweep::hash`].
     pub hash: String,
+    /// Items of the whole sweep.
     pub items: u64,
+    /// Which part of them follows.
     pub shard: Shard,
+    /// Names of the columns.
     pub columns: Vec<String>,
 }
 
@@ -156,6 +166,7 @@ impl Head {
         name.starts_with("curve[") || column + 2 >= self.columns.len()
     }
 
+    /// The head as it stands above the rows.
     pub fn text(&self) -> String {
         let Shard { index, count } = self.shard;
         let rows = self.rows();

@@ -17,6 +17,7 @@ use crate::scenario::{self, Prepared, Scenario};
 pub enum Chunk {
     /// As many as take this long.
     Time(Duration),
+    /// So many.
     Items(u64),
 }
 
@@ -102,7 +103,7 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn new(sweep: &'a Sweep) -> Self {
         let shaping = sweep.variables.iter().map(|v| v.shapes_laws(&sweep.scenario)).collect();
-        let (scenario, values) = (sweep.scenario.clone(), Vec::new());
+        let (scenario, values) = (Scenario::clone(&sweep.scenario), Vec::new());
         Self { sweep, scenario, values, shaping, chains: Vec::new() }
     }
 
@@ -171,10 +172,12 @@ impl<'a> Worker<'a> {
         // The path is the same for all items and known to whoever reads the message.
         let said = |e: scenario::ScenarioError| match e {
             scenario::ScenarioError::Invalid { message, .. } => message,
+            scenario::ScenarioError::Assembly { source, .. } => source.to_string(),
             scenario::ScenarioError::Chain { source, .. } => source.to_string(),
             other => other.to_string(),
         };
         let Self { sweep, scenario, values, shaping, chains } = self;
+        let scenario = &sweep.scenario.vary(scenario).map_err(|e| e.to_string())?;
         let shaping = values.iter().zip(&*shaping).filter(|(_, shapes)| **shapes);
         let key: Vec<u64> = shaping.map(|(value, _)| value.to_bits()).collect();
         match chains.iter().position(|(k, _)| *k == key) {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
+use crate::plan::{Design, Plan, PlanError, Spread, Vary, VaryError, Vehicles, What};
 use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
@@ -32,27 +32,160 @@ enum Target {
 /// A variable for people to look at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariableSummary {
+    /// Name of its column.
     pub column: String,
     /// Values along the grid; `None` of a distribution.
     pub values: Option<u64>,
 }
 
+/// Why a plan cannot be carried out on a scenario.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BindError {
+    /// There is no variable.
+    #[error("[sweep] varies nothing: add [[sweep.vary]]")]
+    Nothing,
+    /// A variable is wrong.
+    #[error("sweep.vary {number} ({}): {source}", .what.name())]
+    Variable {
+        /// Which one, counted from 1.
+        number: usize,
+        /// What it varies.
+        what: What,
+        /// What is wrong with it.
+        source: VariableError,
+    },
+    /// The variables do not go together.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A result is named twice, or none is.
+    #[error("sweep.results: name each result once, and at least one")]
+    Results,
+}
+
+/// What is wrong with one variable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VariableError {
+    /// Its values or its distribution.
+    #[error(transparent)]
+    Spread(#[from] VaryError),
+    /// Another variable has the same column.
+    #[error("{column} is varied twice")]
+    Twice {
+        /// The column.
+        column: String,
+    },
+    /// A speed without its train.
+    #[error("name the train: train = \"…\"")]
+    NoTrain,
+    /// A curve is varied, and nobody says which.
+    #[error("name the curve: curve = \"…\"")]
+    NoCurve,
+    /// A mass without its vehicle.
+    #[error("give vehicle = \"…\", or vehicles = […] or \"all\"")]
+    NoVehicle,
+    /// A gap without its place.
+    #[error("give curve = \"…\" or interface = \"contact\"")]
+    NoGapNamed,
+    /// A name that the scenario does not have.
+    #[error("there is no {what} \"{name}\": the scenario has {known}")]
+    Unknown {
+        /// `train`, `vehicle` or `curve`.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A key of another kind of variable.
+    #[error("{key} does not go with what = \"{}\"", .what.name())]
+    Key {
+        /// The key.
+        key: &'static str,
+        /// What is varied.
+        what: What,
+    },
+    /// A crush zone is joined to its body without a gap.
+    #[error("curve \"{curve}\" joins a crush zone to its body, where there is no gap")]
+    ZoneGap {
+        /// The curve.
+        curve: String,
+    },
+    /// A factor on nothing.
+    #[error("curve \"{curve}\" has no gap that a factor could change")]
+    NoGap {
+        /// The curve.
+        curve: String,
+    },
+    /// The contact's own gap hides the curve's.
+    #[error(
+        "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
+    )]
+    GapUnused {
+        /// The curve.
+        curve: String,
+    },
+    /// A factor on nothing.
+    #[error("the contact has no gap that a factor could change")]
+    NoContactGap,
+    /// An interface other than the contact.
+    #[error(
+        "interface = \"{found}\": expected \"contact\"; gaps inside a train are those of its curve"
+    )]
+    Interface {
+        /// As written.
+        found: String,
+    },
+    /// A curve without a band.
+    #[error("curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one")]
+    NoBand {
+        /// The curve.
+        curve: String,
+    },
+    /// A word that is not `all`.
+    #[error("vehicles = \"{found}\": expected a list, or \"all\"")]
+    Vehicles {
+        /// As written.
+        found: String,
+    },
+    /// A vehicle that is listed twice.
+    #[error("vehicles names \"{name}\" twice")]
+    VehicleTwice {
+        /// The vehicle.
+        name: String,
+    },
+    /// A curve that stands nowhere.
+    #[error("no interface has curve \"{curve}\", so varying it has no effect")]
+    CurveUnused {
+        /// The curve.
+        curve: String,
+    },
+    /// A name that cannot stand in a column.
+    #[error(
+        "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
+        .name.escape_debug()
+    )]
+    Name {
+        /// The name.
+        name: String,
+    },
+}
+
 /// The variables of a plan, in order of their columns, and its design.
 ///
 /// # Errors
-/// A message that names the variable and key.
-pub fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), String> {
+/// [`BindError`] names the variable and key.
+pub fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), BindError> {
     if plan.vary.is_empty() {
-        return Err("[sweep] varies nothing: add [[sweep.vary]]".into());
+        return Err(BindError::Nothing);
     }
     let (mut variables, mut spreads) = (Vec::new(), Vec::new());
     for (k, vary) in plan.vary.iter().enumerate() {
-        let named = |m: String| format!("sweep.vary {} ({}): {m}", k + 1, vary.what.name());
+        let named = |source| BindError::Variable { number: k + 1, what: vary.what, source };
         let bound = Binder { vary, scenario, plan }.variables().map_err(named)?;
-        let spread = vary.spread().map_err(named)?;
+        let spread = vary.spread().map_err(|e| named(e.into()))?;
         for variable in bound {
             if variables.iter().any(|v: &Variable| v.column == variable.column) {
-                return Err(named(format!("{} is varied twice", variable.column)));
+                return Err(named(VariableError::Twice { column: variable.column }));
             }
             variables.push(variable);
             spreads.push(spread.clone());
@@ -69,13 +202,13 @@ struct Binder<'a> {
 }
 
 impl Binder<'_> {
-    fn variables(&self) -> Result<Vec<Variable>, String> {
+    fn variables(&self) -> Result<Vec<Variable>, VariableError> {
         let vary = self.vary;
         self.only_own_keys()?;
         match vary.what {
             What::Speed => {
                 let trains = &self.scenario.train;
-                let name = vary.train.as_deref().ok_or("name the train: train = \"…\"")?;
+                let name = vary.train.as_deref().ok_or(VariableError::NoTrain)?;
                 let known = trains.iter().map(|t| t.name.as_str());
                 let at = known.clone().position(|t| t == name);
                 let at = at.ok_or_else(|| unknown("train", name, known))?;
@@ -87,45 +220,35 @@ impl Binder<'_> {
                     self.check_curve(curve)?;
                     let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
                     if vehicles.any(|v| v.front.iter().chain(&v.rear).any(|z| z.curve == *curve)) {
-                        return Err(format!(
-                            "curve \"{curve}\" joins a crush zone to its body, where there is no gap"
-                        ));
+                        return Err(VariableError::ZoneGap { curve: curve.clone() });
                     }
                     if vary.factor && self.scenario.curves[curve].gap.is_none() {
-                        return Err(format!(
-                            "curve \"{curve}\" has no gap that a factor could change"
-                        ));
+                        return Err(VariableError::NoGap { curve: curve.clone() });
                     }
                     if self.scenario.contact.gap.is_some()
                         && !self.scenario.clone().curve_names_mut()[1..]
                             .iter()
                             .any(|name| *name == curve)
                     {
-                        return Err(format!(
-                            "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
-                        ));
+                        return Err(VariableError::GapUnused { curve: curve.clone() });
                     }
                     self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
                 }
                 (None, Some("contact")) => {
                     if vary.factor && self.scenario.contact.gap.is_none() {
-                        return Err("the contact has no gap that a factor could change".into());
+                        return Err(VariableError::NoContactGap);
                     }
                     self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
                 }
-                (None, Some(other)) => Err(format!(
-                    "interface = \"{other}\": expected \"contact\"; gaps inside a train are those of its curve"
-                )),
-                _ => Err("give curve = \"…\" or interface = \"contact\"".into()),
+                (None, Some(other)) => Err(VariableError::Interface { found: other.into() }),
+                _ => Err(VariableError::NoGapNamed),
             },
             What::Band => {
                 let curve = self.curve()?;
                 let table = &self.scenario.curves[curve];
                 let is_json = |p: &std::path::PathBuf| p.extension().is_some_and(|e| e == "json");
                 if table.model.is_none() && !table.file.as_ref().is_some_and(is_json) {
-                    return Err(format!(
-                        "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
-                    ));
+                    return Err(VariableError::NoBand { curve: curve.into() });
                 }
                 self.one("band", "band", curve, Target::Band(curve.into()))
             }
@@ -145,7 +268,7 @@ impl Binder<'_> {
     }
 
     /// Refuses keys of other kinds of variables.
-    fn only_own_keys(&self) -> Result<(), String> {
+    fn only_own_keys(&self) -> Result<(), VariableError> {
         let vary = self.vary;
         let keys = [
             ("train", vary.train.is_some(), vary.what == What::Speed),
@@ -157,14 +280,12 @@ impl Binder<'_> {
             ("factor", vary.factor, matches!(vary.what, What::Speed | What::Mass | What::Gap)),
         ];
         match keys.iter().find(|(_, given, own)| *given && !own) {
-            Some((key, ..)) => {
-                Err(format!("{key} does not go with what = \"{}\"", vary.what.name()))
-            }
+            Some((key, ..)) => Err(VariableError::Key { key, what: vary.what }),
             None => Ok(()),
         }
     }
 
-    fn masses(&self) -> Result<Vec<Variable>, String> {
+    fn masses(&self) -> Result<Vec<Variable>, VariableError> {
         let vehicles = || {
             let trains = self.scenario.train.iter().enumerate();
             trains.flat_map(|(t, train)| {
@@ -181,23 +302,23 @@ impl Binder<'_> {
                 vehicles().map(|(place, name)| (name, place)).collect()
             }
             (None, Some(Vehicles::Word(word))) => {
-                return Err(format!("vehicles = \"{word}\": expected a list, or \"all\""));
+                return Err(VariableError::Vehicles { found: word.clone() });
             }
             (None, Some(Vehicles::List(names))) if !names.is_empty() => {
-                let places: Result<Vec<_>, String> =
+                let places: Result<Vec<_>, VariableError> =
                     names.iter().map(|name| Ok((name.as_str(), find(name)?))).collect();
                 places?
             }
-            _ => return Err("give vehicle = \"…\", or vehicles = […] or \"all\"".into()),
+            _ => return Err(VariableError::NoVehicle),
         };
         if let Some(k) = (1..named.len()).find(|&k| named[..k].iter().any(|n| n.0 == named[k].0)) {
-            return Err(format!("vehicles names \"{}\" twice", named[k].0));
+            return Err(VariableError::VehicleTwice { name: named[k].0.into() });
         }
         if self.vary.each {
             let each = |(name, place): (&str, (usize, usize))| {
                 self.one("mass_kg", "mass_factor", name, Target::Mass(vec![place]))
             };
-            let variables: Result<Vec<Vec<Variable>>, String> =
+            let variables: Result<Vec<Vec<Variable>>, VariableError> =
                 named.into_iter().map(each).collect();
             return variables.map(|v| v.into_iter().flatten().collect());
         }
@@ -214,7 +335,7 @@ impl Binder<'_> {
         factor: &str,
         name: &str,
         target: Target,
-    ) -> Result<Vec<Variable>, String> {
+    ) -> Result<Vec<Variable>, VariableError> {
         check_name(name)?;
         let quantity = if self.vary.factor { factor } else { absolute };
         let names = match self.vary.what {
@@ -225,13 +346,13 @@ impl Binder<'_> {
         Ok(vec![Variable { column, target, factor: self.vary.factor, names }])
     }
 
-    fn curve(&self) -> Result<&str, String> {
-        let curve = self.vary.curve.as_deref().ok_or("name the curve: curve = \"…\"")?;
+    fn curve(&self) -> Result<&str, VariableError> {
+        let curve = self.vary.curve.as_deref().ok_or(VariableError::NoCurve)?;
         self.check_curve(curve)?;
         Ok(curve)
     }
 
-    fn known_curve(&self, curve: &str) -> Result<(), String> {
+    fn known_curve(&self, curve: &str) -> Result<(), VariableError> {
         match self.scenario.curves.contains_key(curve) {
             true => Ok(()),
             false => Err(unknown("curve", curve, self.scenario.curves.keys().map(String::as_str))),
@@ -239,7 +360,7 @@ impl Binder<'_> {
     }
 
     /// A curve that is there, and that some item uses.
-    fn check_curve(&self, curve: &str) -> Result<(), String> {
+    fn check_curve(&self, curve: &str) -> Result<(), VariableError> {
         self.known_curve(curve)?;
         let replaces = |v: &Vary| {
             v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
@@ -249,26 +370,25 @@ impl Binder<'_> {
             || self.plan.vary.iter().any(replaces);
         match used {
             true => Ok(()),
-            false => {
-                Err(format!("no interface has curve \"{curve}\", so varying it has no effect"))
-            }
+            false => Err(VariableError::CurveUnused { curve: curve.into() }),
         }
     }
 }
 
-fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
+fn unknown<'a>(
+    what: &'static str,
+    name: &str,
+    known: impl Iterator<Item = &'a str>,
+) -> VariableError {
     let known: Vec<&str> = known.collect();
-    format!("there is no {what} \"{name}\": the scenario has {}", known.join(", "))
+    VariableError::Unknown { what, name: name.into(), known: known.join(", ") }
 }
 
 /// Names stand in the columns of the result.
-fn check_name(name: &str) -> Result<(), String> {
+fn check_name(name: &str) -> Result<(), VariableError> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     match name.is_empty() || name.contains(breaks) {
-        true => Err(format!(
-            "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
-            name.escape_debug()
-        )),
+        true => Err(VariableError::Name { name: name.into() }),
         false => Ok(()),
     }
 }

@@ -1,42 +1,36 @@
-//! The file under work: CSV beside the output, taken up again where it ends, renamed or
+//! The journal of a run: CSV beside the output, taken up again where it ends, renamed or
 //! converted when it is complete.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::hdf5;
-use super::row::{Head, Line, MAX_HEAD_BYTES, Status, bad_row};
-use super::run::{self, Chunk, Written};
-use super::statistics::Statistics;
+use super::row::Head;
+use super::run::{self, Chunk};
+use super::shard_file::{ShardFile, read_line};
+use super::tally::Tally;
+use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, Sweep, SweepError};
-use crate::database::WriterLock;
-use crate::file::{self, WriteError};
+use crate::file::{WriteError, WriterLock};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct WriteOptions {
+    /// Which items are run.
     pub shard: Shard,
     /// Begin anew, whatever stands at the output or is left of an earlier run.
     pub restart: bool,
+    /// How many items are run before their rows are written.
     pub chunk: Chunk,
 }
 
-impl Default for Settings {
+impl Default for WriteOptions {
     fn default() -> Self {
         Self { shard: Shard::WHOLE, restart: false, chunk: Chunk::default() }
     }
 }
-
-/// Whether a path is to become HDF5.
-pub(super) fn is_hdf5(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
-}
-
-/// Longer lines are no rows: the columns' names fit into as much.
-const MAX_LINE_BYTES: u64 = MAX_HEAD_BYTES as u64;
 
 fn beside(path: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(path.file_name().unwrap_or_default());
@@ -58,16 +52,16 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 pub fn write(
     sweep: &Sweep,
     output: &Path,
-    settings: &Settings,
+    options: &WriteOptions,
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SweepError> {
     // A link is followed, so that its target is replaced and not the link.
     let output = &fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf());
     let _lock = WriterLock::take(output)?;
-    let head = Head::of(sweep, settings.shard);
+    let head = Head::of(sweep, options.shard);
     let part = beside(output, ".part");
     let mut tally = Tally::new(&head);
-    if settings.restart {
+    if options.restart {
         match fs::remove_file(&part) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(&part)(e)),
             _ => {}
@@ -85,7 +79,7 @@ pub fn write(
     let mut flow = progress(tally.done);
     if flow.is_continue() {
         let rows = head.rows().start + tally.done..head.rows().end;
-        run::rows(sweep, rows, settings.chunk, |chunk| {
+        run::rows(sweep, rows, options.chunk, |chunk| {
             let bytes: Vec<u8> = chunk.iter().flat_map(|w| w.line.iter().copied()).collect();
             file.write_all(&bytes).map_err(&write_failed)?;
             chunk.iter().for_each(|written| tally.see(written));
@@ -98,7 +92,8 @@ pub fn write(
     if tally.done == tally.rows {
         match is_hdf5(output) {
             true => {
-                hdf5::convert(&[(part.clone(), head.clone())], &head, output)?;
+                let finished = ShardFile { path: part.clone(), head: head.clone() };
+                to_hdf5::convert(&[finished], &head, output)?;
                 // What remains is only the space it takes.
                 let _ = fs::remove_file(&part);
             }
@@ -117,13 +112,13 @@ pub fn write_rows(
     sweep: &Sweep,
     out: &mut dyn Write,
     name: &Path,
-    settings: &Settings,
+    options: &WriteOptions,
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SweepError> {
-    let head = Head::of(sweep, settings.shard);
+    let head = Head::of(sweep, options.shard);
     let mut tally = Tally::new(&head);
     out.write_all(head.text().as_bytes()).map_err(failed(name))?;
-    run::rows(sweep, head.rows(), settings.chunk, |chunk| {
+    run::rows(sweep, head.rows(), options.chunk, |chunk| {
         for written in chunk {
             out.write_all(&written.line).map_err(failed(name))?;
             tally.see(written);
@@ -136,96 +131,6 @@ pub fn write_rows(
 
 fn failed(path: &Path) -> impl Fn(io::Error) -> SweepError + '_ {
     move |source| WriteError::new(path, source).into()
-}
-
-/// What a report needs, row by row.
-pub(super) struct Tally {
-    head: Head,
-    statistics: Statistics,
-    pub rows: u64,
-    pub done: u64,
-    resumed: u64,
-    failed: u64,
-    warned: u64,
-    messages: Vec<(u64, String)>,
-}
-
-/// Messages of failed rows that a report repeats.
-const MESSAGES: usize = 3;
-
-impl Tally {
-    pub fn new(head: &Head) -> Self {
-        let rows = head.rows().end - head.rows().start;
-        let numbers: Vec<String> = (1..head.columns.len())
-            .filter(|&c| !head.is_text(c))
-            .map(|c| head.columns[c].clone())
-            .collect();
-        Self {
-            head: head.clone(),
-            statistics: Statistics::new(&numbers, rows),
-            rows,
-            done: 0,
-            resumed: 0,
-            failed: 0,
-            warned: 0,
-            messages: Vec::new(),
-        }
-    }
-
-    fn see(&mut self, Written { row, .. }: &Written) {
-        let head = &self.head;
-        let numbers = row.values.iter().enumerate().filter(|(k, _)| !head.is_text(k + 1));
-        self.statistics.see(row.item, numbers.map(|(_, value)| *value));
-        self.count(row.item, row.status, &row.message);
-    }
-
-    /// Takes the numbers of a row that is counted by itself.
-    pub fn statistics_see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
-        self.statistics.see(item, values);
-    }
-
-    pub fn count(&mut self, item: u64, status: Status, message: &str) {
-        self.done += 1;
-        match status {
-            Status::Ok => {}
-            Status::Warned => self.warned += 1,
-            Status::Failed => {
-                self.failed += 1;
-                if self.messages.len() < MESSAGES {
-                    self.messages.push((item, message.into()));
-                }
-            }
-        }
-    }
-
-    /// Takes a line that ought to be the next one; false if it is not, or is not whole.
-    pub fn see_line(&mut self, line: &[u8]) -> bool {
-        let head = &self.head;
-        let next = head.rows().start + self.done;
-        let parsed = Line::parse(line, head.columns.len())
-            .filter(|line| line.item == next && next < head.rows().end);
-        let Some(line) = parsed else { return false };
-        let numbers = line.values.iter().enumerate().filter(|(k, _)| !head.is_text(k + 1));
-        let numbers: Option<Vec<f64>> = numbers.map(|(_, field)| Line::number(field)).collect();
-        let Some(numbers) = numbers else { return false };
-        self.statistics.see(next, numbers.into_iter());
-        self.count(next, line.status, &line.message);
-        true
-    }
-
-    pub fn close(self) -> Report {
-        Report {
-            items: self.head.items,
-            shard: self.head.shard,
-            rows: self.rows,
-            resumed: self.resumed,
-            done: self.done,
-            failed: self.failed,
-            warned: self.warned,
-            messages: self.messages,
-            columns: self.statistics.close(),
-        }
-    }
 }
 
 /// Opens the file under work behind its last whole row; makes it if it is not there.
@@ -268,54 +173,15 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepErr
     Ok(file)
 }
 
-/// Reads the next line, or as much of it as a row can have; how many bytes.
-fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
-    line.clear();
-    reader.take(MAX_LINE_BYTES).read_until(b'\n', line)
-}
-
 /// Checks an output that is there: this sweep's, with all its rows.
 fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
     if is_hdf5(output) {
-        return hdf5::complete(output, head, tally);
+        return to_hdf5::complete(output, head, tally);
     }
-    let io = |source| SweepError::Read { path: output.into(), source };
-    let mut reader = BufReader::new(file::open(output).map_err(io)?);
-    let found = Head::read(&mut reader).map_err(io)?;
-    let (found, _) = found.ok_or_else(|| SweepError::Foreign { path: output.into() })?;
-    if let Some(differs) = found.differs_from(head) {
+    let found = ShardFile::open(output)?;
+    let found = found.ok_or_else(|| SweepError::Foreign { path: output.into() })?;
+    if let Some(differs) = found.head.differs_from(head) {
         return Err(SweepError::Changed { path: output.into(), differs });
     }
-    each_line(output, &mut reader, |line| tally.see_line(line).then_some(()), head)
-}
-
-/// Hands on every row of a file behind its head, all of which must be there.
-pub(super) fn each_line(
-    path: &Path,
-    reader: &mut impl BufRead,
-    mut see: impl FnMut(&[u8]) -> Option<()>,
-    head: &Head,
-) -> Result<(), SweepError> {
-    let io = |source| SweepError::Read { path: path.into(), source };
-    let mut line = Vec::new();
-    for item in head.rows() {
-        if read_line(reader, &mut line).map_err(io)? == 0 {
-            let last = head.rows().end - 1;
-            return Err(SweepError::Damaged {
-                path: path.into(),
-                message: format!(
-                    "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
-                ),
-            });
-        }
-        see(&line).ok_or_else(|| bad_row(path, item))?;
-    }
-    match read_line(reader, &mut line).map_err(io)? {
-        0 => Ok(()),
-        _ => Err(SweepError::Damaged {
-            path: path.into(),
-            message: "there is something behind the last row: run its sweep again with --restart"
-                .into(),
-        }),
-    }
+    found.rows(|line| tally.see_line(line).then_some(()))
 }

@@ -5,44 +5,80 @@ use std::fs::File as DiskFile;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use hdf5_pure::{
-    AttrValue, CharacterSet, Datatype, File, FileBuilder, StringPadding, make_f64_type,
-    make_i64_type,
-};
+use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
-use super::DatabaseError;
-use super::layout::declared_bytes;
 use super::skeleton::{Skeleton, write_all_at};
-use crate::file::{self, write_at};
+use super::{AttrValue, Dataset, Error, File, FileBuilder, OpenError, declared_bytes};
+use crate::file::{WriteError, write_at};
+
+/// Why a table cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// It cannot be opened as HDF5.
+    #[error("{path}: {source}")]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: OpenError,
+    },
+    /// What it holds is not what it should.
+    #[error("{path}: {place}: {detail}")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Column or attribute.
+        place: String,
+        /// What is wrong with it.
+        detail: String,
+    },
+    /// The library did not write the values of a column in one piece, as writing it later needs.
+    #[error("{path}: a large column is not written in one piece")]
+    InPieces {
+        /// The file that was to be written.
+        path: PathBuf,
+    },
+    /// The target cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
 
 /// What the values of a column are; all have a fixed number of bytes, little endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Values {
+pub(crate) enum Values {
     /// 64 bits, signed.
     Integer,
     /// Doubles.
     Real,
     /// UTF-8, filled up with zero bytes.
-    Text { width: usize },
+    Text {
+        /// Bytes of each value.
+        width: usize,
+    },
 }
 
 /// A column: a dataset of one dimension.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub(crate) struct Column {
+    /// Name of the column; that of its dataset where a dataset can have it.
     pub name: String,
+    /// Kind of its values.
     pub values: Values,
+    /// Number of its values.
     pub rows: u64,
 }
 
 /// An attribute of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Attribute {
+pub(crate) enum Attribute {
+    /// UTF-8.
     Text(String),
+    /// 64 bits, signed.
     Integer(i64),
 }
 
 /// Takes values of a column from a row on, as bytes.
-pub type Put<'a> = dyn FnMut(usize, u64, &[u8]) -> io::Result<()> + 'a;
+pub(crate) type Put<'a> = dyn FnMut(usize, u64, &[u8]) -> io::Result<()> + 'a;
 
 impl Values {
     /// Bytes of one value.
@@ -82,13 +118,13 @@ const SMALL_BYTES: u64 = 1 << 16;
 /// and the same values give the same bytes in whatever pieces they are put.
 ///
 /// # Errors
-/// [`DatabaseError`] if the target cannot be written, or of `fill`.
-pub fn write_table(
+/// [`TableError`] if the target cannot be written, or of `fill`.
+pub(crate) fn write_table(
     path: &Path,
     attributes: &[(&str, Attribute)],
     columns: &[Column],
     fill: impl FnOnce(&mut Put<'_>) -> io::Result<()>,
-) -> Result<(), DatabaseError> {
+) -> Result<(), TableError> {
     let mut held: Vec<Option<Vec<u8>>> = columns
         .iter()
         .map(|c| {
@@ -123,8 +159,7 @@ pub fn write_table(
         }
         file.sync_all().map(Some)
     })?;
-    let detail = || "a large column is not written in one piece".into();
-    written.ok_or_else(|| DatabaseError::Encode { detail: detail() })
+    written.ok_or_else(|| TableError::InPieces { path: path.into() })
 }
 
 /// The file with the values of the columns that are held, and places for the others.
@@ -172,10 +207,12 @@ fn dataset_names(columns: &[&str]) -> Vec<String> {
 }
 
 /// An open table.
-pub struct Table {
+pub(crate) struct Table {
     path: PathBuf,
     file: File,
-    datasets: Vec<String>,
+    /// The columns' datasets: a dataset is looked up among all others by its name, so once.
+    datasets: Vec<Dataset>,
+    /// The columns in their order.
     pub columns: Vec<Column>,
 }
 
@@ -183,11 +220,10 @@ impl Table {
     /// Opens a table whose root attribute `format` is `format`; values are not read yet.
     ///
     /// # Errors
-    /// [`DatabaseError`] if it is not HDF5, or no such table.
-    pub fn open(path: &Path, format: &str) -> Result<Self, DatabaseError> {
-        file::open(path).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
-        let file = File::open_streaming(path)
-            .map_err(|e| DatabaseError::NotHdf5 { path: path.into(), detail: e.to_string() })?;
+    /// [`TableError`] if it is not HDF5, or no such table.
+    pub fn open(path: &Path, format: &str) -> Result<Self, TableError> {
+        let file =
+            super::open(path).map_err(|source| TableError::Open { path: path.into(), source })?;
         let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
         match table.attribute("format")? {
             Some(Attribute::Text(found)) if found == format => {}
@@ -201,16 +237,17 @@ impl Table {
         let names = names.map_err(|e| table.damaged(COLUMNS, e.to_string()))?;
         let names = names.ok_or_else(too_many)?;
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        table.datasets = dataset_names(&names);
-        for (name, dataset) in names.iter().zip(&table.datasets) {
-            table.columns.push(table.column(name, dataset)?);
+        for (name, dataset) in names.iter().zip(&dataset_names(&names)) {
+            let dataset = table.file.dataset(dataset);
+            let dataset = dataset.map_err(|e| table.damaged(name, e.to_string()))?;
+            table.columns.push(table.column(name, &dataset)?);
+            table.datasets.push(dataset);
         }
         Ok(table)
     }
 
-    fn column(&self, name: &str, dataset: &str) -> Result<Column, DatabaseError> {
-        let failed = |e: hdf5_pure::Error| self.damaged(name, e.to_string());
-        let dataset = self.file.dataset(dataset).map_err(failed)?;
+    fn column(&self, name: &str, dataset: &Dataset) -> Result<Column, TableError> {
+        let failed = |e: Error| self.damaged(name, e.to_string());
         let values = match dataset.datatype().map_err(failed)? {
             Datatype::String { size, .. } if size > 0 => Values::Text { width: size as usize },
             found if found == make_i64_type() => Values::Integer,
@@ -225,8 +262,8 @@ impl Table {
     /// An attribute of the file, if it has it.
     ///
     /// # Errors
-    /// [`DatabaseError::Damaged`] if attributes cannot be read.
-    pub fn attribute(&self, name: &str) -> Result<Option<Attribute>, DatabaseError> {
+    /// [`TableError::Damaged`] if attributes cannot be read.
+    pub fn attribute(&self, name: &str) -> Result<Option<Attribute>, TableError> {
         let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
         Ok(match all.remove(name) {
             Some(AttrValue::VarLenString(text) | AttrValue::String(text)) => {
@@ -240,15 +277,14 @@ impl Table {
     /// Bytes of `rows` values of a column from `row` on.
     ///
     /// # Errors
-    /// [`DatabaseError::Damaged`] names the column.
-    pub fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, DatabaseError> {
+    /// [`TableError::Damaged`] names the column.
+    pub fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, TableError> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);
         if bytes > MAX_PIECE_BYTES {
             return Err(self.damaged(name, format!("its texts have {bytes} bytes in {rows} rows")));
         }
-        let dataset = self.file.dataset(&self.datasets[column]);
-        let bytes = dataset.and_then(|d| d.read_raw_rows(row, rows));
+        let bytes = self.datasets[column].read_raw_rows(row, rows);
         let bytes = bytes.map_err(|e| self.damaged(name, e.to_string()))?;
         match bytes.len() as u64 == rows * self.columns[column].values.size() as u64 {
             true => Ok(bytes),
@@ -256,8 +292,8 @@ impl Table {
         }
     }
 
-    fn damaged(&self, place: &str, detail: String) -> DatabaseError {
-        DatabaseError::Damaged { path: self.path.clone(), place: place.into(), detail }
+    fn damaged(&self, place: &str, detail: String) -> TableError {
+        TableError::Damaged { path: self.path.clone(), place: place.into(), detail }
     }
 }
 

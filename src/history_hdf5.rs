@@ -7,22 +7,27 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use hdf5_pure::{AttrValue, DatasetBuilder, FileBuilder};
 use rayon::prelude::*;
 
-use super::DatabaseError;
-use super::skeleton::{Skeleton, write_all_at};
 use crate::file::{WriteError, write_at, write_whole};
+use crate::hdf5::skeleton::{Skeleton, write_all_at};
+use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
 use crate::history::{EntityId, History, Side};
 use crate::solver::{self, Blocks, ReadError, Selection, SolverFile};
 
 /// Why a solver's file could not be converted.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
+    /// The solver's file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    #[error(transparent)]
-    Database(#[from] DatabaseError),
+    /// HDF5 cannot hold the histories.
+    #[error("cannot encode the histories: {detail}")]
+    Encode {
+        /// Why not, in the words of the library.
+        detail: String,
+    },
+    /// The output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -36,7 +41,7 @@ pub enum ConvertError {
 /// # Errors
 /// [`ConvertError`] if the file cannot be read or the output not be written; the output is
 /// then unchanged.
-pub fn convert_histories(
+pub fn convert(
     input: &Path,
     format: Option<&str>,
     selection: &Selection,
@@ -53,23 +58,21 @@ pub fn convert_histories(
         return Ok(file);
     }
     let file = solver::read(input, format, selection)?;
-    write_whole(output, &histories_to_hdf5(&file)?)?;
+    write_whole(output, &encode(&file)?)?;
     Ok(file)
 }
 
 /// Whether a file is HDF5 but no file of histories: a curve database, or of someone else.
 /// What cannot be read as HDF5 to its root counts as such, since a table may be damaged.
 pub fn is_other_hdf5(path: &Path) -> bool {
-    let is_file = path.metadata().is_ok_and(|meta| meta.is_file());
-    if !is_file || !hdf5_pure::is_hdf5(path).unwrap_or(false) {
-        return false;
-    }
-    let format = hdf5_pure::File::open_streaming(path).ok().and_then(|file| {
-        match file.root().attrs().ok()?.remove("format")? {
-            AttrValue::String(format) => Some(format),
+    let format = match hdf5::open(path) {
+        Ok(file) => match file.root().attrs().ok().and_then(|mut a| a.remove("format")) {
+            Some(AttrValue::String(format)) => Some(format),
             _ => None,
-        }
-    });
+        },
+        Err(OpenError::Damaged { .. }) => None,
+        Err(OpenError::Io(_) | OpenError::NoSignature) => return false,
+    };
     format.as_deref() != Some(FORMAT)
 }
 
@@ -80,7 +83,7 @@ pub fn is_other_hdf5(path: &Path) -> bool {
 /// Of more than 8 000 entities, which no attribute holds, the ids are the dataset
 /// `/ids/<component>` and the sides `/sides/<component>`. A component whose name cannot be a
 /// dataset's has `_` in it, and its own name in the attribute `component`.
-pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
+pub fn encode(file: &SolverFile) -> Result<Vec<u8>, ConvertError> {
     let mut out = builder(file);
     let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
     let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
@@ -114,11 +117,11 @@ pub fn histories_to_hdf5(file: &SolverFile) -> Result<Vec<u8>, DatabaseError> {
         }
     }
     long_ids(&mut out, &long)?;
-    out.finish().map_err(encode)
+    out.finish().map_err(not_encoded)
 }
 
-fn encode(error: hdf5_pure::Error) -> DatabaseError {
-    DatabaseError::Encode { detail: error.to_string() }
+fn not_encoded(error: hdf5::Error) -> ConvertError {
+    ConvertError::Encode { detail: error.to_string() }
 }
 
 /// A file with what describes the source, and the times.
@@ -157,7 +160,7 @@ fn sides(entities: &[EntityId]) -> Option<Vec<&'static str>> {
 }
 
 /// Writes the entities that no attribute holds.
-fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) -> Result<(), DatabaseError> {
+fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) -> Result<(), ConvertError> {
     if long.is_empty() {
         return Ok(());
     }
@@ -174,8 +177,8 @@ fn long_ids(out: &mut FileBuilder, long: &[(String, Vec<EntityId>)]) -> Result<(
     }
     let mut group = out.create_group(SIDES);
     for (name, sides) in with_sides {
-        let encode = |error| DatabaseError::Encode { detail: format!("{error}") };
-        group.create_dataset(name).with_ascii_strings(&sides).map_err(encode)?;
+        let failed = |error| ConvertError::Encode { detail: format!("{error}") };
+        group.create_dataset(name).with_ascii_strings(&sides).map_err(failed)?;
     }
     out.add_group(group.finish());
     Ok(())

@@ -1,14 +1,18 @@
-//! The rows as HDF5: a dataset per column, described in `schemas/sweep.md`.
+//! Finished CSV converted to HDF5: a dataset per column, described in `schemas/sweep.md`.
 
-use std::io::{self, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use super::draft::{Tally, each_line};
 use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
+use super::shard_file::ShardFile;
+use super::tally::Tally;
 use super::{Shard, SweepError};
-use crate::database::DatabaseError;
-use crate::database::table::{Attribute, Column, Put, Table, Values, write_table};
-use crate::file;
+use crate::hdf5::table::{Attribute, Column, Put, Table, TableError, Values, write_table};
+
+/// Whether a path is to become HDF5.
+pub(super) fn is_hdf5(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
+}
 
 /// Number of a row's message; 0 is the empty one.
 const MESSAGE_NUMBER: &str = "message_number";
@@ -63,21 +67,17 @@ fn attributes(head: &Head) -> [(&'static str, Attribute); 6] {
 
 /// Writes the rows of CSV files, in this order, as one HDF5 file under `head`. The files have
 /// been written by this program and are read twice.
-pub fn convert(files: &[(PathBuf, Head)], head: &Head, output: &Path) -> Result<(), SweepError> {
+pub(super) fn convert(files: &[ShardFile], head: &Head, output: &Path) -> Result<(), SweepError> {
     let columns = head.columns.len();
     let mut widths = Widths::new(columns);
     let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), SweepError> {
-        for (path, head) in files {
-            let io = |source| SweepError::Read { path: path.clone(), source };
-            let mut reader = BufReader::new(file::open(path).map_err(io)?);
-            Head::read(&mut reader).map_err(io)?;
-            let mut item = head.rows().start;
-            let see = |bytes: &[u8]| {
+        for file in files {
+            let mut item = file.head.rows().start;
+            file.rows(|bytes| {
                 let line = Line::parse(bytes, columns).filter(|line| line.item == item)?;
                 item += 1;
                 see(&line)
-            };
-            each_line(path, &mut reader, see, head)?;
+            })?;
         }
         Ok(())
     };
@@ -192,19 +192,19 @@ fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
     out.resize(end, 0);
 }
 
-/// An HDF5 file of a shard.
-pub struct Shelf {
+/// A finished HDF5 file.
+struct ResultFile {
     path: PathBuf,
     table: Table,
-    pub head: Head,
+    head: Head,
 }
 
-impl Shelf {
-    /// Opens the file of a shard.
+impl ResultFile {
+    /// Opens a finished file.
     ///
     /// # Errors
-    /// [`SweepError::Database`] if it is no HDF5 file, or no sweep's.
-    pub fn open(path: &Path) -> Result<Self, SweepError> {
+    /// [`SweepError::Table`] if it is no HDF5 file, or no sweep's.
+    fn open(path: &Path) -> Result<Self, SweepError> {
         let table = Table::open(path, FORMAT)?;
         let head = head(&table)?.ok_or_else(|| SweepError::Damaged {
             path: path.into(),
@@ -242,7 +242,7 @@ impl Shelf {
         let mut first = 0;
         while first < self.rows() {
             let rows = ROWS.min(self.rows() - first);
-            let columns: Result<Vec<Vec<u8>>, DatabaseError> =
+            let columns: Result<Vec<Vec<u8>>, TableError> =
                 (0..messages).map(|c| self.table.read(c, first, rows)).collect();
             let mut columns = columns?;
             for (k, item) in columns[0].chunks_exact(8).enumerate() {
@@ -258,7 +258,7 @@ impl Shelf {
     }
 
     /// Counts all rows.
-    pub fn tally(&self, tally: &mut Tally) -> Result<(), SweepError> {
+    fn tally(&self, tally: &mut Tally) -> Result<(), SweepError> {
         let numbers: Vec<usize> =
             (1..self.head.columns.len()).filter(|&c| !self.head.is_text(c)).collect();
         let status = self.head.columns.len() - 2;
@@ -299,7 +299,7 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
 }
 
 /// The head that a file's attributes and columns tell.
-fn head(table: &Table) -> Result<Option<Head>, DatabaseError> {
+fn head(table: &Table) -> Result<Option<Head>, TableError> {
     let mut texts = Vec::new();
     for name in ["written_by", "hash", "shard"] {
         match table.attribute(name)? {
@@ -326,91 +326,11 @@ fn head(table: &Table) -> Result<Option<Head>, DatabaseError> {
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.
-pub fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
+pub(super) fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
     let foreign = |_| SweepError::Foreign { path: output.into() };
-    let shelf = Shelf::open(output).map_err(foreign)?;
-    if let Some(differs) = shelf.head.differs_from(head) {
+    let file = ResultFile::open(output).map_err(foreign)?;
+    if let Some(differs) = file.head.differs_from(head) {
         return Err(SweepError::Changed { path: output.into(), differs });
     }
-    shelf.tally(tally)
-}
-
-/// Joins the files of all shards, in order, under `head`.
-pub fn join(shelves: &[Shelf], head: &Head, output: &Path) -> Result<(), SweepError> {
-    let columns = head.columns.len();
-    let mut widths = Widths::new(columns);
-    for shelf in shelves {
-        let datasets = &shelf.table.columns;
-        for (width, dataset) in widths.columns.iter_mut().zip(datasets) {
-            *width = (*width).max(dataset.values.size());
-        }
-        widths.message = widths.message.max(datasets[columns].values.size());
-        widths.messages += datasets[columns].rows.saturating_sub(1);
-    }
-    let datasets = widths.datasets(head);
-    let mut failure = None;
-    let written = write_table(output, &attributes(head), &datasets, |put| {
-        let mut messages = 1;
-        for shelf in shelves {
-            let copied = copy(shelf, &datasets, &mut messages, put);
-            if let Err(error) = copied {
-                failure = Some(error);
-                return Err(io::Error::other("a shard cannot be copied"));
-            }
-        }
-        Ok(())
-    });
-    match failure {
-        Some(error) => Err(error),
-        None => Ok(written?),
-    }
-}
-
-fn copy(
-    shelf: &Shelf,
-    datasets: &[Column],
-    messages: &mut u64,
-    put: &mut Put<'_>,
-) -> Result<(), SweepError> {
-    let (number, message) = (datasets.len() - 2, datasets.len() - 1);
-    let mut failed = |column: usize, row: u64, bytes: &[u8]| {
-        put(column, row, bytes)
-            .map_err(|source| SweepError::Read { path: shelf.path.clone(), source })
-    };
-    // Numbers of messages go on where those of the shard before end.
-    let shift = *messages as i64 - 1;
-    shelf.blocks(|first, _, columns| {
-        for number in columns[number].chunks_exact_mut(8) {
-            let own = integer(number);
-            number.copy_from_slice(&(if own == 0 { 0 } else { own + shift }).to_le_bytes());
-        }
-        for (c, bytes) in columns.iter().enumerate() {
-            let widened = widen(bytes, shelf.table.columns[c].values, datasets[c].values);
-            failed(c, shelf.head.rows().start + first, &widened)?;
-        }
-        Ok(())
-    })?;
-    let count = shelf.table.columns[message].rows.saturating_sub(1);
-    let mut first = 0;
-    while first < count {
-        let rows = ROWS.min(count - first);
-        let bytes = shelf.table.read(message, first + 1, rows)?;
-        let widened = widen(&bytes, shelf.table.columns[message].values, datasets[message].values);
-        failed(message, *messages, &widened)?;
-        (first, *messages) = (first + rows, *messages + rows);
-    }
-    Ok(())
-}
-
-/// Texts filled up to a larger width; numbers as they are.
-fn widen(bytes: &[u8], from: Values, to: Values) -> Vec<u8> {
-    let (Values::Text { width: old }, Values::Text { width: new }) = (from, to) else {
-        return bytes.to_vec();
-    };
-    let mut out = Vec::with_capacity(bytes.len() / old * new);
-    for text in bytes.chunks_exact(old) {
-        out.extend_from_slice(text);
-        out.resize(out.len() + new - old, 0);
-    }
-    out
+    file.tally(tally)
 }

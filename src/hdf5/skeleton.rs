@@ -4,17 +4,27 @@
 //! zeros that nothing ever touched, so that they take no memory, behind a mark; where the
 //! encoder hands over the marked bytes, their place in the file is noted and nothing is
 //! written.
+//!
+//! This rests on something that hdf5-pure does and does not promise: it hands the raw values of
+//! a dataset to its writer in one piece, as they were given to it. The crate's version is pinned
+//! exactly, and the test below fails when that changes. [`Skeleton::write`] notices it too, and
+//! its callers then say so or write in another way.
 
 use std::fs::File;
 use std::io::{self, Write};
 
-use hdf5_pure::{DatasetBuilder, Datatype, FileBuilder, make_f64_type};
+use hdf5_pure::{Datatype, make_f64_type};
 
+use super::{DatasetBuilder, FileBuilder};
+
+/// First bytes of the values that come later; the number of the dataset follows.
 const MARK: &[u8; 16] = b"VALUESCOMELATER!";
+/// Bytes of mark and number.
+const MARK_BYTES: usize = 24;
 
 /// The datasets that get their values later.
 #[derive(Default)]
-pub struct Skeleton {
+pub(crate) struct Skeleton {
     /// Bytes of each.
     lengths: Vec<usize>,
 }
@@ -26,7 +36,8 @@ impl Skeleton {
         self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
     }
 
-    /// Gives a dataset of values of `size` bytes its shape and its place.
+    /// Gives a dataset of values of `size` bytes its shape and its place. Its values need 24
+    /// bytes at least, or there is no room for the mark and [`Skeleton::write`] gives `None`.
     pub fn reserve_values(
         &mut self,
         dataset: &mut DatasetBuilder,
@@ -67,8 +78,8 @@ fn allocate(file: &File, length: u64) -> io::Result<()> {
     file.set_len(length)
 }
 
-fn mark(number: usize) -> [u8; 24] {
-    let mut mark = [0; 24];
+fn mark(number: usize) -> [u8; MARK_BYTES] {
+    let mut mark = [0; MARK_BYTES];
     mark[..16].copy_from_slice(MARK);
     mark[16..].copy_from_slice(&(number as u64).to_le_bytes());
     mark
@@ -84,7 +95,7 @@ struct Sink<'a> {
 
 impl Write for Sink<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let marked = bytes.get(16..24).filter(|_| bytes.starts_with(MARK));
+        let marked = bytes.get(16..MARK_BYTES).filter(|_| bytes.starts_with(MARK));
         let number = marked.and_then(|n| n.try_into().ok()).map(u64::from_le_bytes);
         let number = number.and_then(|n| usize::try_from(n).ok());
         match number.filter(|&n| self.lengths.get(n) == Some(&bytes.len())) {
@@ -102,17 +113,66 @@ impl Write for Sink<'_> {
 
 /// Writes all bytes at a position.
 #[cfg(unix)]
-pub fn write_all_at(file: &File, bytes: &[u8], at: u64) -> io::Result<()> {
+pub(crate) fn write_all_at(file: &File, bytes: &[u8], at: u64) -> io::Result<()> {
     std::os::unix::fs::FileExt::write_all_at(file, bytes, at)
 }
 
 /// Writes all bytes at a position.
 #[cfg(windows)]
-pub fn write_all_at(file: &File, mut bytes: &[u8], mut at: u64) -> io::Result<()> {
+pub(crate) fn write_all_at(file: &File, mut bytes: &[u8], mut at: u64) -> io::Result<()> {
     while !bytes.is_empty() {
         let written = std::os::windows::fs::FileExt::seek_write(file, bytes, at)?;
         bytes = &bytes[written..];
         at += written as u64;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hdf5;
+
+    /// What the module rests on: if this fails after an update of hdf5-pure, the encoder does not
+    /// hand over the values of a dataset in one piece any more. Then histories go through memory
+    /// and large sweeps cannot be converted: find another way to learn where the values begin.
+    #[test]
+    fn the_encoder_hands_over_the_values_of_each_dataset_in_one_piece() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.h5");
+        let file = File::create(&path).unwrap();
+        let mut out = FileBuilder::new();
+        let mut skeleton = Skeleton::default();
+        // From the least that takes a mark to more than any buffer of the encoder.
+        let shapes = [(1, 3), (1000, 1), (70_000, 11)];
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            skeleton.reserve(out.create_dataset(&format!("d{k}")), rows, columns);
+        }
+        out.create_dataset("small").with_f64_data(&[1.0, 2.0]);
+        let offsets = skeleton.write(out, &file).unwrap();
+        let offsets = offsets.expect("hdf5-pure hands values over in pieces: see this test");
+        let value = |k: usize, i: usize| (k * 1_000_000 + i) as f64;
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            let bytes: Vec<u8> =
+                (0..rows * columns).flat_map(|i| value(k, i).to_le_bytes()).collect();
+            write_all_at(&file, &bytes, offsets[k]).unwrap();
+        }
+        let read = hdf5::open(&path).unwrap();
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            let dataset = read.dataset(&format!("d{k}")).unwrap();
+            assert_eq!(dataset.shape().unwrap(), [rows as u64, columns as u64]);
+            let expected: Vec<f64> = (0..rows * columns).map(|i| value(k, i)).collect();
+            assert!(dataset.read_f64().unwrap() == expected, "d{k}");
+        }
+        assert_eq!(read.dataset("small").unwrap().read_f64().unwrap(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn what_is_too_small_for_a_mark_is_noticed() {
+        let file = tempfile::tempfile().unwrap();
+        let mut out = FileBuilder::new();
+        let mut skeleton = Skeleton::default();
+        skeleton.reserve(out.create_dataset("d"), 1, 1);
+        assert_eq!(skeleton.write(out, &file).unwrap(), None);
+    }
 }

@@ -1,0 +1,133 @@
+//! Files: read only where they are files, and up to a bound; written so that a reader sees the
+//! old content or the new, never half of it.
+
+mod lock;
+mod write;
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+pub use lock::{LockError, WriterLock};
+pub use write::{WriteError, write_all_whole, write_at, write_by_path, write_whole};
+
+/// What can be read at a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// It has a size, and can be read again.
+    File,
+    /// A named pipe or the output of another program: it can be read once and has no size.
+    Pipe,
+}
+
+/// What stands at `path`. It is not opened: opening a pipe waits for its writer.
+///
+/// # Errors
+/// Those of the operating system; for a folder, a device or a socket what it is.
+pub fn kind(path: &Path) -> io::Result<Kind> {
+    let kind = fs::metadata(path)?.file_type();
+    let refused = |what: &str| {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("this is {what}: give a file")))
+    };
+    match kind {
+        kind if kind.is_file() => Ok(Kind::File),
+        kind if kind.is_dir() => refused("a folder"),
+        kind if is_pipe(kind) => Ok(Kind::Pipe),
+        // A device may have no end.
+        _ => refused("a device or a socket"),
+    }
+}
+
+#[cfg(unix)]
+fn is_pipe(kind: fs::FileType) -> bool {
+    std::os::unix::fs::FileTypeExt::is_fifo(&kind)
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: fs::FileType) -> bool {
+    false
+}
+
+/// Opens a file for reading; all else is refused before it is opened.
+///
+/// # Errors
+/// As of [`kind`], and for a pipe.
+pub fn open(path: &Path) -> io::Result<File> {
+    match kind(path)? {
+        Kind::File => File::open(path),
+        Kind::Pipe => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "this is a pipe: write its content to a file and give that",
+        )),
+    }
+}
+
+/// Reads a file of `most` bytes at most.
+///
+/// # Errors
+/// As of [`open`]; for a longer file its size and the bound.
+pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let size = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    if size <= most {
+        bytes.try_reserve_exact(size as usize).map_err(|_| out_of_memory(size))?;
+        file.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    let size = size.max(bytes.len() as u64);
+    match size <= most {
+        true => Ok(bytes),
+        false => Err(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!(
+                "the file has {size} bytes, expected at most {most} ({} MiB): is this another kind of file?",
+                most >> 20
+            ),
+        )),
+    }
+}
+
+/// Reads a text file of `most` bytes at most.
+///
+/// # Errors
+/// As of [`read`], and for bytes that are not UTF-8.
+pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
+    String::from_utf8(read(path, most)?).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        let message = format!("byte {at} is not UTF-8: save the file as UTF-8 text");
+        io::Error::new(io::ErrorKind::InvalidData, message)
+    })
+}
+
+/// That so many bytes are not to be had.
+pub fn out_of_memory(bytes: u64) -> io::Error {
+    let message = format!("there is no memory for its {bytes} bytes");
+    io::Error::new(io::ErrorKind::OutOfMemory, message)
+}
+
+/// Whether two paths name the same existing file.
+pub fn is_same(a: &Path, b: &Path) -> bool {
+    matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_files_are_read_and_up_to_a_bound() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "12345").unwrap();
+        assert_eq!(read(&folder.path().join("a"), 5).unwrap(), b"12345");
+        let refused = |path: &Path, expected: &str| {
+            let error = read(path, 4).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        };
+        refused(&folder.path().join("a"), "the file has 5 bytes, expected at most 4");
+        refused(folder.path(), "this is a folder: give a file");
+        refused(Path::new("/dev/zero"), "this is a device or a socket: give a file");
+        // Files of the system have no size.
+        refused(Path::new("/proc/self/status"), "expected at most 4");
+    }
+}

@@ -1,0 +1,77 @@
+//! The CSV file of a shard: its head, and its rows in order, all of which must be there.
+
+use std::io::{self, BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::SweepError;
+use super::row::{Head, MAX_HEAD_BYTES, bad_row};
+use crate::file;
+
+/// The finished CSV file of a shard.
+pub(super) struct ShardFile {
+    pub path: PathBuf,
+    pub head: Head,
+}
+
+impl ShardFile {
+    /// Reads the head of a file; `None` if it is none of ours.
+    pub fn open(path: &Path) -> Result<Option<Self>, SweepError> {
+        let io = |source| SweepError::Read { path: path.into(), source };
+        let mut reader = BufReader::new(file::open(path).map_err(io)?);
+        let head = Head::read(&mut reader).map_err(io)?;
+        Ok(head.map(|(head, _)| Self { path: path.into(), head }))
+    }
+
+    /// Hands on every row with its line feed, in order; `see` gives `None` for one that is not
+    /// whole.
+    ///
+    /// # Errors
+    /// [`SweepError::Damaged`] names the first row that is missing or not whole.
+    pub fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
+        let io = |source| SweepError::Read { path: self.path.clone(), source };
+        let file = file::open(&self.path).map_err(io)?;
+        let mut reader = BufReader::with_capacity(1 << 16, file);
+        Head::read(&mut reader).map_err(io)?;
+        each_line(&self.path, &mut reader, see, &self.head)
+    }
+}
+
+/// Longer lines are no rows: the columns' names fit into as much.
+const MAX_LINE_BYTES: u64 = MAX_HEAD_BYTES as u64;
+
+/// Reads the next line, or as much of it as a row can have; how many bytes.
+pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
+    line.clear();
+    io::Read::take(reader, MAX_LINE_BYTES).read_until(b'\n', line)
+}
+
+/// Hands on every row behind the head.
+fn each_line(
+    path: &Path,
+    reader: &mut impl BufRead,
+    mut see: impl FnMut(&[u8]) -> Option<()>,
+    head: &Head,
+) -> Result<(), SweepError> {
+    let io = |source| SweepError::Read { path: path.into(), source };
+    let mut line = Vec::new();
+    for item in head.rows() {
+        if read_line(reader, &mut line).map_err(io)? == 0 {
+            let last = head.rows().end - 1;
+            return Err(SweepError::Damaged {
+                path: path.into(),
+                message: format!(
+                    "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
+                ),
+            });
+        }
+        see(&line).ok_or_else(|| bad_row(path, item))?;
+    }
+    match read_line(reader, &mut line).map_err(io)? {
+        0 => Ok(()),
+        _ => Err(SweepError::Damaged {
+            path: path.into(),
+            message: "there is something behind the last row: run its sweep again with --restart"
+                .into(),
+        }),
+    }
+}
