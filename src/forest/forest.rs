@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::grow::{Table, grow};
+use super::members::Members;
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
-use super::quantiles::Members;
 use super::tree::{Tree, TreeError};
 use super::walk::{BATCH, Rows, Walk, groups};
 use crate::stream::Stream;

@@ -183,6 +183,15 @@ pub fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Resul
     Ok(filled)
 }
 
+/// [`Read::read`] of anything that has a buffer.
+pub(super) fn read_buffered(input: &mut impl BufRead, out: &mut [u8]) -> io::Result<usize> {
+    let there = input.fill_buf()?;
+    let count = there.len().min(out.len());
+    out[..count].copy_from_slice(&there[..count]);
+    input.consume(count);
+    Ok(count)
+}
+
 /// Bytes per read of a [`Stream`].
 const STREAM_BUFFER: usize = 1 << 16;
 
@@ -220,11 +229,7 @@ impl<'a> Stream<'a> {
 
 impl Read for Stream<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let there = self.fill_buf()?;
-        let count = there.len().min(out.len());
-        out[..count].copy_from_slice(&there[..count]);
-        self.consume(count);
-        Ok(count)
+        read_buffered(self, out)
     }
 }
 
