@@ -258,7 +258,8 @@ impl States {
     /// Leaves out what a restart wrote again; forces cannot be told across it.
     fn resolve_restarts(&mut self, problems: &mut Problems) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
-        let mut kept = restart::resolve(&self.time, |_, _| Some(true), place, "", problems);
+        let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");
+        problems.append(found);
         // Nor can a state whose time is out of order be differentiated.
         let mut last = f64::NEG_INFINITY;
         kept.retain(|&i| {

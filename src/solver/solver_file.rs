@@ -1,0 +1,65 @@
+//! What reading a file gives.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::Problem;
+use crate::history::{EntityId, History};
+
+/// An entity that has histories, with its title where the file's legend gives one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Entity {
+    #[serde(flatten)]
+    pub id: EntityId,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+}
+
+/// An entity that the file names without giving it values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WithoutData {
+    pub id: i64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+    pub reason: NoDataReason,
+}
+
+/// Why an entity has no values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoDataReason {
+    /// A single-surface contact: LS-DYNA prints that its resultants are undefined.
+    SingleSurfaceContact,
+    /// Named in the legend, but no state has a row of it.
+    LegendOnly,
+}
+
+/// What a solver file holds: its own description, the selected histories, its damage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolverFile {
+    pub format: &'static str,
+    /// Section of a binary file; of a text file its format's name.
+    pub section: String,
+    pub solver: Option<String>,
+    pub version: Option<String>,
+    pub title: Option<String>,
+    /// In the order of the first state.
+    pub entities: Vec<Entity>,
+    pub without_data: Vec<WithoutData>,
+    /// All components of the file, selected or not.
+    pub components: Vec<Arc<str>>,
+    /// One time per complete state, in the solver's unit.
+    pub time: Arc<[f64]>,
+    pub histories: Vec<History>,
+    pub problems: Vec<Problem>,
+    /// What was done to the file's values, such as differentiating impulses.
+    pub notes: Vec<String>,
+}
+
+impl SolverFile {
+    /// The history of `component` of `entity` (`None`: a global quantity).
+    pub fn history(&self, entity: Option<EntityId>, component: &str) -> Option<&History> {
+        self.histories.iter().find(|h| h.entity == entity && &*h.component == component)
+    }
+}
