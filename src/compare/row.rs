@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use super::{CompareError, Row};
 use crate::curve::Envelope;
-use crate::curve::rating::l1_ratio;
 use crate::nsdm::Nsdm;
 use crate::rating::{Quantity, Rating, Settings, Signal, rate};
+use crate::signal::l1_ratio;
 use crate::validate::motion::{Driver, Reference};
 
 /// What all rows of one comparison share.

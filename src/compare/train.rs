@@ -10,18 +10,18 @@ use serde::Serialize;
 use super::{CompareError, Settings, nsdm_target};
 use crate::curve::Case;
 use crate::curve::body::filtered;
-use crate::curve::rating::l1_ratio;
-use crate::curve::resample::interpolate;
 use crate::database::{Database, DatabaseError};
 use crate::dataset::TrainingSet;
 use crate::file;
-use crate::history::{EntityId, derivative};
+use crate::history::EntityId;
 use crate::multibody::simulate;
 use crate::nsdm;
 use crate::scenario::{
     self, DampingTable, EndName, ForceName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
     ScenarioError, Source, Sources,
 };
+use crate::signal::resample::interpolate;
+use crate::signal::{derivative, l1_ratio};
 use crate::solver::{self, ReadError, Selection, WantedId};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;

@@ -1,8 +1,8 @@
 //! Body force: what moves the car body, from the rate of the deflection.
 
 use super::loading::{loading_branch, loading_end};
-use super::{Case, Curve, Envelope, cfc};
-use crate::history::derivative;
+use super::{Case, Curve, Envelope};
+use crate::signal::{cfc, derivative};
 
 /// Class of the filter: that of structural accelerations in SAE J211-1.
 const CLASS: u32 = 60;

@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::layout::{self, ATTRIBUTES, Content, Found, Opened};
 use super::{Database, DatabaseError, listed};
-use crate::curve::resample::interpolate;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
 use crate::history::time_gaps;
+use crate::signal::resample::interpolate;
 
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]

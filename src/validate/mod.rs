@@ -9,9 +9,10 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::curve::rating::{l1_ratio, matched_peaks};
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{DatasetError, OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
+use crate::signal::l1_ratio;
+use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
