@@ -6,14 +6,13 @@ use rayon::prelude::*;
 
 use crate::curve::Case;
 use crate::database::{Database, DatabaseError, LockError, WriterLock};
-use crate::manifest::ManifestError;
-use crate::study::{self, RunError, Study};
+use crate::study::{self, RunError, Study, StudyError};
 
 /// Why nothing could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     #[error(transparent)]
-    Manifest(#[from] ManifestError),
+    Study(#[from] StudyError),
     #[error(transparent)]
     Database(#[from] DatabaseError),
     #[error(transparent)]

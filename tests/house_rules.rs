@@ -23,7 +23,7 @@ const MAY_NAME: [(&str, &[&str]); 24] = [
     ("rating", &["curve", "signal", "history", "separated"]),
     ("study", &["curve", "solver", "history", "manifest", "file", "unit"]),
     ("database", &["curve", "solver", "signal", "history", "file", "unit"]),
-    ("build", &["study", "database", "curve", "manifest"]),
+    ("build", &["study", "database", "curve"]),
     ("dataset", &["curve", "unit"]),
     ("surrogate", &["dataset", "forest", "curve", "signal", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
