@@ -12,7 +12,9 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
+    /// The first-listed side: slave.
     SurfA,
+    /// The second-listed side: master.
     SurfB,
 }
 
@@ -38,12 +40,15 @@ impl Side {
 /// Name of an entity: a node, a wall, one side of an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct EntityId {
+    /// As the file has it.
     pub id: i64,
+    /// Side of an interface; `None` for what has no sides.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub side: Option<Side>,
 }
 
 impl EntityId {
+    /// An entity without sides.
     pub fn new(id: i64) -> Self {
         Self { id, side: None }
     }
@@ -89,6 +94,7 @@ pub struct TimeGap {
     pub state: usize,
     /// Times of the states before and behind it.
     pub from: f64,
+    /// Time of the state behind the gap.
     pub to: f64,
     /// Interval of the states around it.
     pub interval: f64,

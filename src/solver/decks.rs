@@ -21,7 +21,9 @@ const HEAD_LINES: usize = 1_000;
 
 /// What a folder has of decks.
 pub enum Search {
+    /// It has no deck.
     None,
+    /// The only deck, or the one that includes the others.
     One(PathBuf),
     /// Several that do not include each other.
     Several(Vec<PathBuf>),

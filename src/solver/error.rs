@@ -7,6 +7,7 @@ use super::{Entity, NoDataReason, Selection, SolverFile, WantedId};
 
 /// Why a file could not be read at all, or not what was asked of it.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ReadError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: io::Error },

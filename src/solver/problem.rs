@@ -56,6 +56,7 @@ pub enum ProblemCode {
 /// One problem and its place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Problem {
+    /// Its kind.
     pub code: ProblemCode,
     /// Line, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -66,6 +67,7 @@ pub struct Problem {
     /// First and last column, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<[usize; 2]>,
+    /// What was expected and found, without the place.
     pub message: String,
 }
 

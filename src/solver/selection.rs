@@ -6,7 +6,9 @@ use crate::history::{EntityId, Side};
 /// Which entity is wanted: an id, on both sides of an interface unless one is named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WantedId {
+    /// As the file has it.
     pub id: i64,
+    /// `None` for both sides.
     pub side: Option<Side>,
 }
 
@@ -45,7 +47,9 @@ impl std::str::FromStr for WantedId {
 /// Which histories a reader keeps. `None` keeps all, an empty list none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
+    /// Entities; global quantities have none and are always kept.
     pub ids: Option<Vec<WantedId>>,
+    /// Names as in binout, such as `x_displacement`.
     pub components: Option<Vec<String>>,
     /// Whether fields that are not kept are read as well, so that the problems of the
     /// whole file are found.

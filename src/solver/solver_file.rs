@@ -10,8 +10,10 @@ use crate::history::{EntityId, History};
 /// An entity that has histories, with its title where the file's legend gives one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entity {
+    /// Id and side.
     #[serde(flatten)]
     pub id: EntityId,
+    /// `None` where the file gives none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
 }
@@ -19,9 +21,12 @@ pub struct Entity {
 /// An entity that the file names without giving it values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WithoutData {
+    /// As the legend has it.
     pub id: i64,
+    /// `None` where the legend gives none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
+    /// Why it has no values.
     pub reason: NoDataReason,
 }
 
@@ -38,20 +43,27 @@ pub enum NoDataReason {
 /// What a solver file holds: its own description, the selected histories, its damage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolverFile {
+    /// Name of the format, one of [`FORMATS`](super::FORMATS).
     pub format: &'static str,
     /// Section of a binary file; of a text file its format's name.
     pub section: String,
+    /// Name of the solver, where the file tells.
     pub solver: Option<String>,
+    /// Version of the solver, where the file tells.
     pub version: Option<String>,
+    /// Title of the run.
     pub title: Option<String>,
     /// In the order of the first state.
     pub entities: Vec<Entity>,
+    /// Entities that are named without values.
     pub without_data: Vec<WithoutData>,
     /// All components of the file, selected or not.
     pub components: Vec<Arc<str>>,
     /// One time per complete state, in the solver's unit.
     pub time: Arc<[f64]>,
+    /// The selected ones, entity by entity.
     pub histories: Vec<History>,
+    /// Damage, in the order of the file.
     pub problems: Vec<Problem>,
     /// What was done to the file's values, such as differentiating impulses.
     pub notes: Vec<String>,

@@ -61,6 +61,10 @@ pub struct Opened {
 }
 
 impl Opened {
+    /// The file with its size of now.
+    ///
+    /// # Errors
+    /// Those of the operating system.
     pub fn new(file: File) -> io::Result<Self> {
         let size = file.metadata()?.len();
         Ok(Self { file, size })
@@ -205,6 +209,7 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
+    /// From the first byte on.
     pub fn new(source: &'a dyn Source) -> Self {
         Self { source, at: 0, buffer: Vec::new(), used: 0 }
     }
@@ -259,6 +264,7 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
+    /// A window that holds nothing yet.
     pub fn new(source: &'a dyn Source) -> Self {
         Self { source, buffer: Vec::new(), start: 0 }
     }

@@ -8,7 +8,7 @@ use crate::curve::recipe::{ForceSource, Recipe};
 
 /// What does not fit in a study manifest.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant is its message")]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum InvalidStudy {
     #[error(
         "a pair needs the other body: deflection.minus_node = …, or half_model = true in [study] for one body against its symmetry plane"

@@ -26,6 +26,7 @@ pub enum StudyError {
 
 /// Why one run gives no case.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum RunError {
     #[error("the run's folder {path} does not exist: check path in the manifest")]
     NoFolder { path: PathBuf },

@@ -15,7 +15,9 @@ use crate::unit::{
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
+    /// What all runs share.
     pub study: Head,
+    /// How a curve is made of a run.
     pub recipe: Recipe,
     /// One entry per FE run.
     pub run: Vec<RunEntry>,
@@ -25,6 +27,7 @@ pub struct Manifest {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
+    /// Name of the study.
     pub name: String,
     /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
     /// if absent.
@@ -32,6 +35,7 @@ pub struct Head {
     pub units: Option<UnitSystem>,
     /// Group of the curve database.
     pub group: String,
+    /// What hits what.
     pub kind: StudyKind,
     /// The pair is modelled as one body against its symmetry plane: closing speed and
     /// deflection are twice the run's.

@@ -6,6 +6,7 @@ use crate::signal::cfc;
 
 /// Why a run gives no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ExtractError {
     #[error("{what} holds {states} states: at least 2 are needed")]
     TooShort { origin: Origin, what: &'static str, states: usize },
@@ -66,6 +67,8 @@ impl ExtractError {
 /// Which history an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
+    /// The file of the deflection.
     Motion,
+    /// The file of the force.
     Force,
 }

@@ -25,14 +25,21 @@ use start::Start;
 /// The curve of a run and what was found on the way.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extracted {
+    /// Impact speed.
     pub speed: Speed,
+    /// At the common interval, from contact on.
     pub sampled: Curve,
+    /// Rate of the deflection at the sampled times, in m/s.
     pub closing_speed_m_per_s: Vec<f64>,
+    /// At the solver's rate, from contact on.
     pub original: Curve,
+    /// Solver's time at which the curve begins, in s.
     pub contact_time_s: f64,
     /// Whether the speed is the deck's, so that damage of the deck matters.
     pub speed_is_decks: bool,
+    /// In N/m; `None` if the record ends before the force has fallen.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Work of the loading branch against the kinetic energy.
     pub audit: EnergyAudit,
     /// Choices made, for the record.
     pub notes: Vec<String>,

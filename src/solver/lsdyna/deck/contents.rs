@@ -11,7 +11,9 @@ use crate::unit::UnitSystem;
 pub struct Deck {
     /// The first `*TITLE` that is not blank.
     pub title: Option<String>,
+    /// As a comment or `*CONTROL_UNITS` states them.
     pub units: Option<StatedUnits>,
+    /// In the order of the deck.
     pub initial_velocities: Vec<InitialVelocity>,
     /// `*DATABASE_…` of the ASCII files, in order.
     pub outputs: Vec<Output>,
@@ -19,13 +21,17 @@ pub struct Deck {
     pub history_nodes: Vec<Named>,
     /// `*DATABASE_HISTORY_NODE_SET`.
     pub history_node_sets: Vec<i64>,
+    /// `*CONTACT_…`, in order.
     pub contacts: Vec<Interface>,
+    /// `*PART`, in order.
     pub parts: Vec<Named>,
+    /// `*RIGIDWALL_…`, in order.
     pub rigid_walls: Vec<Interface>,
     /// `*PARAMETER`, names in lower case.
     pub parameters: Vec<(String, Value)>,
     /// `*INCLUDE`, in order of reading. Folders of `*INCLUDE_PATH` are tried, not listed.
     pub includes: Vec<Include>,
+    /// What could not be read, in order.
     pub problems: Vec<Problem>,
 }
 
@@ -43,6 +49,7 @@ pub struct At {
 pub struct StatedUnits {
     /// `kg / mm / ms / kN / GPa`, or the fields of `*CONTROL_UNITS`.
     pub text: String,
+    /// Where they are stated.
     pub at: At,
     /// When length, mass and time are all recognised and nothing contradicts them.
     pub system: Option<UnitSystem>,
@@ -54,23 +61,30 @@ pub struct StatedUnits {
 pub struct InitialVelocity {
     /// In capitals and without its star.
     pub keyword: String,
+    /// Where it is given.
     pub at: At,
     /// x, y, z. `None` when it is not known; a problem says why.
     pub velocity: Option<[f64; 3]>,
     /// Whether a rotation is given or not known as well.
     pub rotates: bool,
+    /// What it holds for.
     pub scope: Scope,
 }
 
 /// What an initial velocity holds for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
+    /// Every node of the model.
     AllNodes,
+    /// The node of that id.
     Node(i64),
+    /// The node set of that id.
     NodeSet(i64),
     /// Nodes inside a box, of a set when one is given as well.
     Box(i64),
+    /// The part of that id.
     Part(i64),
+    /// The part set of that id.
     PartSet(i64),
     /// The card's scope could not be read.
     Unknown,
@@ -85,14 +99,18 @@ pub struct Output {
     pub interval: Option<f64>,
     /// 1 ASCII, 2 binout, 3 both; 0 or `None` leaves it to the solver.
     pub binary: Option<i64>,
+    /// Where its keyword is.
     pub at: At,
 }
 
 /// An id and the title that goes with it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
+    /// As the deck has it.
     pub id: i64,
+    /// `None` where the deck gives none.
     pub title: Option<String>,
+    /// Where its card is.
     pub at: At,
 }
 
@@ -102,9 +120,11 @@ pub struct Interface {
     /// From `_ID`, or the order number when no contact (no wall) of the deck has an id
     /// and all are of a kind that is numbered together; else `None`.
     pub id: Option<i64>,
+    /// `None` where the deck gives none.
     pub title: Option<String>,
     /// In capitals and without its star.
     pub keyword: String,
+    /// Where its keyword is.
     pub at: At,
 }
 
@@ -115,6 +135,7 @@ pub struct Include {
     pub name: String,
     /// Where it is included.
     pub at: At,
+    /// Whether the file is there.
     pub found: bool,
 }
 
@@ -123,6 +144,7 @@ pub struct Include {
 pub struct ImpactSpeed {
     /// Above zero, in the deck's units.
     pub speed: f64,
+    /// Where the first velocity is given.
     pub at: At,
 }
 

@@ -8,8 +8,11 @@ use super::card::{Field, start};
 /// A parameter's value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
+    /// Of type R.
     Real(f64),
+    /// Of type I.
     Integer(i64),
+    /// Of type C.
     Text(String),
     /// Given by an expression, defined twice with different values, or not readable; a
     /// problem says which.
