@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use crumple::history::derivative;
 use crumple::nsdm::{Settings, Start, Target, fit, fit_seeds};
+use crumple::signal::derivative;
 use divan::{Bencher, black_box};
 
 const GROUP: &str = "lead-car-wall";

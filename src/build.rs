@@ -8,15 +8,14 @@ use rayon::prelude::*;
 use crate::curve::Case;
 use crate::database::{Database, DatabaseError};
 use crate::file::{LockError, WriterLock};
-use crate::manifest::ManifestError;
-use crate::study::{self, RunError, Study};
+use crate::study::{self, RunError, Study, StudyError};
 
 /// Why nothing could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The manifest is wrong.
     #[error(transparent)]
-    Manifest(#[from] ManifestError),
+    Study(#[from] StudyError),
     /// The database is not ours, or damaged.
     #[error(transparent)]
     Database(#[from] DatabaseError),

@@ -12,7 +12,9 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
+    /// The first-listed side: slave.
     SurfA,
+    /// The second-listed side: master.
     SurfB,
 }
 
@@ -38,12 +40,15 @@ impl Side {
 /// Name of an entity: a node, a wall, one side of an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct EntityId {
+    /// As the file has it.
     pub id: i64,
+    /// Side of an interface; `None` for what has no sides.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub side: Option<Side>,
 }
 
 impl EntityId {
+    /// An entity without sides.
     pub fn new(id: i64) -> Self {
         Self { id, side: None }
     }
@@ -82,20 +87,6 @@ impl History {
     }
 }
 
-/// Rate of `values` over `time`: central differences, one-sided at both ends.
-///
-/// `time`: strictly increasing, at least two. Over an output interval `h` the result is
-/// a mean over `2 h`, as the contact forces derived from impulses are.
-pub fn derivative(time: &[f64], values: &[f64]) -> Vec<f64> {
-    let last = values.len() - 1;
-    (0..values.len())
-        .map(|i| {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-            (values[b] - values[a]) / (time[b] - time[a])
-        })
-        .collect()
-}
-
 /// A hole in time: an interval without a state, far longer than those around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeGap {
@@ -103,6 +94,7 @@ pub struct TimeGap {
     pub state: usize,
     /// Times of the states before and behind it.
     pub from: f64,
+    /// Time of the state behind the gap.
     pub to: f64,
     /// Interval of the states around it.
     pub interval: f64,
@@ -222,14 +214,5 @@ mod tests {
         assert_eq!(time_gaps(&[1.0, 2.0, 3.0, 0.5, 4.0, 5.0]), [], "a time that goes back");
         assert_eq!(time_gaps(&[0.0, 1.0, 9.0, 10.0]), [], "too few states to tell");
         assert_eq!(time_gaps(&[]), []);
-    }
-
-    #[test]
-    fn derivative_of_a_parabola_is_exact_inside() {
-        let t: Vec<f64> = (0..10).map(|i| f64::from(i) * 0.5).collect();
-        let v: Vec<f64> = t.iter().map(|t| t * t).collect();
-        let rate = derivative(&t, &v);
-        assert_eq!(rate[4], 4.0);
-        assert_eq!(rate[0], 0.5, "one-sided at the end");
     }
 }

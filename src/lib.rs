@@ -31,6 +31,8 @@ pub mod unit;
 
 pub mod history;
 
+pub mod signal;
+
 pub mod solver;
 
 pub mod curve;

@@ -12,6 +12,7 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// Why a TOML file cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ManifestError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: io::Error },

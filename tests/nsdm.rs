@@ -2,8 +2,6 @@
 
 use crate::common::root;
 use crumple::curve::Case;
-use crumple::curve::rating::l1_ratio;
-use crumple::history::derivative;
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading, simulate,
 };
@@ -11,6 +9,7 @@ use crumple::nsdm::{
     DAMPING_N_S_PER_M, Fit, Identifiability, Nsdm, NsdmError, PiecewiseLinear, STIFFNESS_N_PER_M,
     Settings, Start, Target, fit, fit_seeds,
 };
+use crumple::signal::{derivative, l1_ratio};
 
 const MASS_KG: f64 = 24e3;
 const SPEED_M_PER_S: f64 = 40.0 / 3.0;

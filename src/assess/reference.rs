@@ -1,14 +1,13 @@
 //! Motion of a case against a multi-body run of one mass: the errors of a curve in use.
 
 use crate::curve::body::filtered;
-use crate::curve::rating::l1_ratio;
-use crate::curve::resample::interpolate;
 use crate::curve::{Case, DrivingCurve};
-use crate::history::derivative;
 use crate::multibody::{
     Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
     UnloadingChoice, simulate,
 };
+use crate::signal::resample::interpolate;
+use crate::signal::{derivative, l1_ratio};
 
 /// The comparison ends this long after FE's largest deflection, so that rebound counts.
 const AFTER_MAX_CRUSH_S: f64 = 0.030;

@@ -6,8 +6,8 @@ use super::compare::{CompareError, Row};
 use super::methods::{FittedNsdm, Method};
 use super::reference::Reference;
 use crate::curve::ForceKind;
-use crate::curve::rating::l1_ratio;
 use crate::rating::{Quantity, Rating, Settings, Signal, rate};
+use crate::signal::l1_ratio;
 
 /// What all rows of one comparison share.
 pub(super) struct RowBuilder<'a> {

@@ -11,18 +11,18 @@ use super::compare::{CompareError, Settings};
 use super::methods::{ddtcm_model, fit_nsdm};
 use super::validate::{self, Choice};
 use crate::curve::body::filtered;
-use crate::curve::rating::l1_ratio;
-use crate::curve::resample::interpolate;
 use crate::curve::{Case, DrivingCurve};
 use crate::database::{Database, DatabaseError};
 use crate::dataset::TrainingSet;
 use crate::file;
-use crate::history::{EntityId, derivative};
+use crate::history::EntityId;
 use crate::multibody::simulate;
 use crate::scenario::{
     self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, ScenarioError,
     Source, Sources,
 };
+use crate::signal::resample::interpolate;
+use crate::signal::{derivative, l1_ratio};
 use crate::solver::{self, ReadError, Selection, WantedId};
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction

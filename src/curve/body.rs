@@ -2,8 +2,8 @@
 
 use super::driving::rebound_stiffness_n_per_m;
 use super::loading::{loading_branch, loading_end};
-use super::{Case, Curve, Envelope, cfc};
-use crate::history::derivative;
+use super::{Case, Curve, Envelope};
+use crate::signal::{cfc, derivative};
 
 /// Class of the filter: that of structural accelerations in SAE J211-1.
 const CLASS: u32 = 60;

@@ -3,16 +3,13 @@
 //! Deflection is positive in compression, force pushes the bodies apart; SI throughout.
 
 pub mod body;
-pub mod cfc;
 pub mod contact;
 pub mod driving;
 pub mod energy;
 pub mod envelope;
 pub mod extract;
 pub mod loading;
-pub mod rating;
 pub mod recipe;
-pub mod resample;
 
 use std::collections::BTreeMap;
 

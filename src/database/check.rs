@@ -8,10 +8,10 @@ use serde::Serialize;
 
 use super::layout::{self, ATTRIBUTES, Content, FoundCase, FoundGroup, Opened};
 use super::{DatabaseError, listed};
-use crate::curve::resample::interpolate;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
 use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
+use crate::signal::resample::interpolate;
 
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::grow::{Table, grow};
+use super::members::Members;
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
-use super::quantiles::Members;
 use super::tree::{Tree, TreeError};
 use super::walk::{BATCH, Rows, Walk, groups};
 use crate::stream::Stream;
@@ -42,14 +42,17 @@ pub struct OutOfBag {
 }
 
 impl<F: Float> RegressionForest<F> {
+    /// The trees, in the order of their seeds.
     pub fn trees(&self) -> &[Tree<F>] {
         &self.trees
     }
 
+    /// Number of features that it was fitted to.
     pub fn features(&self) -> usize {
         self.features
     }
 
+    /// The parameters that it was fitted with.
     pub fn params(&self) -> &ForestValidParams<F> {
         &self.params
     }

@@ -23,6 +23,7 @@ mod criterion;
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
 mod grow;
+mod members;
 mod onnx;
 mod params;
 mod quantiles;

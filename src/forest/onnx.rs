@@ -20,6 +20,7 @@ pub struct OnnxDescription<'a> {
 
 /// Why a forest cannot be an ONNX model.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum OnnxError {
     #[error("{named} features are named, the forest was fitted to {fitted}")]
     Names { named: usize, fitted: usize },

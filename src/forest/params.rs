@@ -43,6 +43,7 @@ pub enum Ties {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeaturesPerSplit {
+    /// Every feature.
     All,
     /// This many that are not constant in the node, drawn without replacement.
     Count(usize),
@@ -50,6 +51,7 @@ pub enum FeaturesPerSplit {
 
 /// Why a forest cannot be fitted, or asked for quantiles.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ForestError {
     #[error("a forest needs at least 1 tree, found 0")]
     NoTrees,
@@ -108,6 +110,7 @@ pub struct ForestValidParams<F> {
 }
 
 impl<F> ForestValidParams<F> {
+    /// How thresholds are chosen.
     pub fn thresholds(&self) -> Thresholds {
         self.thresholds
     }
@@ -149,11 +152,13 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
+    /// How thresholds are chosen.
     pub fn thresholds(mut self, thresholds: Thresholds) -> Self {
         self.0.thresholds = thresholds;
         self
     }
 
+    /// When a node becomes a leaf.
     pub fn stop(mut self, stop: StopRule) -> Self {
         self.0.stop = stop;
         self
@@ -171,11 +176,13 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
+    /// How many features are looked at for each split.
     pub fn features_per_split(mut self, features: FeaturesPerSplit) -> Self {
         self.0.features_per_split = features;
         self
     }
 
+    /// Which of equally good splits is taken.
     pub fn ties(mut self, ties: Ties) -> Self {
         self.0.ties = ties;
         self

@@ -24,6 +24,7 @@ pub struct Tree<F> {
 
 /// Why stored node arrays are no tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum TreeError {
     #[error("the node arrays differ in length or are empty")]
     Lengths,
@@ -92,6 +93,7 @@ impl<F: Float> Tree<F> {
         self.feature[node] == LEAF
     }
 
+    /// Number of nodes, leaves among them.
     pub fn nodes(&self) -> usize {
         self.value.len()
     }

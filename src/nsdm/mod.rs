@@ -35,7 +35,7 @@ mod start;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::curve::rating::l1_ratio;
+use crate::signal::l1_ratio;
 use crate::stream::Stream;
 use genes::{Genes, Scales};
 pub use law::{Nsdm, PiecewiseLinear};

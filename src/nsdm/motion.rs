@@ -212,7 +212,7 @@ mod tests {
     use super::super::PiecewiseLinear;
     use super::super::genes::{Genes, Scales};
     use super::*;
-    use crate::curve::rating::l1_ratio;
+    use crate::signal::l1_ratio;
     use crate::stream::Stream;
 
     fn constant(stiffness: f64, damping: f64) -> Nsdm {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::corridor::corridor;
 use super::shift::{best, centred};
 use super::warping;
-use crate::history::derivative;
+use crate::signal::derivative;
 
 /// Largest phase error that has a score, as a share of the samples; nothing is shifted further.
 const PHASE_ERROR: f64 = 0.2;

@@ -17,7 +17,8 @@ pub mod warping;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::curve::rating::{MatchedPeak, l1_ratio, matched_peaks};
+use crate::signal::l1_ratio;
+use crate::signal::peaks::{MatchedPeak, matched_peaks};
 use cora::{Cora, cora};
 use deceleration::Deceleration;
 use differences::{MaxAbs, Pointwise, integral_error, max_abs, peak_norm, pointwise, rms_ratio};

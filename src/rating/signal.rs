@@ -1,7 +1,7 @@
 //! Signals: checked values over time, brought to common times.
 
-use crate::curve::cfc::{self, CfcError};
-use crate::curve::resample::interpolate;
+use crate::signal::cfc::{self, CfcError};
+use crate::signal::resample::interpolate;
 
 /// Interval of ISO/TS 18571: 10 kHz.
 pub const INTERVAL_S: f64 = 1e-4;

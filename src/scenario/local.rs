@@ -8,8 +8,8 @@ use std::path::Path;
 use super::assemble::assemble_at;
 use super::layout::{Role, Slot, layout};
 use super::{CheckedScenario, InterfaceSpeed, Prepared, ScenarioError, Source, Sources};
-use crate::curve::rating::peaks;
 use crate::multibody::{Chain, Method, Run, simulate};
+use crate::signal::peaks::peaks;
 use crate::unit::km_per_h;
 
 /// The speeds are found when none changes by more, in m/s.

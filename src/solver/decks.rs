@@ -1,13 +1,13 @@
 //! The deck of a run: found beside its files, read with its includes, held against them.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::lsdyna::deck::{self, Deck, Interface, Named};
 use super::lsdyna::line::Lines;
 use super::{Entity, ReadError, SolverFile, source};
+use crate::file;
 
 /// Endings of keyword decks.
 const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
@@ -21,7 +21,9 @@ const HEAD_LINES: usize = 1_000;
 
 /// What a folder has of decks.
 pub enum Search {
+    /// It has no deck.
     None,
+    /// The only deck, or the one that includes the others.
     One(PathBuf),
     /// Several that do not include each other.
     Several(Vec<PathBuf>),
@@ -46,16 +48,11 @@ pub fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError
     let mut open = |name: &str| -> Option<Box<dyn BufRead>> {
         // Names are often written on Windows.
         let path = folder.join(name.replace('\\', "/"));
-        // A pipe would block.
-        let is_file = fs::metadata(&path).is_ok_and(|meta| meta.is_file());
-        let file = is_file.then(|| File::open(&path).ok())??;
+        let file = file::open(&path).ok()?;
         included.push(path);
         Some(Box::new(BufReader::new(file)))
     };
-    if !fs::metadata(path).map_err(io)?.is_file() {
-        return Err(io(std::io::Error::other("this is no file")));
-    }
-    let mut file = BufReader::new(File::open(path).map_err(io)?);
+    let mut file = BufReader::new(file::open(path).map_err(io)?);
     let head = file.fill_buf().map_err(io)?;
     if let Some(what) = source::encoded(&head[..head.len().min(HEAD)]) {
         return Err(io(std::io::Error::other(what)));
@@ -66,7 +63,7 @@ pub fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError
 
 /// The files that a deck itself includes.
 fn includes(path: &Path) -> Vec<deck::Include> {
-    let Ok(file) = File::open(path) else { return Vec::new() };
+    let Ok(file) = file::open(path) else { return Vec::new() };
     let read = deck::read(&mut BufReader::new(file), &mut |_| None);
     read.map(|deck| deck.includes).unwrap_or_default()
 }
@@ -106,8 +103,7 @@ fn has_ending(path: &Path) -> bool {
 
 /// Whether the first keyword of a file is one of a deck.
 fn is_deck(path: &Path) -> bool {
-    let is_file = fs::metadata(path).is_ok_and(|meta| meta.is_file());
-    let Some(file) = is_file.then(|| File::open(path).ok()).flatten() else { return false };
+    let Ok(file) = file::open(path) else { return false };
     let mut lines = Lines::new(BufReader::new(file));
     for _ in 0..HEAD_LINES {
         match lines.next_line() {

@@ -4,7 +4,6 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::lsdyna::line::Line;
 use crate::history::time_gaps;
 
 /// Problems kept per file; further ones are counted only.
@@ -57,6 +56,7 @@ pub enum ProblemCode {
 /// One problem and its place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Problem {
+    /// Its kind.
     pub code: ProblemCode,
     /// Line, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,6 +67,7 @@ pub struct Problem {
     /// First and last column, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<[usize; 2]>,
+    /// What was expected and found, without the place.
     pub message: String,
 }
 
@@ -88,7 +89,13 @@ impl fmt::Display for Problem {
 impl Problem {
     /// A problem without a place.
     pub(in crate::solver) fn new(code: ProblemCode, message: String) -> Self {
-        Self { code, line: None, byte: None, columns: None, message }
+        Self::at(code, None, message)
+    }
+
+    /// A problem at a place.
+    pub(in crate::solver) fn at(code: ProblemCode, place: Option<Place>, message: String) -> Self {
+        let line = place.map(|p| p.line).filter(|&line| line > 0);
+        Self { code, line, byte: place.map(|p| p.byte), columns: None, message }
     }
 }
 
@@ -124,12 +131,6 @@ impl Place {
     }
 }
 
-impl From<&Line<'_>> for Place {
-    fn from(line: &Line<'_>) -> Self {
-        Self { line: line.number, byte: line.byte }
-    }
-}
-
 /// Collects problems up to a bound.
 #[derive(Debug, Default)]
 pub struct Problems {
@@ -145,17 +146,15 @@ impl Problems {
         columns: Option<[usize; 2]>,
         message: String,
     ) {
-        if self.kept.len() == MAX_KEPT {
+        self.push(Problem { columns, ..Problem::at(code, place, message) });
+    }
+
+    pub fn push(&mut self, problem: Problem) {
+        if self.kept.len() < MAX_KEPT {
+            self.kept.push(problem);
+        } else {
             self.dropped += 1;
-            return;
         }
-        self.kept.push(Problem {
-            code,
-            line: place.map(|p| p.line).filter(|&line| line > 0),
-            byte: place.map(|p| p.byte),
-            columns,
-            message,
-        });
     }
 
     /// A problem of a binary file, which has no lines.
@@ -176,5 +175,11 @@ impl Problems {
             self.kept.push(Problem::new(ProblemCode::MoreProblems, message));
         }
         self.kept
+    }
+}
+
+impl Extend<Problem> for Problems {
+    fn extend<T: IntoIterator<Item = Problem>>(&mut self, problems: T) {
+        problems.into_iter().for_each(|problem| self.push(problem));
     }
 }

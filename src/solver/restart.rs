@@ -1,6 +1,6 @@
 //! States that a restart wrote again, and states whose time is out of order.
 
-use super::problem::{Place, ProblemCode, Problems};
+use super::problem::{Place, Problem, ProblemCode, Problems};
 
 /// Indices of the states that count, by one rule for all files: of what was written again the
 /// last writing. A single state whose time is before its neighbours' stays where the file has
@@ -8,14 +8,16 @@ use super::problem::{Place, ProblemCode, Problems};
 ///
 /// `is_same`: whether a state is written again by another of its time below it; `None` if the
 /// file does not tell.
-/// `place`: where a state begins.
+/// `place`: where a state begins. `of`: what stands ahead of each message.
+///
+/// Returns the indices, increasing, and what was left out or is out of order.
 pub fn resolve(
     time: &[f64],
     is_same: impl Fn(usize, usize) -> Option<bool>,
     place: impl Fn(usize) -> Option<Place>,
     of: &str,
-    problems: &mut Problems,
-) -> Vec<usize> {
+) -> (Vec<usize>, Problems) {
+    let mut problems = Problems::default();
     let mut kept: Vec<usize> = Vec::with_capacity(time.len());
     for i in 0..time.len() {
         let goes_back = i > 0 && time[i] < time[i - 1];
@@ -27,7 +29,7 @@ pub fn resolve(
                 time[i],
                 i + 1
             );
-            problems.add(ProblemCode::TimeGoesBack, place(i), None, message);
+            problems.push(Problem::at(ProblemCode::TimeGoesBack, place(i), message));
         } else if goes_back || again {
             // Where time goes back, a restart may count its cycles anew.
             let stays = |k: usize| {
@@ -44,10 +46,10 @@ pub fn resolve(
                     time[first],
                     time[last]
                 );
-                problems.add(ProblemCode::RepeatedState, place(i), None, message);
+                problems.push(Problem::at(ProblemCode::RepeatedState, place(i), message));
             }
         }
         kept.push(i);
     }
-    kept
+    (kept, problems)
 }

@@ -61,6 +61,10 @@ pub struct Opened {
 }
 
 impl Opened {
+    /// The file with its size of now.
+    ///
+    /// # Errors
+    /// Those of the operating system.
     pub fn new(file: File) -> io::Result<Self> {
         let size = file.metadata()?.len();
         Ok(Self { file, size })
@@ -183,6 +187,15 @@ pub fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Resul
     Ok(filled)
 }
 
+/// [`Read::read`] of anything that has a buffer.
+pub(super) fn read_buffered(input: &mut impl BufRead, out: &mut [u8]) -> io::Result<usize> {
+    let there = input.fill_buf()?;
+    let count = there.len().min(out.len());
+    out[..count].copy_from_slice(&there[..count]);
+    input.consume(count);
+    Ok(count)
+}
+
 /// Bytes per read of a [`Stream`].
 const STREAM_BUFFER: usize = 1 << 16;
 
@@ -196,6 +209,7 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
+    /// From the first byte on.
     pub fn new(source: &'a dyn Source) -> Self {
         Self { source, at: 0, buffer: Vec::new(), used: 0 }
     }
@@ -220,11 +234,7 @@ impl<'a> Stream<'a> {
 
 impl Read for Stream<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let there = self.fill_buf()?;
-        let count = there.len().min(out.len());
-        out[..count].copy_from_slice(&there[..count]);
-        self.consume(count);
-        Ok(count)
+        read_buffered(self, out)
     }
 }
 
@@ -254,6 +264,7 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
+    /// A window that holds nothing yet.
     pub fn new(source: &'a dyn Source) -> Self {
         Self { source, buffer: Vec::new(), start: 0 }
     }

@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::problem::{ProblemCode, Problems};
+use super::problem::{Problem, ProblemCode};
 use crate::history::{EntityId, History};
 
 /// Sections whose quantities may really vanish for one state, such as a contact's force.
@@ -41,7 +41,13 @@ pub fn may_vanish(section: &str) -> bool {
 /// The last tells zeros that were written over values from a front that stands on a wall for
 /// one state. Forces may vanish together: there, another component of the entity must be
 /// there in that state, because a lost contact loses all.
-pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
+pub fn suspect(section: &str, histories: &[History]) -> Vec<Problem> {
+    let mut found = runs_of_zeros(section, histories);
+    found.sort_by_key(|run| run.state);
+    found.iter().map(|run| run.problem(section, histories)).collect()
+}
+
+fn runs_of_zeros(section: &str, histories: &[History]) -> Vec<Run> {
     let may_vanish = may_vanish(section);
     let mut of_entity: HashMap<Option<EntityId>, Vec<&History>> = HashMap::new();
     if may_vanish {
@@ -68,14 +74,10 @@ pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
             if may_vanish && !alone {
                 continue;
             }
-            let above = runs[state].filter(|run| run.last + 1 == k);
-            let first = above.map_or(k, |run| run.first);
-            let returning = above.map_or(0, |run| run.returning);
-            let returning = returning + usize::from(returns(values, state));
-            let run = Run { state, first, last: k, returning };
+            let run = Run::with(runs[state], state, k, returns(values, state));
             runs[state] = Some(run);
             if run.is_suspect() {
-                let known = found.iter().position(|r| r.state == state && r.first == first);
+                let known = found.iter().position(|r| r.state == state && r.first == run.first);
                 match known {
                     Some(shorter) => found[shorter] = run,
                     None if found.len() < MAX_RUNS => found.push(run),
@@ -84,18 +86,7 @@ pub fn suspect(section: &str, histories: &[History], problems: &mut Problems) {
             }
         }
     }
-    found.sort_by_key(|run| run.state);
-    for Run { state, first, last, .. } in found {
-        let at = histories[first].time.get(state).copied().unwrap_or(f64::NAN);
-        let message = format!(
-            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero but not so in the states around it: was the file overwritten there?",
-            last - first + 1,
-            state + 1,
-            histories[first].label(),
-            histories[last].label(),
-        );
-        problems.add(ProblemCode::SuspectZeros, None, None, message);
-    }
+    found
 }
 
 /// Entities beside each other whose component vanishes in one state.
@@ -110,6 +101,27 @@ struct Run {
 }
 
 impl Run {
+    /// The run that history `k` ends: the one above it, if that ends right above.
+    fn with(above: Option<Self>, state: usize, k: usize, returns: bool) -> Self {
+        let above = above.filter(|run| run.last + 1 == k);
+        let first = above.map_or(k, |run| run.first);
+        let returning = above.map_or(0, |run| run.returning) + usize::from(returns);
+        Self { state, first, last: k, returning }
+    }
+
+    fn problem(&self, section: &str, histories: &[History]) -> Problem {
+        let Self { state, first, last, .. } = *self;
+        let at = histories[first].time.get(state).copied().unwrap_or(f64::NAN);
+        let message = format!(
+            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+            last - first + 1,
+            state + 1,
+            histories[first].label(),
+            histories[last].label(),
+        );
+        Problem::new(ProblemCode::SuspectZeros, message)
+    }
+
     fn is_suspect(&self) -> bool {
         let length = self.last - self.first + 1;
         length >= ENTITIES && 2 * self.returning > length
@@ -152,9 +164,7 @@ mod tests {
         if let Some(values) = others {
             histories.extend((0..rows.len()).map(|k| history("y", k, values)));
         }
-        let mut problems = Problems::default();
-        suspect(section, &histories, &mut problems);
-        problems.into_list().into_iter().map(|p| p.message).collect()
+        suspect(section, &histories).into_iter().map(|p| p.message).collect()
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::CaseCurve;
 use super::curves::least_squares;
-use crate::curve::rating::{PROMINENCE, peaks};
+use crate::signal::peaks::{PROMINENCE, peaks};
 
 /// Landmarks of neighbouring cases match if they lie no further apart than this share of
 /// the larger maximal crush.

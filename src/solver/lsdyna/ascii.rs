@@ -124,76 +124,47 @@ impl<'a> Frame<'a> {
     /// Takes one line; false at the end of the file.
     pub fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
         let Some(line) = self.lines.next_line()? else { return Ok(false) };
+        let states = &mut self.states;
         let in_header = line.number <= 2 || self.fence.is_open();
         if in_header && (line.text.len() > MAX_HEADER_LINE || line.is_binary()) {
-            self.states.problems.add(
-                ProblemCode::BadLine,
-                Some((&line).into()),
-                None,
-                "the line is no title, version or legend entry: was the file overwritten?".into(),
-            );
+            let message =
+                "the line is no title, version or legend entry: was the file overwritten?";
+            states.problems.add(ProblemCode::BadLine, Some((&line).into()), None, message.into());
         }
-        match line.number {
-            1 => {
-                let text = String::from_utf8_lossy(line.text).trim().to_string();
-                self.title = (!text.is_empty()).then_some(text);
-                return Ok(true);
+        if line.number == 1 {
+            let text = String::from_utf8_lossy(line.text).trim().to_string();
+            self.title = (!text.is_empty()).then_some(text);
+        } else if line.number == 2 {
+            self.version = header::version(line.text);
+            if self.version.is_none() {
+                let message = "expected LS-DYNA's version line (\"ls-dyna … date …\")";
+                let place = Some((&line).into());
+                states.problems.add(ProblemCode::NoVersionLine, place, None, message.into());
             }
-            2 => {
-                self.version = header::version(line.text);
-                if self.version.is_none() {
-                    self.states.problems.add(
-                        ProblemCode::NoVersionLine,
-                        Some((&line).into()),
-                        None,
-                        "expected LS-DYNA's version line (\"ls-dyna … date …\")".into(),
-                    );
-                }
-                return Ok(true);
-            }
-            _ => {}
-        }
-        if !line.ended && !line.is_blank() {
+        } else if !line.ended && !line.is_blank() {
             // Nobody knows what is missing from it, not even where all its numbers seem whole.
             if !self.fence.is_open() {
-                body.unfinished(&line, &mut self.states);
-                if !self.states.is_pending() {
-                    self.states.begin(None, (&line).into());
+                body.unfinished(&line, states);
+                if !states.is_pending() {
+                    states.begin(None, (&line).into());
                 }
-                self.states.damage(&line, None, "the file ends within this line".into());
+                states.damage(&line, None, "the file ends within this line".into());
                 body.interrupt();
             }
-            return Ok(true);
-        }
-        if line.overlong {
-            self.states.problems.add(
-                ProblemCode::BadLine,
-                Some((&line).into()),
-                None,
-                "the line is longer than any line of this file can be; its end is left out".into(),
-            );
-        }
-        if line.is_binary() {
-            let message = "expected text, found bytes that are none: was the file overwritten?";
-            self.states.damage(&line, None, message.into());
-            body.interrupt();
-            return Ok(true);
-        }
-        if self.fence.is_open() && body.is_signature(line.text) {
-            self.fence.close();
-            self.states.problems.add(
-                ProblemCode::BadLine,
-                Some((&line).into()),
-                None,
-                "expected {END LEGEND} before the first state".into(),
-            );
-        }
-        if self.fence.covers(line.text) {
-            if self.legend.len() < MAX_LEGEND {
+        } else if is_text(&line, states) {
+            if self.fence.is_open() && body.is_signature(line.text) {
+                self.fence.close();
+                let message = "expected {END LEGEND} before the first state";
+                let place = Some((&line).into());
+                states.problems.add(ProblemCode::BadLine, place, None, message.into());
+            }
+            if !self.fence.covers(line.text) {
+                body.line(&line, states);
+            } else if self.legend.len() < MAX_LEGEND {
                 self.legend.extend(header::legend_entry(line.text));
             }
         } else {
-            body.line(&line, &mut self.states);
+            body.interrupt();
         }
         Ok(true)
     }
@@ -262,4 +233,18 @@ impl<'a> Frame<'a> {
             notes: Vec::new(),
         }
     }
+}
+
+/// Whether a line is text; says if not, or if it is too long.
+fn is_text(line: &Line<'_>, states: &mut States<'_>) -> bool {
+    if line.overlong {
+        let message = "the line is longer than any line of this file can be; its end is left out";
+        states.problems.add(ProblemCode::BadLine, Some(line.into()), None, message.into());
+    }
+    let is_binary = line.is_binary();
+    if is_binary {
+        let message = "expected text, found bytes that are none: was the file overwritten?";
+        states.damage(line, None, message.into());
+    }
+    !is_binary
 }

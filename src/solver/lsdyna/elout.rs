@@ -271,18 +271,7 @@ impl Elout {
         let nodal = matches!(quantity, Quantity::NodalStress | Quantity::NodalStrain);
         let label = text.get(..LABEL)?;
         let (point, surface) = place(label).filter(|_| !label.contains(&b'*'))?;
-        // Details of elements end with the place of the point.
-        let location = [b"int. point".as_slice(), b"node "]
-            .iter()
-            .find_map(|word| memchr::memmem::rfind(text, word).map(|at| (at, word.len())));
-        let (numbers, location) = match location.filter(|(at, _)| *at > LABEL) {
-            Some((at, length)) => {
-                let number = integer(&text[at + length..])?;
-                let what = if text[at] == b'i' { "point" } else { "node" };
-                (text[..at].trim_ascii_end(), Some((what, number)))
-            }
-            None => (text, None),
-        };
+        let (numbers, location) = location(text)?;
         let further: &'static [&'static str] = match quantity {
             Quantity::Stress => self.further,
             Quantity::NodalStress => &["yield"],
@@ -318,6 +307,21 @@ impl Elout {
         });
         Some(())
     }
+}
+
+/// A row without the place of its point, with which rows of details end, and that place.
+fn location(text: &[u8]) -> Option<(&[u8], Option<(&'static str, i64)>)> {
+    let found = [b"int. point".as_slice(), b"node "]
+        .iter()
+        .find_map(|word| memchr::memmem::rfind(text, word).map(|at| (at, word.len())));
+    Some(match found.filter(|(at, _)| *at > LABEL) {
+        Some((at, length)) => {
+            let number = integer(&text[at + length..])?;
+            let what = if text[at] == b'i' { "point" } else { "node" };
+            (text[..at].trim_ascii_end(), Some((what, number)))
+        }
+        None => (text, None),
+    })
 }
 
 /// Integration point and surface that the first columns of a row tell.

@@ -46,6 +46,12 @@ impl Line<'_> {
     }
 }
 
+impl From<&Line<'_>> for Place {
+    fn from(line: &Line<'_>) -> Self {
+        Self { line: line.number, byte: line.byte }
+    }
+}
+
 /// Reads lines ended by LF or CRLF with a bounded buffer.
 pub struct Lines<R> {
     input: R,

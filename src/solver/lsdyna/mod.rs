@@ -1,32 +1,32 @@
 //! LS-DYNA's time histories: one module per file, named as the solver names it.
 
-pub mod abstat;
+pub(super) mod abstat;
 mod ascii;
-pub mod binout;
-pub mod bndout;
-pub mod curvout;
+pub(super) mod binout;
+pub(super) mod bndout;
+pub(super) mod curvout;
 pub mod deck;
-pub mod deforc;
+pub(super) mod deforc;
 mod dotted;
 mod e12;
-pub mod elout;
-pub mod glstat;
+pub(super) mod elout;
+pub(super) mod glstat;
 pub(super) mod header;
-pub mod jntforc;
+pub(super) mod jntforc;
 mod label_values;
-pub mod line;
+pub(super) mod line;
 mod lsda;
-pub mod matsum;
+pub(super) mod matsum;
 mod node_forces;
-pub mod nodfor;
-pub mod nodout;
-pub mod rbdout;
-pub mod rcforc;
-pub mod rwforc;
-pub mod secforc;
-pub mod sleout;
-pub mod spcforc;
-pub mod swforc;
+pub(super) mod nodfor;
+pub(super) mod nodout;
+pub(super) mod rbdout;
+pub(super) mod rcforc;
+pub(super) mod rwforc;
+pub(super) mod secforc;
+pub(super) mod sleout;
+pub(super) mod spcforc;
+pub(super) mod swforc;
 
 use super::states::States;
 

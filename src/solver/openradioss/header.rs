@@ -105,10 +105,8 @@ impl Header {
         let Some(solver) = records.header()? else { return Ok(None) };
         if code > 3050 {
             let Some(extra) = records.header()? else { return Ok(None) };
-            for _ in 0..count(integers(&extra).first()).unwrap_or(0) {
-                if records.header()?.is_none() {
-                    return Ok(None);
-                }
+            if !skip(records, count(integers(&extra).first()).unwrap_or(0))? {
+                return Ok(None);
             }
         }
         let Some(counts) = records.header()? else { return Ok(None) };
@@ -119,40 +117,14 @@ impl Header {
         else {
             return Ok(None);
         };
-        if globals > 0 && records.header()?.is_none() {
+        if globals > 0 && !skip(records, 1)? {
             return Ok(None);
         }
-        let mut part_values = 0;
-        for _ in 0..parts {
-            // Id, title, four integers: the last is the number of history variables.
-            let Some(part) = records.header()? else { return Ok(None) };
-            let tail = integers(part.get(4 + title_length..).unwrap_or_default());
-            let Some(variables) = count(tail.get(3)) else { return Ok(None) };
-            part_values += variables;
-            if variables > 0 && records.header()?.is_none() {
-                return Ok(None);
-            }
+        let Some(part_values) = part_values(records, parts, title_length)? else { return Ok(None) };
+        if !skip(records, materials + properties)? {
+            return Ok(None);
         }
-        for _ in 0..materials + properties {
-            if records.header()?.is_none() {
-                return Ok(None);
-            }
-        }
-        let mut subset_values = 0;
-        for _ in 0..subsets {
-            // Id, parent, number of child subsets, of parts, of variables, title.
-            let Some(subset) = records.header()? else { return Ok(None) };
-            let head = integers(subset.get(..20).unwrap_or_default());
-            for k in 2..5 {
-                let Some(number) = count(head.get(k)) else { return Ok(None) };
-                if k == 4 {
-                    subset_values += number;
-                }
-                if number > 0 && records.next()?.is_none() {
-                    return Ok(None);
-                }
-            }
-        }
+        let Some(subset_values) = subset_values(records, subsets)? else { return Ok(None) };
         let mut read = Vec::new();
         for _ in 0..groups {
             let Some(group) = Group::read(records)? else { return Ok(None) };
@@ -167,6 +139,56 @@ impl Header {
             groups: read,
         }))
     }
+}
+
+/// Passes over records of the header; false if it ends before.
+fn skip(records: &mut Records<'_>, count: usize) -> io::Result<bool> {
+    for _ in 0..count {
+        if records.header()?.is_none() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Values that a state has of all parts.
+fn part_values(
+    records: &mut Records<'_>,
+    parts: usize,
+    title_length: usize,
+) -> io::Result<Option<usize>> {
+    let mut values = 0;
+    for _ in 0..parts {
+        // Id, title, four integers: the last is the number of history variables.
+        let Some(part) = records.header()? else { return Ok(None) };
+        let tail = integers(part.get(4 + title_length..).unwrap_or_default());
+        let Some(variables) = count(tail.get(3)) else { return Ok(None) };
+        values += variables;
+        if variables > 0 && records.header()?.is_none() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(values))
+}
+
+/// Values that a state has of all subsets.
+fn subset_values(records: &mut Records<'_>, subsets: usize) -> io::Result<Option<usize>> {
+    let mut values = 0;
+    for _ in 0..subsets {
+        // Id, parent, number of child subsets, of parts, of variables, title.
+        let Some(subset) = records.header()? else { return Ok(None) };
+        let head = integers(subset.get(..20).unwrap_or_default());
+        for k in 2..5 {
+            let Some(number) = count(head.get(k)) else { return Ok(None) };
+            if k == 4 {
+                values += number;
+            }
+            if number > 0 && records.next()?.is_none() {
+                return Ok(None);
+            }
+        }
+    }
+    Ok(Some(values))
 }
 
 impl Group {

@@ -16,7 +16,8 @@ use super::lsdyna::nodout::TRANSLATIONS;
 use super::problem::{ProblemCode, Problems};
 use super::source::{Source, Stream};
 use super::{Selection, SolverFile};
-use crate::history::{EntityId, History, Side, derivative};
+use crate::history::{EntityId, History, Side};
+use crate::signal::derivative;
 use header::{Header, Records};
 use states::States;
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::io;
 use std::sync::Arc;
 
-use super::header::{FRAME, Header, Records};
+use super::header::{FRAME, Group, Header, Records};
 use super::{
     FORCE_COMPONENTS, GLOBAL_COMPONENTS, IMPULSES, NODE_COMPONENTS, empty, entities, histories,
     history, magnitude,
@@ -39,6 +39,31 @@ pub struct States {
     not_finite: usize,
 }
 
+/// The channels of a group's selected objects and variables.
+fn channels_of(group: &Group, section: &str, selection: &Selection) -> Vec<Channel> {
+    let wants = |component: &str| selection.wants_component(component);
+    let codes: Vec<usize> = match section {
+        "nodout" => {
+            (1..=NODE_COMPONENTS.len()).filter(|&code| wants(NODE_COMPONENTS[code - 1])).collect()
+        }
+        _ if magnitude(section).iter().chain(&FORCE_COMPONENTS).any(|c| wants(c)) => {
+            (1..=IMPULSES).collect()
+        }
+        _ => Vec::new(),
+    };
+    let positions: Vec<usize> = codes.iter().filter_map(|&code| group.position(code)).collect();
+    let sides = [None, Some(Side::SurfA), Some(Side::SurfB)];
+    let wanted = |id: i64| sides.into_iter().any(|side| selection.wants(EntityId { id, side }));
+    let objects = group.objects.iter().enumerate().filter(|(_, object)| wanted(object.0));
+    objects
+        .flat_map(|(k, _)| {
+            let channel =
+                move |p: &usize| Channel { offset: k * group.codes.len() + p, values: Vec::new() };
+            positions.iter().map(channel)
+        })
+        .collect()
+}
+
 impl States {
     pub fn new(header: &Header, selection: &Selection) -> Self {
         let wants_section = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
@@ -53,36 +78,9 @@ impl States {
         let groups = header
             .groups
             .iter()
-            .map(|group| {
-                let Some(section) = group.section().filter(|s| wants_section(s)) else {
-                    return Vec::new();
-                };
-                let codes: Vec<usize> = match section {
-                    "nodout" => (1..=NODE_COMPONENTS.len())
-                        .filter(|&code| selection.wants_component(NODE_COMPONENTS[code - 1]))
-                        .collect(),
-                    _ if magnitude(section)
-                        .iter()
-                        .chain(&FORCE_COMPONENTS)
-                        .any(|c| selection.wants_component(c)) =>
-                    {
-                        (1..=IMPULSES).collect()
-                    }
-                    _ => Vec::new(),
-                };
-                let positions: Vec<usize> =
-                    codes.iter().filter_map(|&code| group.position(code)).collect();
-                let wanted = |id: i64| {
-                    [None, Some(Side::SurfA), Some(Side::SurfB)]
-                        .into_iter()
-                        .any(|side| selection.wants(EntityId { id, side }))
-                };
-                let objects = group.objects.iter().enumerate().filter(|(_, o)| wanted(o.0));
-                objects
-                    .flat_map(|(k, _)| {
-                        positions.iter().map(move |p| channel(k * group.codes.len() + p))
-                    })
-                    .collect()
+            .map(|group| match group.section().filter(|s| wants_section(s)) {
+                Some(section) => channels_of(group, section, selection),
+                None => Vec::new(),
             })
             .collect();
         let mut lengths = vec![4];
@@ -258,7 +256,8 @@ impl States {
     /// Leaves out what a restart wrote again; forces cannot be told across it.
     fn resolve_restarts(&mut self, problems: &mut Problems) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
-        let mut kept = restart::resolve(&self.time, |_, _| Some(true), place, "", problems);
+        let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");
+        problems.append(found);
         // Nor can a state whose time is out of order be differentiated.
         let mut last = f64::NEG_INFINITY;
         kept.retain(|&i| {
@@ -294,59 +293,7 @@ impl States {
         }
         let time: Arc<[f64]> = self.time.into();
         let problems = problems.into_list();
-        let mut files: Vec<SolverFile> = Vec::new();
-        let mut seen: HashSet<(&str, EntityId)> = HashSet::new();
-        // The variables of one object may be spread over several groups.
-        let mut made: HashSet<(&str, EntityId, Arc<str>)> = HashSet::new();
-        for (group, channels) in header.groups.iter().zip(self.groups) {
-            let Some(section) = group.section() else { continue };
-            let file = match files.iter_mut().find(|f| f.section == section) {
-                Some(file) => file,
-                None => {
-                    files.push(empty(section));
-                    let last = files.len() - 1;
-                    &mut files[last]
-                }
-            };
-            let mut channels = channels.into_iter().peekable();
-            for (k, (id, title)) in group.objects.iter().enumerate() {
-                let range = k * group.codes.len()..(k + 1) * group.codes.len();
-                let mut own: Vec<(usize, Vec<f64>)> = Vec::new();
-                while let Some(c) = channels.next_if(|c| range.contains(&c.offset)) {
-                    let code = group.codes[c.offset - range.start];
-                    own.push((usize::try_from(code).unwrap_or(0), c.values));
-                }
-                for entity in entities(section, *id) {
-                    if seen.insert((section, entity)) {
-                        file.entities.push(Entity { id: entity, title: title.clone() });
-                    }
-                    if selection.wants(entity) {
-                        let new = histories(section, entity, &own, &time).into_iter().filter(|h| {
-                            selection.wants_component(&h.component)
-                                && made.insert((section, entity, h.component.clone()))
-                        });
-                        file.histories.extend(new);
-                    }
-                }
-            }
-            let has: Vec<Arc<str>> = match section {
-                "nodout" => (1..=NODE_COMPONENTS.len())
-                    .filter(|&code| group.position(code).is_some())
-                    .map(|code| NODE_COMPONENTS[code - 1].into())
-                    .collect(),
-                _ if time.len() > 1
-                    && (1..=IMPULSES).all(|code| group.position(code).is_some()) =>
-                {
-                    magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
-                }
-                _ => Vec::new(),
-            };
-            for component in has {
-                if !file.components.contains(&component) {
-                    file.components.push(component);
-                }
-            }
-        }
+        let mut files = group_files(header, self.groups, selection, &time);
         if header.globals > 0 {
             let mut file = empty("glstat");
             file.components =
@@ -371,5 +318,71 @@ impl States {
             }
         }
         files
+    }
+}
+
+/// One file for each section that the groups have.
+fn group_files(
+    header: &Header,
+    groups: Vec<Vec<Channel>>,
+    selection: &Selection,
+    time: &Arc<[f64]>,
+) -> Vec<SolverFile> {
+    let mut files: Vec<SolverFile> = Vec::new();
+    let mut seen: HashSet<(&str, EntityId)> = HashSet::new();
+    // The variables of one object may be spread over several groups.
+    let mut made: HashSet<(&str, EntityId, Arc<str>)> = HashSet::new();
+    for (group, channels) in header.groups.iter().zip(groups) {
+        let Some(section) = group.section() else { continue };
+        let file = match files.iter_mut().find(|f| f.section == section) {
+            Some(file) => file,
+            None => {
+                files.push(empty(section));
+                let last = files.len() - 1;
+                &mut files[last]
+            }
+        };
+        let mut channels = channels.into_iter().peekable();
+        for (k, (id, title)) in group.objects.iter().enumerate() {
+            let range = k * group.codes.len()..(k + 1) * group.codes.len();
+            let mut own: Vec<(usize, Vec<f64>)> = Vec::new();
+            while let Some(c) = channels.next_if(|c| range.contains(&c.offset)) {
+                let code = group.codes[c.offset - range.start];
+                own.push((usize::try_from(code).unwrap_or(0), c.values));
+            }
+            for entity in entities(section, *id) {
+                if seen.insert((section, entity)) {
+                    file.entities.push(Entity { id: entity, title: title.clone() });
+                }
+                if selection.wants(entity) {
+                    let new = histories(section, entity, &own, time).into_iter().filter(|h| {
+                        selection.wants_component(&h.component)
+                            && made.insert((section, entity, h.component.clone()))
+                    });
+                    file.histories.extend(new);
+                }
+            }
+        }
+        for component in components_of(group, section, time.len()) {
+            if !file.components.contains(&component) {
+                file.components.push(component);
+            }
+        }
+    }
+    files
+}
+
+/// The components that a group's variables give.
+fn components_of(group: &Group, section: &str, states: usize) -> Vec<Arc<str>> {
+    let has = |code: usize| group.position(code).is_some();
+    match section {
+        "nodout" => (1..=NODE_COMPONENTS.len())
+            .filter(|&code| has(code))
+            .map(|code| NODE_COMPONENTS[code - 1].into())
+            .collect(),
+        _ if states > 1 && (1..=IMPULSES).all(has) => {
+            magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
+        }
+        _ => Vec::new(),
     }
 }

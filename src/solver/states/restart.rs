@@ -10,7 +10,8 @@ impl States<'_> {
         let is_same = |above: usize, below: usize| Some(cycles[below]? <= cycles[above]?);
         let places = &self.places;
         let place = |i: usize| places.get(i).copied();
-        let kept = restart::resolve(&self.time, is_same, place, "", &mut self.problems);
+        let (kept, found) = restart::resolve(&self.time, is_same, place, "");
+        self.problems.append(found);
         if kept.len() == self.time.len() {
             return;
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Collected;
 use crate::history::{EntityId, History};
 use crate::solver::Selection;
-use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::problem::{Problem, ProblemCode, Problems};
 
 /// Rows of the same components.
 pub struct Table {
@@ -100,32 +100,29 @@ impl Table {
         }
         row
     }
+
+    /// Rows that some states lack, in a table whose rows may come and go.
+    fn absent_rows(&self, states: usize) -> Option<Problem> {
+        let partly = self.states_with.iter().filter(|&&n| self.varies && 0 < n && n < states);
+        let partly = partly.count();
+        let message = format!(
+            "{partly} of {} {} are missing from some states (eroded or failed); their values there are NaN",
+            self.rows.len(),
+            self.name
+        );
+        (partly > 0).then(|| Problem::new(ProblemCode::AbsentEntity, message))
+    }
 }
 
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
-pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &mut Problems) {
+pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Problems {
     let states = collected.time.len();
+    let mut problems = Problems::default();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
-    for table in tables {
-        if table.rows.is_empty() {
-            continue;
-        }
-        let mut channels = table.channels.into_iter();
-        let partly = table.states_with.iter().filter(|&&n| table.varies && 0 < n && n < states);
-        let partly = partly.count();
-        if partly > 0 {
-            problems.add(
-                ProblemCode::AbsentEntity,
-                None,
-                None,
-                format!(
-                    "{partly} of {} {} are missing from some states (eroded or failed); their values there are NaN",
-                    table.rows.len(),
-                    table.name
-                ),
-            );
-        }
+    for mut table in tables.into_iter().filter(|table| !table.rows.is_empty()) {
+        problems.extend(table.absent_rows(states));
+        let mut channels = std::mem::take(&mut table.channels).into_iter();
         for (row, &entity) in table.rows.iter().enumerate() {
             if table.varies && table.states_with[row] == 0 {
                 // Only states that were left out had it.
@@ -145,21 +142,17 @@ pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &
                 if channel.seen == 0 {
                     continue;
                 }
+                let component = &table.components[column];
                 if channel.seen < states && !table.varies {
-                    problems.add(
-                        ProblemCode::AbsentComponent,
-                        None,
-                        None,
-                        format!(
-                            "{} of {entity} is missing from {} of {states} states; its values there are NaN",
-                            table.components[column],
-                            states - channel.seen
-                        ),
+                    let message = format!(
+                        "{component} of {entity} is missing from {} of {states} states; its values there are NaN",
+                        states - channel.seen
                     );
+                    problems.push(Problem::new(ProblemCode::AbsentComponent, message));
                 }
                 histories.push(History {
                     entity: Some(entity),
-                    component: table.components[column].clone(),
+                    component: component.clone(),
                     time: collected.time.clone(),
                     values: channel.values,
                 });
@@ -171,4 +164,5 @@ pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected, problems: &
     for entity in &collected.entities {
         collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
     }
+    problems
 }

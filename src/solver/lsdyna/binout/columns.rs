@@ -25,6 +25,28 @@ impl Pick {
         let is_run = positions.iter().copied().eq(span.clone().map(Some));
         Self { positions, span, is_run }
     }
+
+    /// The values of a record that hold those of the kept entities at one of the points that
+    /// each entity has. The span must not be empty.
+    pub fn range(&self, per_entity: usize, point: usize) -> Range<usize> {
+        self.span.start * per_entity..(self.span.end - 1) * per_entity + point + 1
+    }
+
+    /// Takes a state's values from the record's `row`, which begins with the span's first
+    /// entity; returns how many of them are not finite.
+    pub fn fill(&self, values: &mut [f64], row: &[f64], per_entity: usize, point: usize) -> usize {
+        if self.is_run && per_entity == 1 && row.len() == values.len() {
+            values.copy_from_slice(row);
+            return row.iter().filter(|v| !v.is_finite()).count();
+        }
+        let mut not_finite = 0;
+        for (value, position) in values.iter_mut().zip(&self.positions) {
+            let read = position.and_then(|p| row.get((p - self.span.start) * per_entity + point));
+            *value = read.copied().unwrap_or(f64::NAN);
+            not_finite += usize::from(read.is_some_and(|v| !v.is_finite()));
+        }
+        not_finite
+    }
 }
 
 /// Rows of states turned into columns, several rows at a time: a value alone would cost a

@@ -1,7 +1,10 @@
 //! What a section says of itself: title, version, ids, sides, titles of entities.
 
 use std::collections::HashMap;
+use std::io;
 
+use super::bytes::Bytes;
+use super::records::Section;
 use crate::history::{EntityId, Side};
 
 /// What a section says of itself.
@@ -17,6 +20,27 @@ pub struct Metadata {
 }
 
 impl Metadata {
+    pub fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<Self> {
+        let text = |key: &str| -> io::Result<Option<Vec<u8>>> {
+            let place = section.metadata.get(key).filter(|p| p.payload.kind.is_text());
+            place.map(|&place| bytes.text(place)).transpose()
+        };
+        let numbers = |key: &str| -> io::Result<Option<Vec<i64>>> {
+            section.metadata.get(key).map(|&place| bytes.integers(place)).transpose()
+        };
+        let plain = |bytes: Option<Vec<u8>>| bytes.and_then(|b| trimmed(&b));
+        Ok(Self {
+            title: plain(text("title")?),
+            version: plain(text("version")?),
+            revision: plain(text("revision")?),
+            titles: titles(numbers("legend_ids")?, text("legend")?),
+            ids: numbers("ids")?,
+            side: numbers("side")?,
+            force_ids: numbers("force_ids")?,
+            moment_ids: numbers("moment_ids")?,
+        })
+    }
+
     /// The entities that the values of a component belong to, by their number.
     pub fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
         let fits = |ids: &Option<Vec<i64>>| ids.clone().filter(|ids| ids.len() == width);
@@ -34,14 +58,14 @@ impl Metadata {
 }
 
 /// A text without its padding.
-pub fn trimmed(bytes: &[u8]) -> Option<String> {
+fn trimmed(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
     (!text.is_empty()).then(|| text.to_string())
 }
 
 /// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
-pub fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
+fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
     let (Some(ids), Some(legend)) = (ids, legend) else { return HashMap::new() };
     let width = legend.len() / ids.len().max(1);
     if width == 0 {

@@ -1,41 +1,34 @@
 //! `binout`: LS-DYNA's binary histories, an LSDA container.
 //!
-//! First all records are noted with their places, then the values that are wanted are read.
+//! First all records are noted with their places ([`records`]), then the values that are wanted
+//! are read: of each section what it says of itself ([`metadata`]), its whole states
+//! ([`states`]), whom the values of its components belong to ([`owners`]) and those values
+//! ([`values`]).
+//!
 //! A file that continues as `name%001`, `name%002`, … and the files `binout0000`,
 //! `binout0001`, … of the processes of one run are one tree over several containers.
 //!
 //! Of a record that is there twice the later one counts: a restart wrote it again. Entities
 //! may differ between states (eroded elements): a state that lacks one has NaN there.
 
+mod bytes;
 mod columns;
 mod metadata;
-mod reader;
+mod owners;
+mod records;
+mod section;
+mod states;
+mod values;
 
-use std::collections::{HashMap, HashSet};
 use std::io;
-use std::sync::Arc;
 
-use super::lsda::{self, Event, Header, Payload, change_directory};
-use crate::solver::problem::{ProblemCode, Problems};
+use super::lsda::Header;
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};
-use reader::Reader;
+use bytes::Bytes;
+use records::Tree;
+use section::SectionReader;
 
-/// Sections by which a container is known to be a binout.
-const SECTIONS: [&str; 24] = [
-    "abstat", "bndout", "curvout", "dbsensor", "deforc", "disbout", "elout", "eloutdet", "glstat",
-    "jntforc", "matsum", "ncforc", "nodfor", "nodout", "rbdout", "rcforc", "rwforc", "secforc",
-    "sleout", "spcforc", "sphout", "swforc", "tprint", "trhist",
-];
-
-/// Metadata that tells whose values there are.
-const LISTS: [&str; 4] = ["ids", "side", "force_ids", "moment_ids"];
-/// Components kept of one section; real ones have at most about forty.
-const MAX_COMPONENTS: usize = 2_000;
-/// Sections of one run, and records of all of them; more are damage, and would fill the
-/// memory.
-const MAX_SECTIONS: usize = 1_000;
-const MAX_RECORDS: usize = 20_000_000;
 /// Whether a file begins with the header of an LSDA container.
 pub fn recognises(head: &[u8]) -> bool {
     Header::parse(head).is_some()
@@ -43,225 +36,23 @@ pub fn recognises(head: &[u8]) -> bool {
 
 /// Reads the selected histories of every section, or of the one selected. Empty if no
 /// section is one of a binout.
+///
+/// # Errors
+/// Those of reading the sources.
 pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
     let mut tree = Tree::default();
     for (number, part) in parts.iter().enumerate() {
         tree.walk(number, &**part)?;
     }
     let wanted = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
-    let headers = std::mem::take(&mut tree.headers);
-    let reader = Reader::new(parts, &headers, selection);
-    let mut files = Vec::new();
+    let bytes = Bytes::new(parts, &tree.headers);
     // Damaged records concern all sections: nobody knows what they held.
     let common = std::mem::take(&mut tree.problems).into_list();
+    let mut files = Vec::new();
     for section in tree.sections.iter().filter(|s| wanted(&s.name)) {
-        let mut problems = Problems::default();
-        let mut file = reader.section(section, &mut problems)?;
+        let (mut file, problems) = SectionReader::open(section, bytes, selection)?.read()?;
         file.problems = common.iter().cloned().chain(problems.into_list()).collect();
         files.push(file);
     }
     Ok(files)
-}
-
-/// A data record of one of the containers.
-#[derive(Clone, Copy)]
-struct Place {
-    part: usize,
-    payload: Payload,
-}
-
-/// All sections of the family of containers.
-#[derive(Default)]
-struct Tree {
-    headers: Vec<Option<Header>>,
-    sections: Vec<Section>,
-    index: HashMap<String, usize>,
-    records: usize,
-    /// Whether sections were left out.
-    is_full: bool,
-    problems: Problems,
-}
-
-/// The records of one section.
-#[derive(Default)]
-struct Section {
-    name: String,
-    metadata: HashMap<String, Place>,
-    /// Lists of ids and sides, each for the states written behind it.
-    lists: Vec<(&'static str, Place)>,
-    /// Directory numbers of the states, in order of appearance.
-    states: Vec<u64>,
-    state_index: HashMap<u64, usize>,
-    /// States that damage was found in.
-    damaged: HashSet<usize>,
-    /// Records that were there before, and the first state of which.
-    repeated: usize,
-    first_repeated: Option<u64>,
-    /// Records of components beyond those that are kept.
-    left_out: usize,
-    /// Components in order of appearance.
-    components: Vec<Component>,
-    component_index: HashMap<String, usize>,
-}
-
-/// The records of one component.
-struct Component {
-    name: Arc<str>,
-    /// By state.
-    records: HashMap<usize, Place>,
-}
-
-impl Tree {
-    /// Notes all records of one container.
-    fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
-        let header = lsda::header(source)?;
-        self.headers.push(header);
-        let Some(header) = header else {
-            let message = "this is no LSDA container, or its header is cut";
-            self.problems.add(ProblemCode::CutRecord, None, None, message.into());
-            return Ok(());
-        };
-        let mut path: Vec<String> = Vec::new();
-        let mut here = None;
-        lsda::walk(source, header, |event| match event {
-            Event::Directory(to) => {
-                change_directory(&mut path, to);
-                here = self.place(&path);
-            }
-            Event::Data { name, payload } => {
-                self.records += 1;
-                if self.records == MAX_RECORDS {
-                    let message = "there are too many records; those that follow are left out";
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
-                }
-                if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
-                    self.sections[section].note(name, state, Place { part, payload });
-                }
-            }
-            Event::Damage { at, resumed, message } => {
-                let rest = match resumed {
-                    Some(byte) => format!("reading goes on at byte {byte}"),
-                    None => "what follows is left out".into(),
-                };
-                let message = format!("damaged record: {message}; {rest}");
-                self.damage(here, ProblemCode::BadRecord, at, message);
-            }
-            Event::Cut { at } => {
-                let message = format!(
-                    "the file ends within the record at byte {at}; the records before it are read"
-                );
-                self.damage(here, ProblemCode::CutRecord, at, message);
-            }
-        })
-    }
-
-    /// Notes damage where the walk is.
-    fn damage(
-        &mut self,
-        here: Option<(usize, Option<usize>)>,
-        code: ProblemCode,
-        byte: u64,
-        message: String,
-    ) {
-        if let Some((section, Some(state))) = here {
-            self.sections[section].damaged.insert(state);
-        }
-        self.problems.add_at_byte(code, byte, message);
-    }
-
-    /// The section and state a path names; `None` for what is not a result of a binout.
-    /// States are `d` and digits, padded or not; directories below them hold no results.
-    fn place(&mut self, path: &[String]) -> Option<(usize, Option<usize>)> {
-        let (last, section) = path.split_last()?;
-        if !SECTIONS.contains(&section.first()?.as_str()) {
-            return None;
-        }
-        let number = match last.strip_prefix('d') {
-            Some(digits) if digits.bytes().all(|b| b.is_ascii_digit()) => {
-                Some(digits.parse().ok()?)
-            }
-            _ if last == "metadata" => None,
-            _ => return None,
-        };
-        let name = section.join("/");
-        let index = match self.index.get(&name) {
-            Some(&index) => index,
-            None if self.sections.len() == MAX_SECTIONS => {
-                if !self.is_full {
-                    let message =
-                        format!("{name} and what follows is left out: there are too many sections");
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message);
-                }
-                self.is_full = true;
-                return None;
-            }
-            None => {
-                self.sections.push(Section { name: name.clone(), ..Section::default() });
-                self.index.insert(name, self.sections.len() - 1);
-                self.sections.len() - 1
-            }
-        };
-        Some((index, number.map(|number| self.sections[index].state(number))))
-    }
-}
-
-impl Section {
-    /// Index of the state of that directory number.
-    fn state(&mut self, number: u64) -> usize {
-        *self.state_index.entry(number).or_insert_with(|| {
-            self.states.push(number);
-            self.states.len() - 1
-        })
-    }
-
-    fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
-        let Some(state) = state else {
-            if let Some(list) = LISTS.into_iter().find(|list| *list == name) {
-                self.lists.push((list, place));
-            }
-            self.metadata.insert(name.into(), place);
-            return;
-        };
-        let index = match self.component_index.get(name) {
-            Some(&index) => index,
-            None if self.components.len() < MAX_COMPONENTS => {
-                self.components.push(Component { name: name.into(), records: HashMap::new() });
-                self.component_index.insert(name.into(), self.components.len() - 1);
-                self.components.len() - 1
-            }
-            None => {
-                self.left_out += 1;
-                return;
-            }
-        };
-        let again = self.components[index].records.insert(state, place).is_some();
-        // Within one state a record may be there twice; behind later states it is a restart.
-        if again && state + 1 < self.states.len() {
-            self.repeated += 1;
-            self.first_repeated.get_or_insert(self.states[state]);
-        }
-    }
-
-    fn component(&self, name: &str) -> Option<&Component> {
-        self.component_index.get(name).map(|&index| &self.components[index])
-    }
-}
-
-impl Place {
-    /// Order of writing.
-    fn order(&self) -> (usize, u64) {
-        (self.part, self.payload.at)
-    }
-
-    /// Number of values.
-    fn width(&self) -> usize {
-        let size = self.payload.kind.size().unwrap_or(1) as u64;
-        usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)
-    }
-}
-
-impl Component {
-    fn is_real(&self) -> bool {
-        self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
-    }
 }

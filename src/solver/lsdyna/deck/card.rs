@@ -5,7 +5,7 @@ use nom::Parser;
 use nom::bytes::complete::{tag, take_till, take_while_m_n};
 use nom::multi::{many0, separated_list0};
 
-use super::super::line::{Line, integer};
+use super::super::line::{Line, integer, shown};
 use super::keyword::Format;
 use crate::solver::problem::Place;
 
@@ -92,8 +92,16 @@ fn blank(bytes: &[u8]) -> bool {
 pub(super) fn text(bytes: &[u8]) -> Option<String> {
     let bytes = bytes.trim_ascii();
     let kept = bytes.get(..MAX_TEXT).unwrap_or(bytes);
-    let text = super::super::line::shown(kept);
+    let text = shown(kept);
     (!text.is_empty()).then_some(text)
+}
+
+/// Bytes of damaged text shown in a message.
+const MAX_SHOWN: usize = 80;
+
+/// Enough of a line to know it again, for messages.
+pub(super) fn start(line: &[u8]) -> String {
+    shown(line.get(..MAX_SHOWN).unwrap_or(line))
 }
 
 #[cfg(test)]

@@ -2,26 +2,55 @@
 
 use std::io::BufRead;
 
-use super::Include;
 use super::card::Card;
+use super::contents::Include;
+use super::context::{Block, Context, MAX_INCLUDES};
 use super::keyword::Format;
 use super::kind::Kind;
-use super::reader::{Block, Reader, note_full};
 use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
 
-/// Includes read or tried; folders tried.
-pub(super) const MAX_INCLUDES: usize = 1000;
 const MAX_DEPTH: usize = 16;
 /// The manual allows 236 characters; file systems allow more.
 const MAX_FILE_NAME: usize = 1024;
 
-impl Reader<'_, '_> {
-    /// One name per card; " +" at the end of a card says that the name goes on below.
-    pub(super) fn file_name(&mut self, block: &mut Block, card: &Card<'_>) {
+/// Gives the bytes of an included file by its name.
+pub(super) type Open<'a> = dyn FnMut(&str) -> Option<Box<dyn BufRead>> + 'a;
+
+/// Finds included files.
+pub(super) struct Includes<'a, 'o> {
+    open: &'a mut Open<'o>,
+    /// Of `*INCLUDE_PATH`.
+    folders: Vec<String>,
+}
+
+/// An included file that is there.
+pub(super) struct Included {
+    pub source: Box<dyn BufRead>,
+    /// As the deck writes it.
+    pub name: String,
+    /// Where it is included.
+    pub place: Place,
+    /// Format of the cards that include it, with which it begins.
+    pub format: Format,
+}
+
+impl<'a, 'o> Includes<'a, 'o> {
+    pub fn new(open: &'a mut Open<'o>) -> Self {
+        Self { open, folders: Vec::new() }
+    }
+
+    /// One name per card; " +" at the end of a card says that the name goes on below. `Some`
+    /// for a file that is to be read before the next card.
+    pub fn file_name(
+        &mut self,
+        context: &mut Context,
+        block: &mut Block,
+        card: &Card<'_>,
+    ) -> Option<Included> {
         let line = card.text.trim_ascii();
         if line.is_empty() {
-            return;
+            return None;
         }
         let (part, goes_on) = match line.strip_suffix(b" +") {
             Some(part) => (part.trim_ascii_end(), true),
@@ -31,52 +60,50 @@ impl Reader<'_, '_> {
         name.push_str(&shown(part));
         if name.len() > MAX_FILE_NAME {
             let message = format!("expected a file name, found more than {MAX_FILE_NAME} bytes");
-            self.problem(ProblemCode::BadLine, card.place, None, message);
+            context.problem(ProblemCode::BadLine, card.place, None, message);
         } else if goes_on {
             block.text = Some(name);
         } else if block.kind == Kind::Include {
-            self.include(name, card.place, block.format);
+            return self.include(context, name, card.place, block.format);
+        } else if self.folders.len() < MAX_INCLUDES {
+            self.folders.push(name.trim_end_matches(['/', '\\']).to_string());
         } else {
-            let folder = name.trim_end_matches(['/', '\\']).to_string();
-            if self.folders.len() < MAX_INCLUDES {
-                self.folders.push(folder);
-            } else {
-                note_full("include folders", &mut self.full);
-            }
+            context.note_full("include folders");
         }
+        None
     }
 
-    fn include(&mut self, name: String, place: Place, format: Format) {
-        let index = self.deck.includes.len();
-        let refused = if index >= MAX_INCLUDES {
-            note_full("includes", &mut self.full);
-            return;
-        } else if self.reading.len() >= MAX_DEPTH {
-            Some(format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out"))
-        } else {
-            None
-        };
-        let opened = if refused.is_some() { None } else { self.find(&name) };
-        let at = self.at(place);
-        let found = opened.is_some();
-        self.deck.includes.push(Include { name: name.clone(), at, found });
-        let problem = match (refused, opened) {
-            (Some(refused), _) => refused,
-            (None, None) => format!("include \"{name}\" is not there"),
-            (None, Some((path, _))) if self.reading.iter().any(|(_, open)| *open == path) => {
+    fn include(
+        &mut self,
+        context: &mut Context,
+        name: String,
+        place: Place,
+        format: Format,
+    ) -> Option<Included> {
+        let index = context.deck.includes.len();
+        if index >= MAX_INCLUDES {
+            context.note_full("includes");
+            return None;
+        }
+        let too_deep = context.reading.len() >= MAX_DEPTH;
+        let opened = if too_deep { None } else { self.find(&name) };
+        let (at, found) = (context.at(place), opened.is_some());
+        context.deck.includes.push(Include { name: name.clone(), at, found });
+        let problem = match opened {
+            Some((path, _)) if context.reading.iter().any(|(_, open)| *open == path) => {
                 format!("include \"{name}\" includes itself; it is not read again")
             }
-            (None, Some((path, mut source))) => {
-                self.reading.push((index, path));
-                let read = self.file(&mut *source, format);
-                self.reading.pop();
-                match read {
-                    Ok(()) => return,
-                    Err(e) => format!("include \"{name}\" cannot be read to its end: {e}"),
-                }
+            Some((path, source)) => {
+                context.reading.push((index, path));
+                return Some(Included { source, name, place, format });
             }
+            None if too_deep => {
+                format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out")
+            }
+            None => format!("include \"{name}\" is not there"),
         };
-        self.problem(ProblemCode::UnreadRows, place, None, problem);
+        context.problem(ProblemCode::UnreadRows, place, None, problem);
+        None
     }
 
     fn find(&mut self, name: &str) -> Option<(String, Box<dyn BufRead>)> {

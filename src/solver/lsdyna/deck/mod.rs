@@ -5,6 +5,9 @@
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;
+mod contents;
+mod context;
+mod definitions;
 mod includes;
 mod keyword;
 mod kind;
@@ -16,122 +19,11 @@ mod velocity;
 
 use std::io::{self, BufRead};
 
-use super::super::problem::Problem;
+pub use contents::{
+    At, Deck, ImpactSpeed, Include, InitialVelocity, Interface, Named, Output, Scope, StatedUnits,
+};
 pub use keyword::signature;
 pub use parameters::Value;
-pub use units::StatedUnits;
-
-/// What a deck and its includes say about a run. Numbers are in the deck's own units.
-///
-/// Each list ends at 100,000 entries; a problem says when there were more.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Deck {
-    /// The first `*TITLE` that is not blank.
-    pub title: Option<String>,
-    pub units: Option<StatedUnits>,
-    pub initial_velocities: Vec<InitialVelocity>,
-    /// `*DATABASE_…` of the ASCII files, in order.
-    pub outputs: Vec<Output>,
-    /// `*DATABASE_HISTORY_NODE`.
-    pub history_nodes: Vec<Named>,
-    /// `*DATABASE_HISTORY_NODE_SET`.
-    pub history_node_sets: Vec<i64>,
-    pub contacts: Vec<Interface>,
-    pub parts: Vec<Named>,
-    pub rigid_walls: Vec<Interface>,
-    /// `*PARAMETER`, names in lower case.
-    pub parameters: Vec<(String, Value)>,
-    /// `*INCLUDE`, in order of reading. Folders of `*INCLUDE_PATH` are tried, not listed.
-    pub includes: Vec<Include>,
-    pub problems: Vec<Problem>,
-}
-
-/// Where a card or keyword is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct At {
-    /// Counted from 1.
-    pub line: u64,
-    /// Index into [`Deck::includes`]; `None` for the deck itself.
-    pub include: Option<usize>,
-}
-
-/// One velocity given at the start: `*INITIAL_VELOCITY`, `_NODE`, `_RIGID_BODY`,
-/// `_GENERATION`, or that of an `_INERTIA` body.
-#[derive(Clone, Debug, PartialEq)]
-pub struct InitialVelocity {
-    /// In capitals and without its star.
-    pub keyword: String,
-    pub at: At,
-    /// x, y, z. `None` when it is not known; a problem says why.
-    pub velocity: Option<[f64; 3]>,
-    /// Whether a rotation is given or not known as well.
-    pub rotates: bool,
-    pub scope: Scope,
-}
-
-/// What an initial velocity holds for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scope {
-    AllNodes,
-    Node(i64),
-    NodeSet(i64),
-    /// Nodes inside a box, of a set when one is given as well.
-    Box(i64),
-    Part(i64),
-    PartSet(i64),
-    /// The card's scope could not be read.
-    Unknown,
-}
-
-/// One ASCII file that the deck asks for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Output {
-    /// As the keyword names it, in small letters: `nodout`.
-    pub file: &'static str,
-    /// Output interval, in the deck's unit of time. `None` when left out or not known.
-    pub interval: Option<f64>,
-    /// 1 ASCII, 2 binout, 3 both; 0 or `None` leaves it to the solver.
-    pub binary: Option<i64>,
-    pub at: At,
-}
-
-/// An id and the title that goes with it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Named {
-    pub id: i64,
-    pub title: Option<String>,
-    pub at: At,
-}
-
-/// A contact or a rigid wall.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Interface {
-    /// From `_ID`, or the order number when no contact (no wall) of the deck has an id
-    /// and all are of a kind that is numbered together; else `None`.
-    pub id: Option<i64>,
-    pub title: Option<String>,
-    /// In capitals and without its star.
-    pub keyword: String,
-    pub at: At,
-}
-
-/// One included file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Include {
-    /// As the deck writes it.
-    pub name: String,
-    /// Where it is included.
-    pub at: At,
-    pub found: bool,
-}
-
-/// A speed taken from a deck.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImpactSpeed {
-    /// Above zero, in the deck's units.
-    pub speed: f64,
-    pub at: At,
-}
 
 /// Reads a deck.
 ///
@@ -148,41 +40,6 @@ pub fn read(
     open: &mut dyn FnMut(&str) -> Option<Box<dyn BufRead>>,
 ) -> io::Result<Deck> {
     reader::read(source, open)
-}
-
-impl Deck {
-    /// The speed at which the model starts to move: that of all initial velocities that
-    /// are not zero, when they agree in size and direction (to 1e-6, since decks write
-    /// seven digits). `None` when there is none, when they differ, when one turns or is
-    /// not known, or when a wall moves. An include that is not there may hide more.
-    pub fn impact_speed(&self) -> Option<ImpactSpeed> {
-        let moves = |w: &Interface| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
-        if self.rigid_walls.iter().any(moves) {
-            return None;
-        }
-        let mut first: Option<([f64; 3], ImpactSpeed)> = None;
-        for given in &self.initial_velocities {
-            let velocity = given.velocity.filter(|_| !given.rotates)?;
-            let speed = norm(velocity);
-            if speed == 0.0 {
-                continue;
-            }
-            match first {
-                None => first = Some((velocity, ImpactSpeed { speed, at: given.at })),
-                Some((v, known)) => {
-                    let difference = [v[0] - velocity[0], v[1] - velocity[1], v[2] - velocity[2]];
-                    if norm(difference) > 1e-6 * known.speed {
-                        return None;
-                    }
-                }
-            }
-        }
-        first.map(|(_, known)| known).filter(|known| known.speed.is_finite())
-    }
-}
-
-fn norm([x, y, z]: [f64; 3]) -> f64 {
-    x.hypot(y).hypot(z)
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
 //! Cards that name what a run holds: outputs, history nodes, contacts, walls, parts.
 
 use super::card::{Card, text};
+use super::contents::{At, Interface, Named, Output};
+use super::context::{Block, Context};
 use super::kind::Kind;
-use super::reader::{Block, Reader, keep};
-use super::{At, Interface, Named, Output};
 
-impl Reader<'_, '_> {
+impl Context {
     /// DT BINARY LCUR IOOPT.
     pub(super) fn output(&mut self, file: &'static str, block: &Block, card: &Card<'_>) {
         let interval = self.real(card, 0).unwrap_or(None);
         let binary = self.integer(card, 1).unwrap_or(None);
         let output = Output { file, interval, binary, at: self.at(block.place) };
-        keep(&mut self.deck.outputs, output, "output files", &mut self.full);
+        self.keep(|deck| &mut deck.outputs, output, "output files");
     }
 
     pub(super) fn history(&mut self, kind: Kind, card: &Card<'_>, k: usize) {
@@ -20,10 +20,10 @@ impl Reader<'_, '_> {
             return;
         }
         if matches!(kind, Kind::HistoryNodeSets | Kind::HistoryNodeSetsLocal) {
-            keep(&mut self.deck.history_node_sets, id, "history node sets", &mut self.full);
+            self.keep(|deck| &mut deck.history_node_sets, id, "history node sets");
         } else {
             let node = Named { id, title: None, at: self.at(card.place) };
-            keep(&mut self.deck.history_nodes, node, "history nodes", &mut self.full);
+            self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
 
@@ -34,7 +34,7 @@ impl Reader<'_, '_> {
         let (field, title) = card.id_and_text();
         if let Some(id) = self.required_id_of(field, card.place) {
             let node = Named { id, title, at: self.at(card.place) };
-            keep(&mut self.deck.history_nodes, node, "history nodes", &mut self.full);
+            self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
 
@@ -48,9 +48,9 @@ impl Reader<'_, '_> {
     ) {
         let interface = Interface { id: id.filter(|&id| id != 0), title, keyword, at };
         if kind == Kind::Wall {
-            keep(&mut self.deck.rigid_walls, interface, "rigid walls", &mut self.full);
+            self.keep(|deck| &mut deck.rigid_walls, interface, "rigid walls");
         } else {
-            keep(&mut self.deck.contacts, interface, "contacts", &mut self.full);
+            self.keep(|deck| &mut deck.contacts, interface, "contacts");
         }
     }
 
@@ -69,7 +69,7 @@ impl Reader<'_, '_> {
                 }
                 if let Some(id) = block.ids[0] {
                     let part = Named { id, title: block.text.take(), at: self.at(card.place) };
-                    keep(&mut self.deck.parts, part, "parts", &mut self.full);
+                    self.keep(|deck| &mut deck.parts, part, "parts");
                 }
             }
             (3, Kind::Parts { inertia: true, .. }) => {

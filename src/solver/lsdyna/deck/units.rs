@@ -1,20 +1,10 @@
 //! Units that a deck states: in a comment, or on `*CONTROL_UNITS`.
 
-use super::At;
 use super::card::{Card, text};
-use super::reader::Reader;
+use super::contents::StatedUnits;
+use super::context::Context;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::unit::UnitSystem;
-
-/// Units as stated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StatedUnits {
-    /// `kg / mm / ms / kN / GPa`, or the fields of `*CONTROL_UNITS`.
-    pub text: String,
-    pub at: At,
-    /// When length, mass and time are all recognised and nothing contradicts them.
-    pub system: Option<UnitSystem>,
-}
 
 /// What a comment such as `$# Units: kg / mm / ms / kN / GPa` states.
 pub(super) fn in_comment(line: &[u8]) -> Option<String> {
@@ -63,7 +53,7 @@ fn from_words<'a>(words: impl Iterator<Item = &'a str>) -> Option<UnitSystem> {
     UnitSystem::parse(&[length?, mass?, time?].join("-")).ok()
 }
 
-impl Reader<'_, '_> {
+impl Context {
     /// Keeps the first statement that is recognised; `*CONTROL_UNITS` stands above comments.
     pub(super) fn units(&mut self, stated: String, place: Place, on_card: bool) {
         let mut new = StatedUnits { system: system(&stated), text: stated, at: self.at(place) };

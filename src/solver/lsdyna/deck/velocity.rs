@@ -1,11 +1,11 @@
 //! Cards that give initial velocities.
 
 use super::card::Card;
+use super::contents::{At, InitialVelocity, Scope};
+use super::context::{Block, Context, Missing};
 use super::kind::Kind;
-use super::reader::{Block, Missing, Reader, keep};
-use super::{At, InitialVelocity, Scope};
 
-impl Reader<'_, '_> {
+impl Context {
     /// Card 1: NSID NSIDEX BOXID …; card 2: VX VY VZ VXR VYR VZR; card 3, when there is
     /// NSIDEX: velocities of the exempted nodes.
     pub(super) fn velocity_of_set(&mut self, block: &mut Block, card: &Card<'_>) {
@@ -85,7 +85,7 @@ impl Reader<'_, '_> {
         rotates: bool,
     ) {
         let given = InitialVelocity { keyword: keyword.into(), at, velocity, rotates, scope };
-        keep(&mut self.deck.initial_velocities, given, "initial velocities", &mut self.full);
+        self.keep(|deck| &mut deck.initial_velocities, given, "initial velocities");
     }
 
     fn three(&mut self, card: &Card<'_>, from: usize) -> Option<[f64; 3]> {

@@ -5,7 +5,8 @@ use std::io;
 use rayon::prelude::*;
 
 use super::Nodout;
-use super::stride::{Stride, Wanted};
+use super::rows::Wanted;
+use super::stride::Stride;
 use crate::history::EntityId;
 use crate::solver::lsdyna::ascii::Frame;
 use crate::solver::problem;

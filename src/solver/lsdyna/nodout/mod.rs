@@ -5,6 +5,7 @@
 //! which block it is.
 
 mod blocks;
+mod rows;
 mod stride;
 
 use std::io;

@@ -7,22 +7,16 @@
 //! all rows are read, those of all rows. At the first surprise the line reader goes on.
 
 use std::io;
-use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{COLUMN_LINE, FIELD_WIDTH, ROTATIONS, STATE, TRANSLATIONS, cycle_and_time, id_end};
-use crate::history::EntityId;
-use crate::solver::lsdyna::e12;
-use crate::solver::lsdyna::line::{Field, Lines, integer, real};
+use super::rows::{Block, DENSE_READ, Wanted};
+use super::{COLUMN_LINE, ROTATIONS, STATE, TRANSLATIONS};
+use crate::solver::lsdyna::line::Lines;
 use crate::solver::problem::Place;
 use crate::solver::source::{Source, Stream, Window};
 use crate::solver::states::{States, TableId};
 
-/// Bytes read at once where all rows are read.
-const DENSE_READ: usize = 1 << 18;
-/// Bytes below which two wanted rows are read together rather than apart.
-const PAGE: usize = 4096;
 /// Values held while a batch of states waits to be handed on.
 const BATCH_VALUES: usize = 1 << 20;
 const MAX_BATCH: usize = 256;
@@ -42,34 +36,55 @@ pub struct Stride {
     wanted: Vec<Wanted>,
 }
 
-/// Rows of equal width, and what stands above them.
-struct Block {
-    table: TableId,
-    /// Bytes above the rows, and where in them the state line is.
-    head: Vec<u8>,
-    state_line: Range<usize>,
-    /// Where the rows begin, from the state's start.
-    rows_at: u64,
-    rows: usize,
-    /// Width of a row with its line end.
-    width: usize,
-    /// Columns before the first field: the id.
-    first: usize,
-    fields: usize,
-    /// Id columns of all rows.
-    ids: Vec<u8>,
-    line_end: &'static [u8],
-}
-
-/// What is wanted of a block.
-pub struct Wanted {
-    rows: Vec<usize>,
-    columns: Vec<usize>,
-    /// Index of the block's first value in the output, and the distance between the values
-    /// of neighbouring rows and columns there.
-    start: usize,
-    row_step: usize,
-    column_step: usize,
+/// The blocks of the state between `from` and `to`, and what stands below the last; `None` if
+/// the rows of a block differ in width.
+fn blocks(
+    source: &dyn Source,
+    from: Place,
+    to: Place,
+    tables: [TableId; 2],
+) -> io::Result<Option<(Vec<Block>, Vec<u8>)>> {
+    let mut lines = Lines::new(Stream::new(source));
+    lines.go_to(from);
+    let mut blocks: Vec<Block> = Vec::new();
+    let mut head: Vec<u8> = Vec::new();
+    let mut state_line = 0..0;
+    let mut open = false;
+    while lines.place().byte < to.byte {
+        let Some(line) = lines.next_line()? else { return Ok(None) };
+        let text = line.text;
+        let (is_blank, byte) = (line.is_blank(), line.byte);
+        let is_column = text.starts_with(COLUMN_LINE) && line.is_heading();
+        if text.starts_with(STATE) {
+            state_line = head.len()..head.len() + text.len();
+        }
+        if open && !is_blank {
+            let Some(block) = blocks.last_mut() else { return Ok(None) };
+            if !block.add(text) || lines.place().byte - byte != block.width as u64 {
+                return Ok(None);
+            }
+            continue;
+        }
+        open = is_column;
+        head.extend_from_slice(text);
+        let (length, end) = (text.len(), lines.place().byte);
+        head.extend_from_slice(match end - byte - length as u64 {
+            1 => b"\n".as_slice(),
+            2 => b"\r\n",
+            _ => return Ok(None),
+        });
+        if head.len() > DENSE_READ {
+            return Ok(None);
+        }
+        if is_column {
+            let rotations = memchr::memmem::find(&head, b" x-rot").is_some();
+            let fields = if rotations { ROTATIONS.len() } else { TRANSLATIONS.len() };
+            let (head, line) = (std::mem::take(&mut head), std::mem::take(&mut state_line));
+            let table = tables[usize::from(rotations)];
+            blocks.push(Block::below(head, line, table, end - from.byte, fields));
+        }
+    }
+    Ok(Some((blocks, head)))
 }
 
 impl Stride {
@@ -81,67 +96,9 @@ impl Stride {
         states: &States<'_>,
         tables: [TableId; 2],
     ) -> io::Result<Option<Self>> {
-        let mut lines = Lines::new(Stream::new(source));
-        lines.go_to(from);
-        let mut blocks: Vec<Block> = Vec::new();
-        let mut head: Vec<u8> = Vec::new();
-        let mut state_line = 0..0;
-        let mut open = false;
-        while lines.place().byte < to.byte {
-            let Some(line) = lines.next_line()? else { return Ok(None) };
-            let text = line.text;
-            let (is_blank, byte) = (line.is_blank(), line.byte);
-            let is_column = text.starts_with(COLUMN_LINE) && line.is_heading();
-            if text.starts_with(STATE) {
-                state_line = head.len()..head.len() + text.len();
-            }
-            let is_row = open && !is_blank;
-            if is_row {
-                let Some(block) = blocks.last_mut() else { return Ok(None) };
-                if !block.add(text) {
-                    return Ok(None);
-                }
-                let end = lines.place().byte;
-                if end - byte != block.width as u64 {
-                    return Ok(None);
-                }
-                continue;
-            }
-            open = is_column;
-            head.extend_from_slice(text);
-            let (length, end) = (text.len(), lines.place().byte);
-            head.extend_from_slice(match end - byte - length as u64 {
-                1 => b"\n".as_slice(),
-                2 => b"\r\n",
-                _ => return Ok(None),
-            });
-            if head.len() > DENSE_READ {
-                return Ok(None);
-            }
-            if is_column {
-                let rotations = memchr::memmem::find(&head, b" x-rot").is_some();
-                let crlf = head.ends_with(b"\r\n");
-                blocks.push(Block {
-                    table: tables[usize::from(rotations)],
-                    rows_at: end - from.byte,
-                    state_line: std::mem::take(&mut state_line),
-                    head: std::mem::take(&mut head),
-                    rows: 0,
-                    width: 0,
-                    first: 0,
-                    fields: if rotations { ROTATIONS.len() } else { TRANSLATIONS.len() },
-                    ids: Vec::new(),
-                    line_end: if crlf { b"\r\n" } else { b"\n" },
-                });
-            }
-        }
-        let mut stride = Self {
-            blocks,
-            period: to.byte - from.byte,
-            lines: to.line - from.line,
-            tail: head,
-            wanted: Vec::new(),
-        };
+        let Some((blocks, tail)) = blocks(source, from, to, tables)? else { return Ok(None) };
+        let (period, lines) = (to.byte - from.byte, to.line - from.line);
+        let mut stride = Self { blocks, period, lines, tail, wanted: Vec::new() };
         stride.wanted = stride.wanted(states);
         Ok(stride.fits(states, tables).then_some(stride))
     }
@@ -318,175 +275,5 @@ impl Stride {
             }
         }
         Ok(None)
-    }
-}
-
-impl Wanted {
-    pub fn values(&self) -> usize {
-        self.rows.len() * self.columns.len()
-    }
-
-    pub fn rows(&self) -> &[usize] {
-        &self.rows
-    }
-
-    pub fn columns(&self) -> &[usize] {
-        &self.columns
-    }
-
-    pub fn range(&self) -> Range<usize> {
-        self.start..self.start + self.values()
-    }
-
-    /// Whether so many pages of the block are wanted that it is read as a whole.
-    fn reads_most(&self, block: &Block) -> bool {
-        let pages = self.rows.len() * (PAGE + block.width);
-        !self.columns.is_empty() && 2 * pages > block.rows * block.width
-    }
-}
-
-impl Block {
-    /// Adds a row of the state that is learnt; false if it differs from those above it.
-    fn add(&mut self, text: &[u8]) -> bool {
-        let fields = self.fields * FIELD_WIDTH;
-        let width = text.len() + self.line_end.len();
-        let Some(first) = text.len().checked_sub(fields) else { return false };
-        if self.rows == 0 {
-            (self.width, self.first) = (width, first);
-        }
-        self.rows += 1;
-        self.ids.extend_from_slice(&text[..first]);
-        (width, first) == (self.width, self.first) && id_end(text) <= first
-    }
-
-    fn id(&self, row: usize) -> &[u8] {
-        &self.ids[row * self.first..(row + 1) * self.first]
-    }
-
-    fn entities(&self) -> impl Iterator<Item = Option<EntityId>> {
-        (0..self.rows).map(|row| {
-            let id = self.id(row);
-            integer(&id[..id_end(id)]).map(EntityId::new)
-        })
-    }
-
-    /// Cycle and time, if all else is as in the state that was learnt.
-    fn verify_head(&self, head: &[u8]) -> Option<(i64, f64)> {
-        let Range { start, end } = self.state_line;
-        let same = head[..start] == self.head[..start] && head[end..] == self.head[end..];
-        cycle_and_time(&head[start..end]).filter(|_| same)
-    }
-
-    /// Whether `row` has its id and its line end.
-    fn verify_row(&self, number: usize, row: &[u8]) -> bool {
-        row[..self.first] == *self.id(number) && row.ends_with(self.line_end)
-    }
-
-    /// Parses one field; `None` if it holds no number.
-    #[inline(always)]
-    fn field(&self, row: &[u8], column: usize) -> Option<f64> {
-        let from = self.first + column * FIELD_WIDTH;
-        let field: &[u8; FIELD_WIDTH] = row.get(from..from + FIELD_WIDTH)?.try_into().ok()?;
-        e12::parse(field).or_else(|| match real(field) {
-            Field::Real(value) => Some(value),
-            _ => None,
-        })
-    }
-
-    fn store(&self, row: &[u8], k: usize, wanted: &Wanted, out: &mut [f64]) -> Option<()> {
-        let first = wanted.start + k * wanted.row_step;
-        for (i, &column) in wanted.columns.iter().enumerate() {
-            *out.get_mut(first + i * wanted.column_step)? = self.field(row, column)?;
-        }
-        Some(())
-    }
-
-    /// Every column of a row whose columns are all wanted.
-    fn store_all(&self, row: &[u8], k: usize, wanted: &Wanted, out: &mut [f64]) -> Option<()> {
-        let first = wanted.start + k * wanted.row_step;
-        let fields = row.get(self.first..self.first + self.fields * FIELD_WIDTH)?;
-        for (i, field) in fields.chunks_exact(FIELD_WIDTH).enumerate() {
-            let field: &[u8; FIELD_WIDTH] = field.try_into().ok()?;
-            let value = match e12::parse(field) {
-                Some(value) => value,
-                None => self.field(row, i)?,
-            };
-            *out.get_mut(first + i * wanted.column_step)? = value;
-        }
-        Some(())
-    }
-
-    /// Reads and verifies all rows.
-    fn read_all(
-        &self,
-        window: &mut Window<'_>,
-        at: u64,
-        wanted: &Wanted,
-        audit: bool,
-        out: &mut [f64],
-    ) -> io::Result<Option<()>> {
-        let all_columns = wanted.columns.len() == self.fields;
-        let mut next = wanted.rows.iter().enumerate().peekable();
-        let at_once = (DENSE_READ / self.width).max(1);
-        let mut number = 0;
-        while number < self.rows {
-            let count = at_once.min(self.rows - number);
-            let from = at + (number * self.width) as u64;
-            let Some(bytes) = window.get(from, count * self.width, 0)? else { return Ok(None) };
-            for row in bytes.chunks_exact(self.width) {
-                let k = next.next_if(|(_, wanted)| **wanted == number).map(|(k, _)| k);
-                let stored = match k {
-                    _ if !self.verify_row(number, row) => None,
-                    Some(k) if all_columns => self.store_all(row, k, wanted, out),
-                    Some(k) if !audit => self.store(row, k, wanted, out),
-                    None if !audit => Some(()),
-                    _ => (0..self.fields)
-                        .try_for_each(|c| self.field(row, c).map(drop))
-                        .and_then(|()| k.map_or(Some(()), |k| self.store(row, k, wanted, out))),
-                };
-                if stored.is_none() {
-                    return Ok(None);
-                }
-                number += 1;
-            }
-        }
-        Ok(Some(()))
-    }
-
-    /// Reads the wanted rows and verifies the first and the last one as well.
-    fn read_some(
-        &self,
-        window: &mut Window<'_>,
-        at: u64,
-        wanted: &Wanted,
-        out: &mut [f64],
-    ) -> io::Result<Option<()>> {
-        let last = self.rows - 1;
-        let mut numbers: Vec<(usize, Option<usize>)> =
-            wanted.rows.iter().enumerate().map(|(k, &row)| (row, Some(k))).collect();
-        numbers.extend([(0, None), (last, None)]);
-        numbers.sort_unstable_by_key(|&(row, _)| row);
-        let together = 1 + PAGE / self.width;
-        let mut rest = &numbers[..];
-        while let Some(&(from, _)) = rest.first() {
-            let near = rest.windows(2).take_while(|w| w[1].0 - w[0].0 < together).count() + 1;
-            let (group, others) = rest.split_at(near);
-            rest = others;
-            let to = group.last().map_or(from, |g| g.0);
-            let start = at + (from * self.width) as u64;
-            // Behind the last row comes the head of what follows, with its first row.
-            let ahead = if to == last { self.head.len() + self.width + 64 } else { 0 };
-            let Some(bytes) = window.get(start, (to + 1 - from) * self.width, ahead)? else {
-                return Ok(None);
-            };
-            for &(number, k) in group {
-                let row = &bytes[(number - from) * self.width..][..self.width];
-                let stored = k.map_or(Some(()), |k| self.store(row, k, wanted, out));
-                if !self.verify_row(number, row) || stored.is_none() {
-                    return Ok(None);
-                }
-            }
-        }
-        Ok(Some(()))
     }
 }

@@ -4,8 +4,11 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]
 pub struct OutOfRange {
+    /// The time that was asked for.
     pub time_s: f64,
+    /// The first of the history.
     pub first_s: f64,
+    /// The last of the history.
     pub last_s: f64,
 }
 

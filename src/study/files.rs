@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::RunError;
 use crate::file;
-use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
+use crate::solver::{self, ReadError, Selection};
 
 /// A source file of a run before it is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,71 +110,4 @@ fn file_names(folder: &Path) -> Result<Vec<String>, RunError> {
         .collect();
     names.sort();
     Ok(names)
-}
-
-/// Text and binary of one run agree up to the text's digits.
-const SAME_VALUE: f64 = 1e-5;
-
-/// Says which of text file and binout was read, and whether they differ.
-pub(super) fn compare_twin(
-    file: &Located,
-    read: &SolverFile,
-    notes: &mut Vec<String>,
-    warnings: &mut Vec<String>,
-) {
-    if let Some(section) = &file.section {
-        notes.push(format!(
-            "{}: read from section {section} of {}",
-            file.file,
-            shown_name(&file.path)
-        ));
-    }
-    let Some((path, section)) = &file.twin else { return };
-    let ids = read.histories.iter().filter_map(|h| h.entity);
-    let selection = Selection {
-        ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
-        components: Some(read.histories.iter().map(|h| h.component.to_string()).collect()),
-        section: Some(section.clone()),
-        ..Selection::all()
-    };
-    let twin = match solver::read(path, None, &selection) {
-        Ok(twin) => twin,
-        Err(error) => {
-            warnings.push(format!(
-                "{}: the binary file beside it cannot be compared: {error}",
-                file.file
-            ));
-            return;
-        }
-    };
-    // A number that is not there must not be there in the other either.
-    let differ = |a: f64, b: f64, largest: f64| {
-        let unlike = (a - b).abs() > SAME_VALUE * largest;
-        unlike || a.is_finite() != b.is_finite()
-    };
-    let largest = |values: &[f64]| {
-        values.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()))
-    };
-    let differing = |a: &[f64], b: &[f64]| {
-        let largest = largest(a);
-        a.len() != b.len() || a.iter().zip(b).any(|(a, b)| differ(*a, *b, largest))
-    };
-    let differs = differing(&read.time, &twin.time)
-        || read.histories.iter().any(|a| {
-            let Some(b) = twin.history(a.entity, &a.component) else { return true };
-            differing(&a.values, &b.values)
-        });
-    if differs {
-        warnings.push(format!(
-            "{} and section {section} of {} differ; the text file was used",
-            file.file,
-            shown_name(path)
-        ));
-    } else {
-        notes.push(format!(
-            "{}: section {section} of {} agrees with it",
-            file.file,
-            shown_name(path)
-        ));
-    }
 }

@@ -6,6 +6,7 @@ use super::resample::interpolate;
 
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum CfcError {
     #[error(
         "the interval of {interval_s:e} s is too long for CFC{class}: at most {longest_s:e} s; use a lower class, filter = \"none\", or output at a higher rate"
@@ -27,6 +28,7 @@ const MAX_SPREAD: f64 = 0.6;
 /// A filtered history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filtered {
+    /// In the unit of the input, one per time.
     pub values: Vec<f64>,
     /// Whether the intervals differed so much that it was filtered at their mean.
     pub resampled: bool,
@@ -41,10 +43,15 @@ const PAD_SAMPLES: usize = 100;
 /// Coefficients of one pass: a two-pole Butterworth low-pass.
 #[derive(Debug, Clone, Copy)]
 pub struct Coefficients {
+    /// Factor of the input.
     pub a0: f64,
+    /// Factor of the input one step before.
     pub a1: f64,
+    /// Factor of the input two steps before.
     pub a2: f64,
+    /// Factor of the output one step before.
     pub b1: f64,
+    /// Factor of the output two steps before.
     pub b2: f64,
 }
 

@@ -1,14 +1,4 @@
-//! Rating: how far a prediction is from its reference.
-
-/// `Σ|p − r| / Σ|r|`: the headline error for velocity, acceleration and force.
-///
-/// Equal lengths, same times or deflections. Infinite if the reference is all zero and
-/// the prediction is not; 0 if both are.
-pub fn l1_ratio(reference: &[f64], prediction: &[f64]) -> f64 {
-    let difference: f64 = reference.iter().zip(prediction).map(|(r, p)| (p - r).abs()).sum();
-    let scale: f64 = reference.iter().map(|r| r.abs()).sum();
-    if difference == 0.0 { 0.0 } else { difference / scale }
-}
+//! Peaks of a signal by their prominence, and those of two signals that match.
 
 /// A peak counts if it stands out by this share of the largest value.
 pub const PROMINENCE: f64 = 0.1;
@@ -181,12 +171,5 @@ mod tests {
                 MatchedPeak { reference: (6.0, 3.0), prediction: None },
             ]
         );
-    }
-
-    #[test]
-    fn l1_ratio_by_hand() {
-        assert_eq!(l1_ratio(&[1.0, -2.0, 1.0], &[1.5, -2.0, 0.5]), 0.25);
-        assert_eq!(l1_ratio(&[0.0, 0.0], &[0.0, 0.0]), 0.0);
-        assert_eq!(l1_ratio(&[0.0], &[1.0]), f64::INFINITY);
     }
 }

@@ -1,0 +1,149 @@
+//! Extraction: from the histories of one run to its curve.
+
+mod error;
+mod from_contact;
+mod input;
+mod record;
+mod remarks;
+mod sample;
+mod speed;
+mod start;
+
+use super::recipe::Filter;
+use super::{Curve, EnergyAudit, energy, loading};
+use crate::signal::cfc;
+use crate::unit::Speed;
+pub use error::{ExtractError, Origin};
+use from_contact::FromContact;
+pub use input::{DeckSpeed, Measured, MeasuredForce, Setup, Stated, StatedContact};
+use record::Record;
+pub use remarks::Remarks;
+use sample::sample;
+use speed::{ImpactSpeed, SpeedBy};
+use start::Start;
+
+/// The curve of a run and what was found on the way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extracted {
+    /// Impact speed.
+    pub speed: Speed,
+    /// At the common interval, from contact on.
+    pub sampled: Curve,
+    /// Rate of the deflection at the sampled times, in m/s.
+    pub closing_speed_m_per_s: Vec<f64>,
+    /// At the solver's rate, from contact on.
+    pub original: Curve,
+    /// Solver's time at which the curve begins, in s.
+    pub contact_time_s: f64,
+    /// Whether the speed is the deck's, so that damage of the deck matters.
+    pub speed_is_decks: bool,
+    /// In N/m; `None` if the record ends before the force has fallen.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Work of the loading branch against the kinetic energy.
+    pub audit: EnergyAudit,
+    /// Choices made, for the record.
+    pub notes: Vec<String>,
+    /// What the user should look at.
+    pub warnings: Vec<String>,
+}
+
+/// Extracts the curve of one run.
+///
+/// Order of work: SI, common times, cut, sign of the force, contact, filter (force only, at its
+/// original rate), deflection from contact on, speed, resampling, audit and its bounds.
+///
+/// # Errors
+/// [`ExtractError`] says which history cannot be used and what to change.
+pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, ExtractError> {
+    let mut remarks = Remarks::default();
+    let mut record = remarks.take(Record::of(measured, setup)?);
+    // Before the filter, which without phase shift begins ahead of the contact.
+    let start = remarks.take(Start::find(measured, setup, &record)?);
+    if let Filter::Cfc(class) = setup.recipe.filter {
+        remarks.append(filter(class, &mut record)?);
+    }
+    let contact = remarks.take(FromContact::of(&record, start.time_s, setup.stated.offset_m)?);
+    remarks.append(start.uncertainty(&contact));
+    let FromContact { curve: original, closing_m_per_s: closing, .. } = contact;
+    let before = contact.before;
+    let ImpactSpeed { speed, by, recorded_m_per_s } =
+        remarks.take(ImpactSpeed::of(measured, setup, &record, before)?);
+    let claim = energy::Claim {
+        curve: &original,
+        masses: setup.masses,
+        speed,
+        closing_m_per_s: measured.velocity.map(|_| &closing[..]),
+        recorded_m_per_s,
+        units: measured.units,
+        is_body_force: matches!(measured.force, MeasuredForce::Body(..)),
+        others: setup.others,
+    };
+    let balance = match claim.check() {
+        Ok(balance) => balance,
+        Err(impossible) if setup.stated.accept_energy => {
+            remarks.warn(format!("accept_energy: {}", impossible.found()));
+            claim.balance()
+        }
+        Err(impossible) => return Err(impossible.into()),
+    };
+    let (sampled, closing_speed_m_per_s) = remarks.take(sample(&original, &closing, setup)?);
+    remarks.append(audited(&original, balance));
+    Ok(Extracted {
+        speed,
+        sampled,
+        closing_speed_m_per_s,
+        unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
+        audit: energy::audit(&original, setup.masses, speed),
+        original,
+        contact_time_s: contact.time_s,
+        speed_is_decks: by == SpeedBy::Deck,
+        notes: remarks.notes,
+        warnings: remarks.warnings,
+    })
+}
+
+/// Filters the record's force.
+fn filter(class: u32, record: &mut Record) -> Result<Remarks, ExtractError> {
+    let mut remarks = Remarks::default();
+    let filtered = cfc::filter(class, &record.time_s, &record.force_n)?;
+    if filtered.resampled {
+        remarks.note(format!(
+            "filter: intervals differ by up to {:.1} %, so the force was filtered at their mean",
+            filtered.spread * 100.0
+        ));
+    }
+    record.force_n = filtered.values;
+    Ok(remarks)
+}
+
+/// What energy, impulse and the loading branch say of a curve.
+fn audited(curve: &Curve, balance: energy::Balance) -> Remarks {
+    let mut remarks = Remarks::default();
+    // Of a run that ended while loading: of what it had stopped by then.
+    if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
+        remarks.warn(format!(
+            "energy: the curve takes up {:.1} % of the kinetic energy",
+            work * 100.0
+        ));
+    }
+    if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
+        remarks.warn(format!(
+            "impulse: the force gives {:.1} % of the recorded change of momentum",
+            impulse * 100.0
+        ));
+    }
+    if loading::loading_end(curve) + 1 == curve.time_s().len() {
+        remarks.warn(
+            "truncated: the largest deflection is the last state, so the run ended while loading",
+        );
+    }
+    if let Ok(branch) = loading::loading_branch(curve)
+        && branch.dropped > 0
+    {
+        remarks.note(format!(
+            "loading branch: {} samples removed because the deflection did not advance",
+            branch.dropped
+        ));
+    }
+    remarks
+}

@@ -1,0 +1,250 @@
+//! Motion and force of a run in SI, at common times.
+
+use super::error::{ExtractError, Origin};
+use super::input::{Measured, MeasuredForce, Setup};
+use super::remarks::Remarks;
+use crate::curve::contact::milliseconds;
+use crate::curve::recipe::BodyMotion;
+use crate::history::History;
+use crate::signal::derivative;
+use crate::signal::resample::interpolate;
+use crate::unit::UnitSystem;
+
+/// Times of two files count as equal up to the six digits that solvers print.
+const SAME_TIME: f64 = 1e-5;
+
+/// Motion and force at the same times, the force positive in compression.
+pub(super) struct Record {
+    pub time_s: Vec<f64>,
+    pub deflection_m: Vec<f64>,
+    pub rate_m_per_s: Vec<f64>,
+    pub force_n: Vec<f64>,
+    /// Rate of the first state of the motion, before any cut.
+    pub first_rate_m_per_s: f64,
+}
+
+impl Record {
+    /// The record of a run, up to the manifest's end.
+    pub fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Remarks), ExtractError> {
+        let mut remarks = Remarks::default();
+        let motion = remarks.take(Motion::of(measured, setup)?);
+        let force = remarks.take(force(measured, setup)?);
+        let mut record = remarks.take(Self::at_common_times(motion, force)?);
+        if let Some(until_s) = setup.stated.truncate_s {
+            remarks.note(record.truncate(until_s)?);
+        }
+        let sign = match setup.stated.force_sign {
+            Some(sign) => sign,
+            None => sign_of_impulse(&record.time_s, &record.force_n),
+        };
+        if sign < 0.0 {
+            remarks.note("force: sign flipped, positive in compression");
+        }
+        record.force_n.iter_mut().for_each(|f| *f *= sign);
+        Ok((record, remarks))
+    }
+
+    fn at_common_times(motion: Motion, force: Signal) -> Result<(Self, Remarks), ExtractError> {
+        let mut remarks = Remarks::default();
+        let first_rate_m_per_s = motion.rate_m_per_s[0];
+        let (from, to) = (motion.time_s[0], motion.time_s[motion.time_s.len() - 1]);
+        let pairs = || motion.time_s.iter().zip(&force.time_s);
+        if motion.time_s.len() == force.time_s.len()
+            && pairs().all(|(a, b)| (a - b).abs() <= SAME_TIME * to.abs())
+        {
+            let record = Self {
+                time_s: motion.time_s,
+                deflection_m: motion.deflection_m,
+                rate_m_per_s: motion.rate_m_per_s,
+                force_n: force.values,
+                first_rate_m_per_s,
+            };
+            return Ok((record, remarks));
+        }
+        let (time_s, force_n): (Vec<f64>, Vec<f64>) = force
+            .time_s
+            .iter()
+            .zip(&force.values)
+            .filter(|(t, _)| (from..=to).contains(*t))
+            .map(|(&t, &f)| (t, f))
+            .unzip();
+        if time_s.len() < 2 {
+            return Err(ExtractError::NoOverlap);
+        }
+        remarks.note(format!(
+            "times: the force has {} states and the motion {}; the motion was interpolated to {} common ones",
+            force.time_s.len(),
+            motion.time_s.len(),
+            time_s.len()
+        ));
+        let at = |values: &[f64]| {
+            interpolate(&motion.time_s, values, &time_s).map_err(|_| ExtractError::NoOverlap)
+        };
+        let record = Self {
+            deflection_m: at(&motion.deflection_m)?,
+            rate_m_per_s: at(&motion.rate_m_per_s)?,
+            time_s,
+            force_n,
+            first_rate_m_per_s,
+        };
+        Ok((record, remarks))
+    }
+
+    /// Removes the states behind the manifest's end of the record; says how many.
+    fn truncate(&mut self, until_s: f64) -> Result<String, ExtractError> {
+        let kept = self.time_s.iter().take_while(|&&t| t <= until_s).count();
+        if kept < 2 {
+            return Err(self.outside("truncate", until_s));
+        }
+        let removed = self.time_s.len() - kept;
+        self.time_s.truncate(kept);
+        self.deflection_m.truncate(kept);
+        self.rate_m_per_s.truncate(kept);
+        self.force_n.truncate(kept);
+        Ok(format!("truncate: {removed} states after {} removed", milliseconds(until_s)))
+    }
+
+    /// That a time lies outside the record.
+    pub fn outside(&self, key: &'static str, time_s: f64) -> ExtractError {
+        let (first_s, last_s) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+        ExtractError::OutsideRecord { key, time_s, first_s, last_s }
+    }
+
+    /// Whether a time lies within the record and before its last state.
+    pub fn holds(&self, time_s: f64) -> bool {
+        (self.time_s[0]..self.time_s[self.time_s.len() - 1]).contains(&time_s)
+    }
+
+    /// A column's value at a time within the record.
+    pub fn at(&self, values: &[f64], time_s: f64) -> Result<f64, ExtractError> {
+        interpolate(&self.time_s, values, &[time_s])
+            .map(|v| v[0])
+            .map_err(|_| ExtractError::NoOverlap)
+    }
+}
+
+/// The sign of `∫F dt`: a single state that is wrong does not turn it.
+pub(super) fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
+    let impulse: f64 = (1..time_s.len())
+        .map(|i| 0.5 * (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
+        .sum();
+    if impulse < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// A history in SI with strictly increasing times.
+pub(super) struct Signal {
+    pub time_s: Vec<f64>,
+    pub values: Vec<f64>,
+}
+
+impl Signal {
+    pub fn of(
+        history: &History,
+        units: UnitSystem,
+        factor: f64,
+        what: &'static str,
+        origin: Origin,
+    ) -> Result<(Self, Remarks), ExtractError> {
+        let mut remarks = Remarks::default();
+        if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
+            let what = history.label();
+            return Err(ExtractError::NotFinite {
+                origin,
+                what,
+                state: i + 1,
+                value: history.values[i],
+            });
+        }
+        let (mut time_s, mut values) = (Vec::new(), Vec::new());
+        for (&t, &v) in history.time.iter().zip(&history.values) {
+            let t = t * units.time_s;
+            if time_s.last().is_none_or(|&last| t > last) {
+                time_s.push(t);
+                values.push(v * factor);
+            }
+        }
+        let skipped = history.time.len() - time_s.len();
+        if skipped > 0 {
+            remarks
+                .note(format!("{what}: {skipped} states left out because time did not increase"));
+        }
+        if time_s.len() < 2 {
+            return Err(ExtractError::TooShort { origin, what, states: time_s.len() });
+        }
+        Ok((Self { time_s, values }, remarks))
+    }
+}
+
+/// Relative displacement and its rate, in the direction of the file.
+struct Motion {
+    time_s: Vec<f64>,
+    deflection_m: Vec<f64>,
+    rate_m_per_s: Vec<f64>,
+}
+
+impl Motion {
+    fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Remarks), ExtractError> {
+        let mut remarks = Remarks::default();
+        let units = measured.units;
+        let bodies = if setup.half_model { 2.0 } else { 1.0 };
+        let Signal { time_s, values: deflection_m } = remarks.take(relative(
+            measured.displacement,
+            measured.minus_displacement,
+            units,
+            units.length_m * bodies,
+            "displacement",
+        )?);
+        if setup.half_model {
+            remarks.note("half model: deflection and speed are twice the run's");
+        }
+        let rate_m_per_s = match measured.velocity {
+            Some(velocity) => {
+                let (minus, factor) = (measured.minus_velocity, units.speed() * bodies);
+                remarks.take(relative(velocity, minus, units, factor, "velocity")?).values
+            }
+            None => {
+                remarks
+                    .note("closing speed: displacement differentiated, the file has no velocity");
+                derivative(&time_s, &deflection_m)
+            }
+        };
+        Ok((Self { time_s, deflection_m, rate_m_per_s }, remarks))
+    }
+}
+
+/// A node's history less another's.
+fn relative(
+    node: &History,
+    minus: Option<&History>,
+    units: UnitSystem,
+    factor: f64,
+    what: &'static str,
+) -> Result<(Signal, Remarks), ExtractError> {
+    let (mut signal, mut remarks) = Signal::of(node, units, factor, what, Origin::Motion)?;
+    if let Some(minus) = minus {
+        let minus = remarks.take(Signal::of(minus, units, factor, what, Origin::Motion)?);
+        for (value, minus) in signal.values.iter_mut().zip(&minus.values) {
+            *value -= minus;
+        }
+    }
+    Ok((signal, remarks))
+}
+
+/// The force in N, in the direction of the file, at its own rate.
+fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Remarks), ExtractError> {
+    let units = measured.units;
+    let mass = setup.masses.body_kg;
+    let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);
+    match measured.force {
+        MeasuredForce::Contact(history) => of(history, units.force(), "force"),
+        MeasuredForce::Body(history, BodyMotion::Acceleration) => {
+            of(history, mass * units.acceleration(), "acceleration")
+        }
+        MeasuredForce::Body(history, BodyMotion::Velocity) => {
+            let (velocity, mut remarks) = of(history, mass * units.speed(), "velocity")?;
+            remarks.note("body force: mass times the central difference of the velocity");
+            let values = derivative(&velocity.time_s, &velocity.values);
+            Ok((Signal { values, ..velocity }, remarks))
+        }
+    }
+}

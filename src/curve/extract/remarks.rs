@@ -1,0 +1,34 @@
+//! What is said of a run beside its numbers.
+
+/// Choices that were made, and what the user should look at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Remarks {
+    /// Choices made, for the record.
+    pub notes: Vec<String>,
+    /// What the user should look at.
+    pub warnings: Vec<String>,
+}
+
+impl Remarks {
+    /// Adds a note.
+    pub fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
+    /// Adds a warning.
+    pub fn warn(&mut self, warning: impl Into<String>) {
+        self.warnings.push(warning.into());
+    }
+
+    /// Adds other remarks behind these.
+    pub fn append(&mut self, other: Self) {
+        self.notes.extend(other.notes);
+        self.warnings.extend(other.warnings);
+    }
+
+    /// The result of a step, whose remarks are added behind these.
+    pub fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
+        self.append(remarks);
+        result
+    }
+}

@@ -1,0 +1,179 @@
+//! Where contact begins in a record.
+
+use super::error::{ExtractError, Origin};
+use super::from_contact::FromContact;
+use super::input::{Measured, MeasuredForce, Setup, StatedContact};
+use super::record::{Record, Signal, sign_of_impulse};
+use super::remarks::Remarks;
+use crate::curve::contact::{self, milliseconds};
+use crate::curve::{Curve, loading};
+use crate::history::History;
+use crate::unit::UnitSystem;
+
+/// A beginning of the crush, as a share of it, that brings less than this share of the impulse
+/// is doubtful: light noses of real runs bring twice as much and more.
+const BEGINNING: (f64, f64) = (0.15, 0.003);
+/// A contact found within a step that closes more than this share of the crush is uncertain.
+const CERTAIN_SHARE: f64 = 0.01;
+
+/// Where contact begins, and how sure that is.
+pub(super) struct Start {
+    pub time_s: f64,
+    by: StartBy,
+}
+
+enum StartBy {
+    /// The manifest's contact time or gap.
+    Manifest,
+    /// The first state, which is in contact already.
+    FirstState,
+    /// A crossing within an output interval of this length.
+    Crossing { interval_s: f64 },
+    /// The body's slowing down, which is later: said where it is found.
+    Body,
+}
+
+impl Start {
+    /// Where the manifest says, else where the force does.
+    pub fn find(
+        measured: &Measured<'_>,
+        setup: &Setup<'_>,
+        record: &Record,
+    ) -> Result<(Self, Remarks), ExtractError> {
+        match setup.stated.contact {
+            Some(StatedContact::Time { s: time_s }) => {
+                if !record.holds(time_s) {
+                    return Err(record.outside("contact_time", time_s));
+                }
+                let mut remarks = Remarks::default();
+                remarks.notes.extend(found_elsewhere(record, time_s));
+                Ok((Self { time_s, by: StartBy::Manifest }, remarks))
+            }
+            Some(StatedContact::Gap { m }) => {
+                let mut remarks = Remarks::default();
+                let time_s = closing_time(record, m)?;
+                remarks.note(format!("contact: the gap is closed at {}", milliseconds(time_s)));
+                remarks.notes.extend(found_elsewhere(record, time_s));
+                Ok((Self { time_s, by: StartBy::Manifest }, remarks))
+            }
+            None => Self::in_force(measured, record),
+        }
+    }
+
+    /// Where the contact force begins, if the recipe names one; else the record's.
+    fn in_force(measured: &Measured<'_>, record: &Record) -> Result<(Self, Remarks), ExtractError> {
+        let mut remarks = Remarks::default();
+        let onset = match measured.contact {
+            Some(contact) => remarks.take(onset_of(contact, measured.units)?),
+            None => onset(&record.time_s, &record.force_n)?,
+        };
+        let of_body =
+            measured.contact.is_none() && matches!(measured.force, MeasuredForce::Body(..));
+        if of_body {
+            remarks.warn(format!(
+                "contact: found at {} where the body slows down; what touches first is stopped earlier by some milliseconds, and the crush is too short by as much times the speed: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or say contact_time in the run",
+                milliseconds(onset.time_s)
+            ));
+        }
+        remarks.warnings.extend(onset.warnings);
+        if !record.holds(onset.time_s) {
+            return Err(record.outside("the contact", onset.time_s));
+        }
+        let by = match onset.interval_s {
+            _ if of_body => StartBy::Body,
+            Some(interval_s) => StartBy::Crossing { interval_s },
+            None => StartBy::FirstState,
+        };
+        Ok((Self { time_s: onset.time_s, by }, remarks))
+    }
+
+    /// By how much the crush may be off because contact lies somewhere in a step.
+    pub fn uncertainty(&self, contact: &FromContact) -> Remarks {
+        let mut remarks = Remarks::default();
+        let curve = &contact.curve;
+        let crush_m = curve.deflection_m()[loading::loading_end(curve)];
+        let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
+        match self.by {
+            StartBy::Crossing { .. } | StartBy::FirstState | StartBy::Body
+                if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
+            {
+                remarks.warn(format!(
+                    "contact: the first {:.0} % of the crush ({:.0} mm) bring less than {} % of the impulse: if that is no contact yet, say contact_time or gap in the run",
+                    BEGINNING.0 * 100.0,
+                    BEGINNING.0 * crush_m * 1e3,
+                    BEGINNING.1 * 100.0
+                ));
+            }
+            StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
+                remarks.warn(format!(
+                    "contact: it lies in a step of {:.2} mm, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run says where)",
+                    step_m(interval_s) * 1e3,
+                    100.0 * step_m(interval_s) / crush_m
+                ));
+            }
+            StartBy::FirstState => remarks.note(
+                "contact: the record begins in contact, so the deflection counts from its first state",
+            ),
+            StartBy::Crossing { .. } | StartBy::Manifest | StartBy::Body => {}
+        }
+        remarks
+    }
+}
+
+/// When the force begins, if the manifest states another contact.
+fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
+    let found = onset(&record.time_s, &record.force_n).ok()?;
+    let is_elsewhere = (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0);
+    is_elsewhere.then(|| {
+        format!(
+            "contact: {} as the manifest has it; the force begins at {}",
+            milliseconds(stated_s),
+            milliseconds(found.time_s)
+        )
+    })
+}
+
+/// The onset of a contact force beside a body force.
+fn onset_of(
+    contact: &History,
+    units: UnitSystem,
+) -> Result<(contact::Onset, Remarks), ExtractError> {
+    let (signal, mut remarks) =
+        Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
+    let sign = sign_of_impulse(&signal.time_s, &signal.values);
+    let force_n: Vec<f64> = signal.values.iter().map(|f| sign * f).collect();
+    remarks.note(format!("contact: found by {}", contact.label()));
+    Ok((onset(&signal.time_s, &force_n)?, remarks))
+}
+
+fn onset(time_s: &[f64], force_n: &[f64]) -> Result<contact::Onset, ExtractError> {
+    let threshold_n = contact::threshold_n(force_n);
+    contact::onset(time_s, force_n, threshold_n).ok_or_else(|| {
+        let largest_n = force_n.iter().copied().fold(0.0, f64::max);
+        ExtractError::NoContact { threshold_n, largest_n }
+    })
+}
+
+/// When the bodies have moved towards each other by `gap_m` from the first state, in the
+/// direction in which they first move.
+fn closing_time(record: &Record, gap_m: f64) -> Result<f64, ExtractError> {
+    let (t, d) = (&record.time_s, &record.deflection_m);
+    let direction = if record.rate_m_per_s[0] < 0.0 { -1.0 } else { 1.0 };
+    let travel = |i: usize| direction * (d[i] - d[0]);
+    let most_m = (0..d.len()).map(travel).fold(0.0, f64::max);
+    let i = (1..d.len() - 1)
+        .find(|&i| travel(i) >= gap_m)
+        .ok_or(ExtractError::GapStaysOpen { gap_m, most_m })?;
+    let share = (gap_m - travel(i - 1)) / (travel(i) - travel(i - 1));
+    Ok(t[i - 1] + share.clamp(0.0, 1.0) * (t[i] - t[i - 1]))
+}
+
+/// Share of the loading branch's impulse up to a deflection.
+fn impulse_share_to(curve: &Curve, deflection_m: f64) -> f64 {
+    let (t, d, f) = (curve.time_s(), curve.deflection_m(), curve.force_n());
+    let end = loading::loading_end(curve);
+    let steps = |to: usize| (1..=to).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1]));
+    let there = (0..=end).take_while(|&i| d[i] <= deflection_m).count().saturating_sub(1);
+    let whole: f64 = steps(end).sum();
+    if whole > 0.0 { steps(there + 1).sum::<f64>() / whole } else { 1.0 }
+}

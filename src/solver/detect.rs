@@ -1,0 +1,135 @@
+//! Which kind of file it is: told by its content, and by its name where that is not enough.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::format::{FORMATS, Format, format_names};
+use super::source::{self, Source, Stream};
+use super::{ReadError, SolverFile, lsdyna};
+
+/// Lines looked at before a file counts as unknown: more than the longest legend seen,
+/// few enough that a large foreign file is refused at once.
+const DETECT_LINES: u64 = 100_000;
+
+/// The format of a file.
+///
+/// # Errors
+/// [`ReadError`] says what it looks like instead.
+pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError> {
+    let (by_content, is_lsdyna) = look_at(path, source)?;
+    if let Some(format) = by_content {
+        return Ok(format);
+    }
+    let named_so = |f: &&Format| path.file_name().is_some_and(|name| name == f.name);
+    if let Some(format) = FORMATS.iter().find(named_so) {
+        return Ok(format);
+    }
+    let by_name = path.iter().rev().take(2).find_map(|part| {
+        let part = part.to_string_lossy().to_ascii_lowercase();
+        FORMATS.iter().find(|f| part.starts_with(f.name))
+    });
+    match by_name {
+        Some(format) if is_lsdyna => Ok(format),
+        _ => Err(ReadError::UnknownFormat {
+            path: path.into(),
+            looks_like: match is_lsdyna {
+                true => "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
+                false => NOT_RECOGNISED,
+            }
+            .into(),
+            known: format_names(),
+        }),
+    }
+}
+
+const NOT_RECOGNISED: &str = "no solver output is recognised in it";
+
+/// The format that the content tells, and whether it has the header of LS-DYNA's text files.
+fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>, bool), ReadError> {
+    let io = |source| ReadError::Io { path: path.into(), source };
+    let unknown = |looks_like: &str| ReadError::UnknownFormat {
+        path: path.into(),
+        looks_like: looks_like.into(),
+        known: format_names(),
+    };
+    let mut head = Vec::new();
+    Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
+    if head.starts_with(b"\x89HDF\r\n\x1a\n") {
+        return Err(unknown("this is an HDF5 file"));
+    }
+    if let Some(what) = source::encoded(&head) {
+        return Err(unknown(what));
+    }
+    if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
+        return Ok((Some(format), false));
+    }
+    let is_named_t01 = path.file_name().is_some_and(|n| n.to_string_lossy().ends_with(T01));
+    if is_named_t01 && !head.is_empty() {
+        return Err(unknown("it is named like a T01, but does not begin like one: is it damaged?"));
+    }
+    let mut lines = lsdyna::line::Lines::new(Stream::new(source));
+    let mut is_lsdyna = false;
+    while let Some(line) = lines.next_line().map_err(io)? {
+        if line.number > DETECT_LINES {
+            return Err(unknown(NOT_RECOGNISED));
+        }
+        if lsdyna::deck::signature(line.text) {
+            return Err(ReadError::Deck { path: path.into() });
+        }
+        is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
+        if line.number <= 2 {
+            continue;
+        }
+        // Titles in a legend are free text, but none begins like a line of a body, whose
+        // signature also ends a legend that lost its closing line.
+        if let Some(format) = FORMATS.iter().find(|f| f.is_signature(line.text)) {
+            return Ok((Some(format), is_lsdyna));
+        }
+    }
+    Ok((None, is_lsdyna))
+}
+
+/// Holds a named format against what the file looks like, if nothing was read by it.
+pub(super) fn check_format(
+    path: &Path,
+    format: &Format,
+    source: &dyn Source,
+    sections: &[SolverFile],
+) -> Result<(), ReadError> {
+    if sections.iter().any(|s| !s.time.is_empty()) {
+        return Ok(());
+    }
+    match look_at(path, source)? {
+        (Some(found), _) if found.name != format.name => Err(ReadError::OtherFormat {
+            path: path.into(),
+            format: format.name.into(),
+            looks_like: found.name,
+        }),
+        // A file that ends after its header tells no format, nor does one that has just begun.
+        (None, false) if source.size().is_ok_and(|size| size > 0) => {
+            Err(ReadError::UnknownFormat {
+                path: path.into(),
+                looks_like: NOT_RECOGNISED.into(),
+                known: format_names(),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The files of a folder that are named like a solver's, for messages: `, such as nodout`.
+pub(super) fn files_in(folder: &Path) -> String {
+    const LOOKED_AT: usize = 1_000;
+    let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
+    let mut named: Vec<String> = entries
+        .take(LOOKED_AT)
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.ends_with(T01) || FORMATS.iter().any(|f| name.starts_with(f.name)))
+        .collect();
+    named.sort();
+    named.truncate(3);
+    if named.is_empty() { String::new() } else { format!(", such as {}", named.join(" or ")) }
+}
+
+/// How OpenRadioss names its time history: the run's name and this.
+const T01: &str = "T01";

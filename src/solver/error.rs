@@ -1,0 +1,134 @@
+//! Why a file gives no histories, or not those that were asked for.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::{Entity, NoDataReason, Selection, SolverFile, WantedId};
+
+/// Why a file could not be read at all, or not what was asked of it.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
+pub enum ReadError {
+    #[error("{path}: {source}")]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{path}: {looks_like}: the readers take {known}")]
+    UnknownFormat { path: PathBuf, looks_like: String, known: String },
+    #[error("{path}: this is no {format}: it looks like a {looks_like}, read it as that")]
+    OtherFormat { path: PathBuf, format: String, looks_like: &'static str },
+    #[error("{path}: this is a folder: name a file in it{files}")]
+    Folder { path: PathBuf, files: String },
+    #[error(
+        "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
+    )]
+    Deck { path: PathBuf },
+    #[error(
+        "{path}: it has several sections: select one of {known} (with --section; in a recipe the section's name is the file's)"
+    )]
+    SeveralSections { path: PathBuf, known: String },
+    #[error("{path}: it has no section \"{section}\": it has {known}")]
+    NoSuchSection { path: PathBuf, section: String, known: String },
+    #[error("there is no format \"{name}\": the readers take {known}")]
+    NoSuchFormat { name: String, known: String },
+    #[error("{path}: {format} has no {what} {id}: {near}", what = entity_word(format))]
+    NoSuchEntity { path: PathBuf, format: String, id: WantedId, near: String },
+    #[error(
+        "{path}: interface {id} is a single-surface contact, for which LS-DYNA prints no resultants: ask for a two-sided contact or a force transducer ({with_data})"
+    )]
+    SingleSurface { path: PathBuf, id: i64, with_data: String },
+    #[error("{path}: {format} has no component \"{component}\": it has {known}")]
+    NoSuchComponent { path: PathBuf, format: String, component: String, known: String },
+}
+
+/// What an id of this format counts, for messages.
+fn entity_word(format: &str) -> &'static str {
+    match format {
+        "nodout" => "node",
+        "rwforc" | "rwforc/forces" => "rigid wall",
+        "secforc" => "section",
+        "matsum" => "part",
+        "rcforc" | "sleout" => "interface",
+        "spcforc" | "bndout" | "nodfor" | "eloutdet" => "node",
+        "elout" | "deforc" => "element",
+        "swforc" => "weld",
+        "abstat" => "airbag",
+        "jntforc" => "joint",
+        "rbdout" => "rigid body",
+        "curvout" => "curve",
+        _ => "entity",
+    }
+}
+
+/// Holds every selected id and component against what the file has.
+///
+/// # Errors
+/// [`ReadError`] names the first that is missing, and what the file has instead.
+pub(super) fn check_selection(
+    path: &Path,
+    file: &SolverFile,
+    selection: &Selection,
+) -> Result<(), ReadError> {
+    for wanted in selection.ids.iter().flatten() {
+        if file.entities.iter().any(|e| wanted.matches(e.id)) {
+            continue;
+        }
+        let single_surface = file
+            .without_data
+            .iter()
+            .any(|w| w.id == wanted.id && w.reason == NoDataReason::SingleSurfaceContact);
+        if single_surface {
+            return Err(ReadError::SingleSurface {
+                path: path.into(),
+                id: wanted.id,
+                with_data: near_ids(file, wanted.id),
+            });
+        }
+        return Err(ReadError::NoSuchEntity {
+            path: path.into(),
+            format: file.section.clone(),
+            id: *wanted,
+            near: near_ids(file, wanted.id),
+        });
+    }
+    for wanted in selection.components.iter().flatten() {
+        if !file.components.iter().any(|c| **c == **wanted) {
+            return Err(ReadError::NoSuchComponent {
+                path: path.into(),
+                format: file.section.clone(),
+                component: wanted.clone(),
+                known: if file.components.is_empty() {
+                    "none, because the file holds no complete state".into()
+                } else {
+                    file.components.join(", ")
+                },
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The ids nearest to one that is missing, with titles: what the user may have meant.
+fn near_ids(file: &SolverFile, id: i64) -> String {
+    const SHOWN: usize = 8;
+    if file.entities.is_empty() && file.time.is_empty() {
+        return "it holds no complete state".into();
+    }
+    if file.entities.is_empty() {
+        return "it holds no ids".into();
+    }
+    let mut entities: Vec<&Entity> = file.entities.iter().collect();
+    entities.sort_by_key(|e| (e.id.id.abs_diff(id), e.id));
+    let shown: Vec<String> = entities
+        .iter()
+        .take(SHOWN)
+        .map(|e| match &e.title {
+            Some(title) => format!("{} \"{title}\"", e.id),
+            None => e.id.to_string(),
+        })
+        .collect();
+    let rest = file.entities.len().saturating_sub(SHOWN);
+    if rest > 0 {
+        format!("the nearest of its ids are {} and {rest} more", shown.join(", "))
+    } else {
+        format!("it has {}", shown.join(", "))
+    }
+}

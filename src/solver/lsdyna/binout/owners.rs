@@ -1,0 +1,182 @@
+//! Whom the values of a component belong to.
+
+use std::collections::{HashMap, HashSet};
+use std::io;
+use std::sync::Arc;
+
+use super::bytes::Bytes;
+use super::metadata::Metadata;
+use super::records::{Component, Place, Section};
+use super::states::States;
+use crate::history::EntityId;
+use crate::solver::problem::{Problem, ProblemCode};
+
+/// Values of one entity for several integration points that are told apart.
+const MAX_POINTS: usize = 128;
+/// Rows that one entity has in a state; a node is in so many sets of constraints at most.
+pub(super) const MAX_ROWS: usize = 20;
+/// Sections in which an id that is there twice is a fault of the file.
+const HAVE_ONE_ROW: [&str; 6] =
+    ["nodout", "matsum", "rwforc/forces", "secforc", "rbdout", "abstat"];
+
+/// Whom the values of a component belong to.
+#[derive(Clone)]
+pub(super) enum Owners {
+    Global,
+    /// One value per entity, in this order in every state.
+    Fixed(Arc<[EntityId]>),
+    /// Each state names its own entities; here all of them.
+    OfState(Arc<[EntityId]>),
+}
+
+/// What is found of a component's owners.
+pub(super) enum Found {
+    /// Owners, and values of each of them: one, or one for each integration point.
+    Owners(Owners, usize),
+    /// The component has no values.
+    Nothing,
+    /// Its values fit no ids.
+    Unfit(Problem),
+}
+
+impl Owners {
+    pub fn of(
+        section: &Section,
+        component: &Component,
+        metadata: &Metadata,
+        states: &States,
+        bytes: Bytes<'_>,
+    ) -> io::Result<Found> {
+        let first = states.whole.iter().find_map(|state| component.records.get(state));
+        let any = first.or_else(|| component.records.values().next());
+        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(Place::width) else {
+            return Ok(Found::Nothing);
+        };
+        if width == 0 || is_total(&component.name) {
+            let is_one = width == 1;
+            return Ok(if is_one { Found::Owners(Self::Global, 1) } else { Found::Nothing });
+        }
+        if let Some(ids) = &states.ids {
+            let with = (0..states.whole.len())
+                .find(|&k| component.records.contains_key(&states.whole[k]) && !ids[k].is_empty());
+            let count = with.map_or(0, |k| ids[k].len());
+            if let Some(points) = points(section, states, count, width, bytes)? {
+                let mut known = HashSet::new();
+                let each = ids.iter().flat_map(|ids| ids.iter());
+                let all = each.filter(|&&id| known.insert(id)).map(|id| EntityId::new(*id));
+                return Ok(Found::Owners(Self::OfState(all.collect()), points));
+            }
+        }
+        if let Some(ids) = metadata.entities(&component.name, width) {
+            return Ok(Found::Owners(Self::Fixed(ids.into()), 1));
+        }
+        if width == 1 {
+            return Ok(Found::Owners(Self::Global, 1));
+        }
+        let message = format!(
+            "{}: {} has {width} values a state and no ids of that number; it is not read",
+            section.name, component.name
+        );
+        Ok(Found::Unfit(Problem::new(ProblemCode::UnreadRows, message)))
+    }
+
+    pub fn entities(&self) -> &[EntityId] {
+        match self {
+            Self::Global => &[],
+            Self::Fixed(ids) | Self::OfState(ids) => ids,
+        }
+    }
+
+    /// The same with a list that other components have as well.
+    pub fn sharing(self, list: &EntityList) -> Self {
+        match self {
+            Self::Global => self,
+            Self::Fixed(_) => Self::Fixed(list.entities.clone()),
+            Self::OfState(_) => Self::OfState(list.entities.clone()),
+        }
+    }
+}
+
+/// Values of each of `count` entities: one, or as many as integration points if the
+/// section says that all have the same number of them (`nip`).
+fn points(
+    section: &Section,
+    states: &States,
+    count: usize,
+    width: usize,
+    bytes: Bytes<'_>,
+) -> io::Result<Option<usize>> {
+    if count == 0 || width == count {
+        return Ok((width == count).then_some(1));
+    }
+    let record = section
+        .component("nip")
+        .and_then(|nip| states.whole.iter().find_map(|state| nip.records.get(state)));
+    let Some(&record) = record else { return Ok(None) };
+    let nip = bytes.integers(record)?;
+    let points = width / count;
+    let agrees = nip.len() == count
+        && points * count == width
+        && (2..=MAX_POINTS).contains(&points)
+        && nip.iter().all(|&n| usize::try_from(n) == Ok(points));
+    Ok(agrees.then_some(points))
+}
+
+/// Entities that one component or several have values of.
+pub(super) struct EntityList {
+    pub entities: Arc<[EntityId]>,
+    /// Rows of the entity that has most, as far as they are read.
+    pub most_rows: usize,
+}
+
+impl EntityList {
+    /// The list, and which entities are there more often than they can be.
+    pub fn of(section: &Section, owners: &Owners) -> (Self, Option<Problem>) {
+        let entities: Arc<[EntityId]> = owners.entities().into();
+        let ordinals = ordinals(&entities);
+        let rows = || ordinals.iter().zip(&*entities).filter(|(_, id)| !section.is_lost(id.id));
+        let most_rows = rows().map(|(&row, _)| row).max().unwrap_or(1);
+        let limit = if HAVE_ONE_ROW.contains(&&*section.name) { 1 } else { MAX_ROWS };
+        let problem = (most_rows > limit).then(|| {
+            let again = rows().filter(|(row, _)| **row == limit + 1).count();
+            let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
+            let message = format!(
+                "{}: {again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
+                section.name,
+                first.unwrap_or_default(),
+                if limit == 1 { "once".to_string() } else { format!("{limit} times") },
+            );
+            Problem::new(ProblemCode::RepeatedLabel, message)
+        });
+        (Self { entities, most_rows: most_rows.min(MAX_ROWS) }, problem)
+    }
+}
+
+/// Sums over all entities of a section (bndout, spcforc), whose number of values tells
+/// nothing where there is one entity.
+fn is_total(name: &str) -> bool {
+    name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")
+}
+
+/// Ordinal of each row of a state among the rows of its entity, from 1: a node in two sets of
+/// constraints has two rows. Empty if every entity has one.
+pub(super) fn ordinals(entities: &[EntityId]) -> Vec<usize> {
+    if entities.windows(2).all(|pair| pair[0].id < pair[1].id) {
+        return Vec::new();
+    }
+    let mut seen: HashMap<EntityId, usize> = HashMap::new();
+    let ordinals: Vec<usize> = entities
+        .iter()
+        .map(|&entity| {
+            let count = seen.entry(entity).or_default();
+            *count += 1;
+            *count
+        })
+        .collect();
+    if seen.len() == entities.len() { Vec::new() } else { ordinals }
+}
+
+/// The name of the values of an entity's row of that ordinal, as in the text files.
+pub(super) fn row_name(component: &Arc<str>, ordinal: usize) -> Arc<str> {
+    if ordinal > 1 { format!("{component}_{ordinal}").into() } else { component.clone() }
+}

@@ -1,0 +1,245 @@
+//! The whole states of a section, in order of their numbers, and the ids of each.
+
+use std::collections::{HashMap, HashSet};
+use std::io;
+use std::sync::Arc;
+
+use super::bytes::Bytes;
+use super::records::{Component, LISTS, Place, Section};
+use crate::solver::problem::{Place as FilePlace, Problem, ProblemCode, Problems};
+use crate::solver::restart;
+
+/// The whole states of a section.
+pub(super) struct States {
+    /// Indices of the states, in order of their numbers.
+    pub whole: Vec<usize>,
+    pub time: Arc<[f64]>,
+    /// Ids of each of them where states name their own.
+    pub ids: Option<Vec<Ids>>,
+}
+
+/// A state's ids; states with the same ones share them.
+pub(super) type Ids = Arc<[i64]>;
+
+impl States {
+    /// A state is whole if it has a time and no damage; the last one must also have what the
+    /// one before has. Of states that a restart wrote again the last ones are kept.
+    pub fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
+        let mut problems = Problems::default();
+        problems.extend(order_of(section));
+        let (mut timed, left_out) = Timed::of(section, bytes)?;
+        problems.append(left_out);
+        let name = format!("{}: ", section.name);
+        let place = |i: usize| place_of(section, timed.states[i]);
+        let (kept, repeated) = restart::resolve(&timed.time, |_, _| Some(true), place, &name);
+        problems.append(repeated);
+        timed.keep(&kept);
+        if let Some(change) = last_change_of_lists(section, bytes)? {
+            problems.extend(timed.leave_out_before(change, section));
+        }
+        let Timed { states: whole, time } = timed;
+        let ids = match section.component("ids") {
+            None => ids_by_order(section, &whole, bytes)?,
+            Some(component) => Some(ids_of_states(component, &whole, bytes)?),
+        };
+        problems.extend(repeated_ids(section, ids.as_deref().unwrap_or_default()));
+        Ok((Self { whole, time: time.into(), ids }, problems))
+    }
+
+    /// Entities that some states lack.
+    pub fn absent(&self, section: &Section) -> Option<Problem> {
+        let ids = self.ids.as_ref()?;
+        let mut states_with: HashMap<i64, usize> = HashMap::new();
+        for id in ids.iter().flat_map(|ids| ids.iter()) {
+            *states_with.entry(*id).or_default() += 1;
+        }
+        let partly = states_with.values().filter(|&&n| n < ids.len()).count();
+        let message = format!(
+            "{}: {partly} of {} entities are missing from some states (eroded or failed); their values there are NaN",
+            section.name,
+            states_with.len()
+        );
+        (partly > 0).then(|| Problem::new(ProblemCode::AbsentEntity, message))
+    }
+}
+
+/// States that are in the file twice or not in order.
+fn order_of(section: &Section) -> Option<Problem> {
+    if section.repeated > 0 {
+        let message = format!(
+            "{}: {} records are there again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
+            section.name,
+            section.repeated,
+            section.first_repeated.unwrap_or_default()
+        );
+        let state = section.first_repeated.and_then(|n| section.state_index.get(&n));
+        let place = state.and_then(|&state| place_of(section, state));
+        return Some(Problem::at(ProblemCode::RepeatedState, place, message));
+    }
+    let message = format!(
+        "{}: states are not in order of their numbers; they are returned in it",
+        section.name
+    );
+    (!section.states.is_sorted()).then(|| Problem::new(ProblemCode::TimeGoesBack, message))
+}
+
+/// States and their times.
+struct Timed {
+    states: Vec<usize>,
+    time: Vec<f64>,
+}
+
+impl Timed {
+    /// The states without damage, in order of their numbers, and why others are left out.
+    fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
+        let mut order: Vec<usize> = (0..section.states.len()).collect();
+        order.sort_by_key(|&i| section.states[i]);
+        let times = section.component("time");
+        let last = order.last().copied();
+        let before = order.len().checked_sub(2).map(|k| order[k]);
+        let (mut states, mut time, mut problems) = (Vec::new(), Vec::new(), Problems::default());
+        for state in order {
+            let record = times.and_then(|t| t.records.get(&state));
+            let value = match record {
+                Some(&place) => bytes.first_real(place)?.filter(|t| t.is_finite()),
+                None => None,
+            };
+            let lacks = || {
+                let has = |c: &Component, s: usize| c.records.contains_key(&s);
+                let lost = |c: &&Component| before.is_some_and(|b| has(c, b)) && !has(c, state);
+                section.components.iter().find(lost).map(|c| c.name.clone())
+            };
+            let why = match value {
+                _ if section.damaged.contains(&state) => Some("a record of it is damaged".into()),
+                None => Some("its time is missing".into()),
+                Some(_) if Some(state) == last => {
+                    lacks().map(|name| format!("it lacks {name}, which the state before has"))
+                }
+                Some(_) => None,
+            };
+            match (why, value) {
+                (None, Some(value)) => {
+                    states.push(state);
+                    time.push(value);
+                }
+                (why, _) => {
+                    let message = format!(
+                        "{}: state d{} is left out: {}",
+                        section.name,
+                        section.states[state],
+                        why.unwrap_or_default()
+                    );
+                    let place = place_of(section, state);
+                    problems.push(Problem::at(ProblemCode::IncompleteState, place, message));
+                }
+            }
+        }
+        Ok((Self { states, time }, problems))
+    }
+
+    fn keep(&mut self, kept: &[usize]) {
+        self.time = kept.iter().map(|&i| self.time[i]).collect();
+        self.states = kept.iter().map(|&i| self.states[i]).collect();
+    }
+
+    /// Leaves out states that were written before a list of ids changed: their rows cannot be
+    /// told by one id.
+    fn leave_out_before(&mut self, change: (usize, u64), section: &Section) -> Option<Problem> {
+        let times = section.component("time");
+        let is_behind = |state: usize| {
+            times.and_then(|t| t.records.get(&state)).is_some_and(|t| t.order() > change)
+        };
+        let kept: Vec<usize> =
+            (0..self.states.len()).filter(|&k| is_behind(self.states[k])).collect();
+        let lost = self.states.len() - kept.len();
+        self.keep(&kept);
+        let message = format!(
+            "{}: the ids change; {lost} states that were written before are left out",
+            section.name
+        );
+        let place = Some(FilePlace::at_byte(change.1));
+        (lost > 0).then(|| Problem::at(ProblemCode::UnexpectedEntity, place, message))
+    }
+}
+
+/// Where the last list was written that differs from the one above it, in a section with lists
+/// of sides or of several kinds of ids.
+fn last_change_of_lists(section: &Section, bytes: Bytes<'_>) -> io::Result<Option<(usize, u64)>> {
+    let is_plain = section.lists.iter().all(|(name, _)| *name == "ids");
+    let mut last_change = None;
+    for name in LISTS.into_iter().filter(|_| !is_plain) {
+        let mut above: Option<Vec<i64>> = None;
+        for (_, place) in section.lists.iter().filter(|(n, _)| *n == name) {
+            let list = bytes.integers(*place)?;
+            if above.as_ref().is_some_and(|above| *above != list) {
+                last_change = last_change.max(Some(place.order()));
+            }
+            above = Some(list);
+        }
+    }
+    Ok(last_change)
+}
+
+/// The ids that each state names itself.
+fn ids_of_states(component: &Component, whole: &[usize], bytes: Bytes<'_>) -> io::Result<Vec<Ids>> {
+    let mut ids: Vec<Ids> = Vec::with_capacity(whole.len());
+    for state in whole {
+        let read = match component.records.get(state) {
+            Some(&place) => bytes.integers(place)?,
+            None => Vec::new(),
+        };
+        let above = ids.last().filter(|above| ***above == *read).cloned();
+        ids.push(above.unwrap_or_else(|| read.into()));
+    }
+    Ok(ids)
+}
+
+/// The ids in force when each state was written, if they changed; sections whose rows
+/// are told by more than an id are not asked.
+fn ids_by_order(
+    section: &Section,
+    whole: &[usize],
+    bytes: Bytes<'_>,
+) -> io::Result<Option<Vec<Ids>>> {
+    let places: Vec<Place> =
+        section.lists.iter().filter(|(name, _)| *name == "ids").map(|(_, p)| *p).collect();
+    let lists: Vec<Ids> = places
+        .iter()
+        .map(|&place| bytes.integers(place).map(Ids::from))
+        .collect::<io::Result<_>>()?;
+    let more = section.lists.iter().any(|(name, _)| *name != "ids");
+    if more || lists.windows(2).all(|w| w[0] == w[1]) {
+        return Ok(None);
+    }
+    let of = |state: &usize| {
+        let time = section.component("time").and_then(|t| t.records.get(state));
+        let before = |p: &Place| time.is_some_and(|t| p.order() < t.order());
+        let last = places.iter().rposition(before).unwrap_or(0);
+        lists[last].clone()
+    };
+    Ok(Some(whole.iter().map(of).collect()))
+}
+
+/// Ids that one state has twice.
+fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
+    let twice = |ids: &Ids| ids.len() - ids.iter().collect::<HashSet<_>>().len();
+    let mut above: Option<&Ids> = None;
+    let changed = ids.iter().filter(|&ids| {
+        let same = above.replace(ids).is_some_and(|above| Arc::ptr_eq(above, ids));
+        !same
+    });
+    let twice = changed.map(twice).max().unwrap_or(0);
+    let message = format!(
+        "{}: {twice} ids are there twice in one state; the last value of each is returned",
+        section.name
+    );
+    (twice > 0).then(|| Problem::new(ProblemCode::RepeatedLabel, message))
+}
+
+/// Where a state is in its file.
+fn place_of(section: &Section, state: usize) -> Option<FilePlace> {
+    let records = || section.components.iter().filter_map(|c| c.records.get(&state));
+    let time = section.component("time").and_then(|t| t.records.get(&state));
+    let place = time.or_else(|| records().min_by_key(|p| p.order()))?;
+    Some(FilePlace::at_byte(place.payload.at))
+}

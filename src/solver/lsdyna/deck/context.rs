@@ -1,0 +1,153 @@
+//! What is known of a deck while its cards are read: its contents so far, its parameters, the
+//! files that are open, and its problems.
+
+use super::card::{Card, Field};
+use super::contents::{At, Deck};
+use super::keyword::{Format, Keyword};
+use super::kind::Kind;
+use super::parameters::{NoNumber, Parameters};
+use crate::solver::problem::{Place, Problem, ProblemCode, Problems};
+
+/// Entries kept of each list.
+pub(super) const MAX_ENTRIES: usize = 100_000;
+/// Includes read or tried; folders tried.
+pub(super) const MAX_INCLUDES: usize = 1000;
+
+/// A keyword and what its cards said so far.
+pub(super) struct Block {
+    pub kind: Kind,
+    pub keyword: Keyword,
+    pub place: Place,
+    pub format: Format,
+    /// Cards read, or cards of the definition that is being read when a keyword has many.
+    pub cards: usize,
+    /// Numbers that a later card of the definition needs.
+    pub ids: [Option<i64>; 3],
+    /// Text that a later card of the definition needs.
+    pub text: Option<String>,
+}
+
+/// A field without a number, which a problem says.
+pub(super) struct Missing;
+
+/// The state of reading a deck.
+#[derive(Default)]
+pub(super) struct Context {
+    pub deck: Deck,
+    pub problems: Problems,
+    pub parameters: Parameters,
+    /// Included files that are being read, outermost first: index in the deck's includes, and
+    /// the name they were opened by.
+    pub reading: Vec<(usize, String)>,
+    /// Whether two statements of units differ.
+    pub units_differ: bool,
+    /// Names of the lists that had to leave out entries.
+    full: Vec<&'static str>,
+}
+
+impl Context {
+    pub fn real(&mut self, card: &Card<'_>, k: usize) -> Result<Option<f64>, Missing> {
+        self.real_of(card.field(k), card.place)
+    }
+
+    pub fn integer(&mut self, card: &Card<'_>, k: usize) -> Result<Option<i64>, Missing> {
+        self.integer_of(card.field(k), card.place)
+    }
+
+    pub fn real_of(&mut self, field: Field<'_>, place: Place) -> Result<Option<f64>, Missing> {
+        let number = self.parameters.real(field);
+        self.named(number, field, place)
+    }
+
+    pub fn integer_of(&mut self, field: Field<'_>, place: Place) -> Result<Option<i64>, Missing> {
+        let number = self.parameters.integer(field);
+        self.named(number, field, place)
+    }
+
+    fn named<T>(
+        &mut self,
+        number: Result<T, NoNumber>,
+        field: Field<'_>,
+        place: Place,
+    ) -> Result<T, Missing> {
+        number.map_err(|e| {
+            if let NoNumber::Bad(message) = e {
+                self.problem(ProblemCode::BadField, place, Some(field.columns), message);
+            }
+            Missing
+        })
+    }
+
+    pub fn required_id(&mut self, card: &Card<'_>, k: usize) -> Option<i64> {
+        self.required_id_of(card.field(k), card.place)
+    }
+
+    pub fn required_id_of(&mut self, field: Field<'_>, place: Place) -> Option<i64> {
+        match self.integer_of(field, place) {
+            Ok(Some(id)) => Some(id),
+            Ok(None) => {
+                let message = "expected an id, found blanks".into();
+                self.problem(ProblemCode::BadField, place, Some(field.columns), message);
+                None
+            }
+            Err(Missing) => None,
+        }
+    }
+
+    pub fn at(&self, place: Place) -> At {
+        At { line: place.line, include: self.reading.last().map(|&(index, _)| index) }
+    }
+
+    pub fn problem(
+        &mut self,
+        code: ProblemCode,
+        place: Place,
+        columns: Option<[usize; 2]>,
+        message: String,
+    ) {
+        let message = match self.reading.last() {
+            Some((_, path)) => format!("{message} (in \"{path}\")"),
+            None => message,
+        };
+        // A field beyond the end of its card has no columns.
+        let columns = columns.filter(|c| c[0] > 0);
+        self.problems.add(code, Some(place), columns, message);
+    }
+
+    /// Notes that a list had to leave out entries.
+    pub fn note_full(&mut self, what: &'static str) {
+        if !self.full.contains(&what) {
+            self.full.push(what);
+        }
+    }
+
+    /// Adds an entry to one of the deck's lists, which `list` picks, up to its bound.
+    pub fn keep<T>(
+        &mut self,
+        list: impl FnOnce(&mut Deck) -> &mut Vec<T>,
+        entry: T,
+        what: &'static str,
+    ) {
+        let list = list(&mut self.deck);
+        if list.len() < MAX_ENTRIES {
+            list.push(entry);
+        } else {
+            self.note_full(what);
+        }
+    }
+
+    /// The deck with its parameters and problems.
+    pub fn finish(mut self) -> Deck {
+        self.deck.parameters = self.parameters.list;
+        self.deck.problems = self.problems.into_list();
+        // Added last, so that a deck full of damage cannot push them out.
+        self.deck.problems.extend(self.full.into_iter().map(left_out));
+        self.deck
+    }
+}
+
+fn left_out(what: &'static str) -> Problem {
+    let limit = if what.starts_with("include") { MAX_INCLUDES } else { MAX_ENTRIES };
+    let message = format!("{what} beyond the first {limit} are left out");
+    Problem::new(ProblemCode::UnreadRows, message)
+}

@@ -1,0 +1,137 @@
+//! What of a study manifest only the whole shows.
+
+use std::collections::HashSet;
+
+use super::manifest::{Head, Manifest, RunEntry, StudyKind};
+use crate::curve::Parameter;
+use crate::curve::recipe::{ForceSource, Recipe};
+
+/// What does not fit in a study manifest.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
+pub enum InvalidStudy {
+    #[error(
+        "a pair needs the other body: deflection.minus_node = …, or half_model = true in [study] for one body against its symmetry plane"
+    )]
+    PairOfOne,
+    #[error(
+        "half_model = true doubles the deflection, which a minus_node already makes whole: keep one of them"
+    )]
+    DoublyWhole,
+    #[error("half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair")]
+    HalfWall,
+    #[error("there is no [[run]]")]
+    NoRun,
+    #[error(
+        "recipe.contact must be a contact force (id = … of a wall or contact): a body slows down after the first touch"
+    )]
+    ContactOfBody,
+    #[error("recipe.contact is for a body force: contact is found in recipe.force itself")]
+    ContactBesideContact,
+    #[error("run \"{run}\": contact_time and gap both say when contact begins: keep one of them")]
+    TwoContacts { run: String },
+    #[error("a [[run]] has an empty path")]
+    EmptyPath,
+    #[error("run \"{run}\": other_mass needs kind = \"pair\"")]
+    OtherMassOfWall { run: String },
+    #[error("run \"{run}\" gives no name for its case: add name = \"…\" to it", run = run.escape_debug())]
+    NoCaseName { run: String },
+    #[error("two runs are named \"{name}\": give one of them a name = …")]
+    SameName { name: String },
+    #[error("run \"{run}\": parameter \"{name}\" is no name", name = name.escape_debug())]
+    ParameterName { run: String, name: String },
+    #[error(
+        "run \"{run}\": parameter \"{name}\" has a key of its own: use speed or mass",
+        name = name.escape_debug()
+    )]
+    ParameterTaken { run: String, name: String },
+    #[error("run \"{run}\": parameter \"{name}\" is not finite", name = name.escape_debug())]
+    ParameterNotFinite { run: String, name: String },
+    #[error("{key} = \"{name}\" is no name", name = name.escape_debug())]
+    NoName { key: &'static str, name: String },
+    #[error(
+        "{key} = \"{name}\" may not contain \"/\" or control characters",
+        name = name.escape_debug()
+    )]
+    NameCharacters { key: &'static str, name: String },
+}
+
+pub(super) fn check(manifest: &Manifest) -> Result<(), InvalidStudy> {
+    let Head { name, group, kind, half_model, .. } = &manifest.study;
+    check_name("study.name", name, true)?;
+    check_name("study.group", group, false)?;
+    let minus_node = manifest.recipe.deflection.minus_node.is_some();
+    match (kind, half_model, minus_node) {
+        (StudyKind::Pair, false, false) => return Err(InvalidStudy::PairOfOne),
+        (StudyKind::Pair, true, true) => return Err(InvalidStudy::DoublyWhole),
+        (StudyKind::Wall, true, _) => return Err(InvalidStudy::HalfWall),
+        _ => {}
+    }
+    if manifest.run.is_empty() {
+        return Err(InvalidStudy::NoRun);
+    }
+    check_contact(&manifest.recipe)?;
+    let mut names = HashSet::new();
+    for run in &manifest.run {
+        check_run(run, *kind)?;
+        let name = run.case_name();
+        if !names.insert(name.clone()) {
+            return Err(InvalidStudy::SameName { name });
+        }
+    }
+    Ok(())
+}
+
+fn check_contact(recipe: &Recipe) -> Result<(), InvalidStudy> {
+    match (&recipe.contact, &recipe.force) {
+        (Some(ForceSource::Body { .. }), _) => Err(InvalidStudy::ContactOfBody),
+        (Some(_), ForceSource::Contact { .. }) => Err(InvalidStudy::ContactBesideContact),
+        _ => Ok(()),
+    }
+}
+
+fn check_run(entry: &RunEntry, kind: StudyKind) -> Result<(), InvalidStudy> {
+    check_parameters(entry)?;
+    let run = || entry.path.clone();
+    if entry.contact_time.is_some() && entry.gap.is_some() {
+        return Err(InvalidStudy::TwoContacts { run: run() });
+    }
+    if entry.path.trim().is_empty() {
+        return Err(InvalidStudy::EmptyPath);
+    }
+    if kind == StudyKind::Wall && entry.other_mass.is_some() {
+        return Err(InvalidStudy::OtherMassOfWall { run: run() });
+    }
+    check_name("run.name", &entry.case_name(), false)
+        .map_err(|_| InvalidStudy::NoCaseName { run: run() })
+}
+
+/// Names that the models use themselves.
+const TAKEN: [&str; 4] = ["speed_m_per_s", "deflection_m", "mass_kg", "other_mass_kg"];
+
+fn check_parameters(entry: &RunEntry) -> Result<(), InvalidStudy> {
+    for (name, value) in &entry.parameters {
+        let (run, key) = (entry.path.clone(), name.clone());
+        if name.trim().is_empty() || name.contains(|c: char| c.is_control() || c == '=') {
+            return Err(InvalidStudy::ParameterName { run, name: key });
+        }
+        if TAKEN.contains(&name.as_str()) {
+            return Err(InvalidStudy::ParameterTaken { run, name: key });
+        }
+        if matches!(value, Parameter::Number(v) if !v.is_finite()) {
+            return Err(InvalidStudy::ParameterNotFinite { run, name: key });
+        }
+    }
+    Ok(())
+}
+
+/// Names stand in files, tables and HDF5 paths.
+fn check_name(key: &'static str, name: &str, slash: bool) -> Result<(), InvalidStudy> {
+    if name.trim().is_empty() || name == "." || name == ".." {
+        return Err(InvalidStudy::NoName { key, name: name.into() });
+    }
+    if name.contains(|c: char| c.is_control() || (c == '/' && !slash)) {
+        return Err(InvalidStudy::NameCharacters { key, name: name.into() });
+    }
+    Ok(())
+}

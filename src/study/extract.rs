@@ -1,0 +1,212 @@
+//! Extraction of a run's case: units, histories, curve, and what is to be said of them.
+
+use super::RunError;
+use super::files::shown_name;
+use super::locate::{LocatedRun, RunDeck};
+use super::read::{ReadFile, RunFiles};
+use super::twin::compare_twin;
+use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
+use crate::curve::recipe::ForceSource;
+use crate::curve::{Case, Source};
+use crate::unit::UnitSystem;
+
+impl LocatedRun<'_> {
+    /// Reads the selected histories and extracts the case.
+    ///
+    /// # Errors
+    /// [`RunError`] names the file and what to change.
+    pub fn extract(&self) -> Result<Case, RunError> {
+        let mut remarks = Remarks { notes: self.deck_notes.clone(), ..Remarks::default() };
+        let units = remarks.take(self.units()?);
+        let files = RunFiles::read(self, &self.study.manifest.recipe)?;
+        let extracted = self.curve(&files, units)?;
+        if self.study.manifest.study.units.is_none() || extracted.speed_is_decks {
+            // What could not be read of it may have changed what was taken from it.
+            remarks.warnings.extend(self.deck_problems());
+        }
+        remarks.notes.extend_from_slice(&extracted.notes);
+        remarks.warnings.extend_from_slice(&extracted.warnings);
+        remarks.append(self.of_files(&files)?);
+        Ok(self.case(&files, units, extracted, remarks))
+    }
+
+    /// The manifest's units, or those that the deck states.
+    fn units(&self) -> Result<(UnitSystem, Remarks), RunError> {
+        let mut remarks = Remarks::default();
+        let stated = self.deck.as_ref().and_then(|deck| {
+            let units = deck.deck.units.as_ref()?;
+            Some((shown_name(&deck.file.path), units, units.system?))
+        });
+        let units = match (self.study.manifest.study.units, stated) {
+            (Some(units), Some((name, stated, system))) if system != units => {
+                remarks.warn(format!(
+                    "units: the deck {name} states \"{}\", the manifest has others; the manifest's are used",
+                    stated.text.trim()
+                ));
+                units
+            }
+            (Some(units), _) => units,
+            (None, Some((name, stated, system))) => {
+                remarks.note(format!(
+                    "units: \"{}\" taken from the deck {name}, line {}",
+                    stated.text.trim(),
+                    stated.at.line
+                ));
+                system
+            }
+            (None, None) => {
+                let why = match &self.deck {
+                    Some(deck) => format!("the deck {} states none", deck.file.path.display()),
+                    None => "the run has no deck that could".into(),
+                };
+                return Err(RunError::NoUnits { why });
+            }
+        };
+        Ok((units, remarks))
+    }
+
+    /// The curve from the histories that were read.
+    fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, RunError> {
+        let (study, entry) = (self.study, self.entry);
+        let others: Vec<(String, f64)> = study
+            .runs()
+            .iter()
+            .filter(|run| run.case_name() != entry.case_name())
+            .filter_map(|run| Some((run.case_name(), run.speed?.0)))
+            .collect();
+        let setup = Setup {
+            recipe: &study.manifest.recipe,
+            kind: study.speed_kind(),
+            half_model: study.manifest.study.half_model,
+            masses: study.masses(entry),
+            manifest_speed_m_per_s: entry.speed.map(|s| s.0),
+            deck_speed: self.deck_speed(units),
+            stated: study.stated(entry),
+            others: &others,
+        };
+        extract(&files.measured(units)?, &setup).map_err(|source| {
+            let read = if source.is_of_force() { &files.force } else { &files.motion };
+            RunError::Extract { path: read.located.path.clone(), source }
+        })
+    }
+
+    fn deck_problems(&self) -> Vec<String> {
+        let Some(RunDeck { file, deck }) = &self.deck else { return Vec::new() };
+        let name = shown_name(&file.path);
+        deck.problems.iter().map(|p| format!("deck {name}: {p}")).collect()
+    }
+
+    /// What is to be said of the files: the side that was chosen, twins, notes and damage.
+    fn of_files(&self, files: &RunFiles<'_>) -> Result<Remarks, RunError> {
+        let mut remarks = Remarks::default();
+        if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force
+            && let Some(side) = files.force_history()?.entity.and_then(|e| e.side)
+        {
+            remarks.note(format!(
+                "force: side {} of interface {id} is used, the recipe names none",
+                side.name()
+            ));
+        }
+        let ReadFile { located, file } = &files.motion;
+        remarks.append(compare_twin(located, file));
+        if self.files.len() > 1 {
+            let ReadFile { located, file } = &files.force;
+            remarks.append(compare_twin(located, file));
+        }
+        for ReadFile { located, file } in files.each() {
+            remarks.notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
+            remarks.warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
+        }
+        Ok(remarks)
+    }
+
+    fn case(
+        &self,
+        files: &RunFiles<'_>,
+        units: UnitSystem,
+        extracted: Extracted,
+        remarks: Remarks,
+    ) -> Case {
+        let head = &self.study.manifest.study;
+        let read = files.each().into_iter().map(|read| self.source(read));
+        Case {
+            study: head.name.clone(),
+            group: head.group.clone(),
+            name: self.entry.case_name(),
+            speed: extracted.speed,
+            masses: self.study.masses(self.entry),
+            parameters: self.entry.parameters.clone(),
+            force_kind: files.force_kind(),
+            sampled: extracted.sampled,
+            closing_speed_m_per_s: extracted.closing_speed_m_per_s,
+            original: extracted.original,
+            contact_time_s: extracted.contact_time_s,
+            solver_wall_time_s: self.solver_wall_time_s(),
+            unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
+            audit: extracted.audit,
+            recipe: self.recipe_in(units),
+            fingerprint: self.fingerprint.clone(),
+            sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
+            notes: remarks.notes,
+            warnings: remarks.warnings,
+        }
+    }
+
+    /// The recipe with the units that were found for it.
+    fn recipe_in(&self, units: UnitSystem) -> String {
+        let Ok(mut recipe) = serde_json::from_str::<serde_json::Value>(&self.recipe) else {
+            return self.recipe.clone();
+        };
+        recipe["units"] = units.to_string().into();
+        recipe.to_string()
+    }
+
+    /// The deck's speed; for half a model the closing speed.
+    fn deck_speed(&self, units: UnitSystem) -> Option<DeckSpeed> {
+        let bodies = if self.study.manifest.study.half_model { 2.0 } else { 1.0 };
+        let RunDeck { file, deck } = self.deck.as_ref()?;
+        let found = deck.impact_speed()?;
+        Some(DeckSpeed {
+            m_per_s: bodies * found.speed * units.speed(),
+            place: format!("{}, line {}", shown_name(&file.path), found.at.line),
+        })
+    }
+
+    fn deck_source(&self, RunDeck { file: located, deck }: &RunDeck) -> Source {
+        Source {
+            path: located
+                .path
+                .strip_prefix(&self.study.folder)
+                .unwrap_or(&located.path)
+                .display()
+                .to_string(),
+            size_bytes: located.size_bytes,
+            blake3: located.blake3.clone(),
+            format: "keyword".into(),
+            solver: Some("LS-DYNA".into()),
+            version: None,
+            title: deck.title.clone(),
+            problems: deck.problems.len(),
+        }
+    }
+
+    fn source(&self, ReadFile { located, file }: &ReadFile<'_>) -> Source {
+        Source {
+            path: format!(
+                "{}/{}",
+                self.entry.path,
+                located
+                    .path
+                    .file_name()
+                    .map_or(String::new(), |n| n.to_string_lossy().into_owned())
+            ),
+            size_bytes: located.size_bytes,
+            blake3: located.blake3.clone(),
+            format: file.format.into(),
+            solver: file.solver.clone(),
+            version: file.version.clone(),
+            title: file.title.clone(),
+            problems: file.problems.len(),
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The histories of a run that its recipe names.
+
+use super::files::Located;
+use super::locate::LocatedRun;
+use crate::curve::ForceKind;
+use crate::curve::extract::{Measured, MeasuredForce};
+use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
+use crate::history::{EntityId, History, Side};
+use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
+use crate::unit::UnitSystem;
+
+/// A located file with the histories that were selected of it.
+pub(super) struct ReadFile<'a> {
+    pub located: &'a Located,
+    pub file: SolverFile,
+}
+
+/// The files of a run with the histories that its recipe names.
+pub(super) struct RunFiles<'a> {
+    recipe: &'a Recipe,
+    pub motion: ReadFile<'a>,
+    pub force: ReadFile<'a>,
+    /// The contact force beside a body force.
+    pub contact: Option<ReadFile<'a>>,
+}
+
+impl<'a> RunFiles<'a> {
+    pub fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, ReadError> {
+        let read_force = |source: &ForceSource| {
+            let located = run.file(force_file(source));
+            Ok::<_, ReadError>(ReadFile { located, file: read_force(located, source)? })
+        };
+        let located = run.file(&recipe.deflection.file);
+        Ok(Self {
+            recipe,
+            motion: ReadFile { located, file: read_motion(located, &recipe.deflection)? },
+            force: read_force(&recipe.force)?,
+            contact: recipe.contact.as_ref().map(read_force).transpose()?,
+        })
+    }
+
+    /// The histories for an extraction.
+    pub fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, ReadError> {
+        let DeflectionSource { node, minus_node, component, .. } = self.recipe.deflection;
+        let motion =
+            |node: i64, name: &str| self.motion.file.history(Some(EntityId::new(node)), name);
+        let displacement =
+            motion(node, component.name()).ok_or_else(|| self.motion.lacks(component.name()))?;
+        let force = self.force_history()?;
+        Ok(Measured {
+            units,
+            displacement,
+            minus_displacement: minus_node.and_then(|n| motion(n, component.name())),
+            velocity: motion(node, component.velocity()),
+            minus_velocity: minus_node.and_then(|n| motion(n, component.velocity())),
+            force: match self.recipe.force {
+                ForceSource::Contact { .. } => MeasuredForce::Contact(force),
+                ForceSource::Body { motion, .. } => MeasuredForce::Body(force, motion),
+            },
+            contact: match self.recipe.contact.as_ref().zip(self.contact.as_ref()) {
+                Some((source, read)) => Some(read.force_history(source)?),
+                None => None,
+            },
+        })
+    }
+
+    /// The history that the force is, or is made of.
+    pub fn force_history(&self) -> Result<&History, ReadError> {
+        self.force.force_history(&self.recipe.force)
+    }
+
+    pub fn force_kind(&self) -> ForceKind {
+        match self.recipe.force {
+            ForceSource::Contact { .. } => ForceKind::Contact,
+            ForceSource::Body { .. } => ForceKind::Body,
+        }
+    }
+
+    /// Each file once.
+    pub fn each(&self) -> Vec<&ReadFile<'a>> {
+        let mut each = vec![&self.motion];
+        for read in [&self.force].into_iter().chain(&self.contact) {
+            if each.iter().all(|known| known.located.file != read.located.file) {
+                each.push(read);
+            }
+        }
+        each
+    }
+}
+
+impl ReadFile<'_> {
+    fn force_history(&self, source: &ForceSource) -> Result<&History, ReadError> {
+        let history = match source {
+            ForceSource::Contact { id, side, component, .. } => {
+                contact_history(&self.file, *id, *side, component)
+            }
+            ForceSource::Body { node, component, .. } => {
+                self.file.history(Some(EntityId::new(*node)), component)
+            }
+        };
+        history.ok_or_else(|| self.lacks(force_component(source)))
+    }
+
+    fn lacks(&self, component: &str) -> ReadError {
+        ReadError::NoSuchComponent {
+            path: self.located.path.clone(),
+            format: self.file.section.clone(),
+            component: component.into(),
+            known: self.file.components.join(", "),
+        }
+    }
+}
+
+/// The file of a force, as the recipe names it.
+pub(super) fn force_file(force: &ForceSource) -> &str {
+    match force {
+        ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
+    }
+}
+
+fn force_component(force: &ForceSource) -> &str {
+    match force {
+        ForceSource::Contact { component, .. } | ForceSource::Body { component, .. } => component,
+    }
+}
+
+/// Displacements and, where the file has them, velocities of the recipe's nodes.
+fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {
+    let wanted = |id| WantedId { id, side: None };
+    let ids: Vec<WantedId> =
+        [Some(source.node), source.minus_node].into_iter().flatten().map(wanted).collect();
+    let component = source.component;
+    let select = |components: Vec<String>| Selection {
+        ids: Some(ids.clone()),
+        components: Some(components),
+        section: file.section.clone(),
+        ..Selection::all()
+    };
+    let both = select(vec![component.name().into(), component.velocity().into()]);
+    match solver::read(&file.path, None, &both) {
+        Err(ReadError::NoSuchComponent { component: c, .. }) if c == component.velocity() => {
+            solver::read(&file.path, None, &select(vec![component.name().into()]))
+        }
+        result => result,
+    }
+}
+
+fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadError> {
+    let id = match *source {
+        ForceSource::Contact { id, side, .. } => WantedId { id, side },
+        ForceSource::Body { node, .. } => WantedId { id: node, side: None },
+    };
+    let component = force_component(source).to_string();
+    let selection = Selection {
+        ids: Some(vec![id]),
+        components: Some(vec![component]),
+        section: file.section.clone(),
+        ..Selection::all()
+    };
+    solver::read(&file.path, None, &selection)
+}
+
+/// The history of a wall or of one side of an interface; without a side named, SURFA's.
+fn contact_history<'a>(
+    file: &'a SolverFile,
+    id: i64,
+    side: Option<Side>,
+    component: &str,
+) -> Option<&'a History> {
+    let bare = file.history(Some(EntityId::new(id)), component);
+    let of_side = |side| file.history(Some(EntityId { id, side: Some(side) }), component);
+    match side {
+        Some(side) => of_side(side).or(bare),
+        None => bare.or_else(|| of_side(Side::SurfA)),
+    }
+}
