@@ -7,10 +7,10 @@
 //! where a deflection turns, so the error does not show a step over the turn, which would leave
 //! the memory short of the top: steps end at turns.
 
-use super::integrator::{Record, Run, RunSettings, SimulationError};
 use super::interface::ForceLaw;
 use super::ledger::{Account, Balance};
 use super::rows::{Places, Rows};
+use super::run::{Record, Run, RunSettings, SimulationError};
 use super::train::{Body, Chain};
 use super::watch::Watch;
 
@@ -207,7 +207,7 @@ pub(super) fn run(
 ) -> Result<(), SimulationError> {
     let (bodies, interfaces) = (chain.bodies(), chain.interfaces());
     let n = bodies.len();
-    let start = super::engine::first_contact(chain);
+    let start = chain.first_contact();
     let mut y = vec![0.0; 2 * n + 3];
     for i in 0..n {
         (y[i], y[n + i]) = (start[i], bodies[i].speed_m_per_s);

@@ -249,4 +249,32 @@ impl Chain {
         }
         shortest
     }
+
+    /// Time of free motion in s until the first gap or slack closes, and the times of each
+    /// interface's; 0 if none closes.
+    pub(super) fn flights(&self) -> (f64, Vec<(f64, f64)>) {
+        let flight = |gap_m: f64, closing: f64| match closing > 0.0 {
+            true => gap_m / closing,
+            false => f64::INFINITY,
+        };
+        let speed = |i: usize| self.bodies.get(i).map_or(0.0, |b| b.speed_m_per_s);
+        let flights: Vec<(f64, f64)> = self
+            .interfaces
+            .iter()
+            .enumerate()
+            .map(|(k, interface)| {
+                let closing = speed(k) - speed(k + 1);
+                let slack = interface.tension.as_ref().map_or(f64::INFINITY, |t| t.slack_m);
+                (flight(interface.gap_m, closing), flight(slack, -closing))
+            })
+            .collect();
+        let shortest = flights.iter().map(|(a, b)| a.min(*b)).fold(f64::INFINITY, f64::min);
+        (if shortest.is_finite() { shortest } else { 0.0 }, flights)
+    }
+
+    /// Positions of the bodies at the first contact, in m.
+    pub(super) fn first_contact(&self) -> Vec<f64> {
+        let (flight_s, _) = self.flights();
+        self.bodies.iter().map(|b| b.speed_m_per_s * flight_s).collect()
+    }
 }

@@ -1,7 +1,7 @@
 //! Watch: extremes and events of a run between its outputs.
 
-use super::integrator::{Record, Run};
 use super::rows::{LANES, Place, Places, Row, Rows, each, larger};
+use super::run::{Record, Run};
 use super::train::Chain;
 
 /// Window of the moving mean deceleration, in s (EN 15227).

@@ -1,36 +1,15 @@
 //! Events: what happens where an interface leaves its piece within a step.
 
-use super::super::bank::{At, Bank, Move};
-use super::super::integrator::{Method, SimulationError};
+use super::super::bank::{At, Move};
 use super::super::rows::Place;
-use super::{Engine, ahead};
+use super::super::run::{Method, SimulationError};
+use super::state::{Engine, Missed, Turn, ahead};
 
 /// Rounding of a sum of works, and the share of a force from which on it counts as noise.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const NOISE: f64 = 1e-5;
 
-/// An interface that has left its piece within the step.
-pub(super) struct Missed {
-    pulls: bool,
-    k: usize,
-    place: Place,
-    /// Work done up to the start of the step in J, and its integral over the deflection.
-    work_j: f64,
-    sum_jm: f64,
-    what: Move,
-    turn: Option<Turn>,
-}
-
-/// The deflection was largest `after_s` after the step's start (or before it); there the
-/// stiffness changed by `stiffer_n_per_m`. `rate` is the second derivative of the deflection.
-#[derive(Clone, Copy)]
-struct Turn {
-    after_s: f64,
-    rate: f64,
-    stiffer_n_per_m: f64,
-}
-
-impl<'a> Engine<'a> {
+impl Engine<'_> {
     /// Finds the pieces of all interfaces that have left theirs.
     #[cold]
     #[inline(never)]
@@ -45,22 +24,6 @@ impl<'a> Engine<'a> {
         }
         left.clear();
         self.left = left;
-    }
-
-    #[inline(always)]
-    fn bank(&self, pulls: bool) -> &Bank<'a> {
-        match &self.pull {
-            Some(pull) if pulls => pull,
-            _ => &self.push,
-        }
-    }
-
-    #[inline(always)]
-    fn bank_mut(&mut self, pulls: bool) -> &mut Bank<'a> {
-        match &mut self.pull {
-            Some(pull) if pulls => pull,
-            _ => &mut self.push,
-        }
     }
 
     #[inline(always)]
@@ -252,18 +215,6 @@ impl<'a> Engine<'a> {
         if impulse.is_finite() {
             self.rates.damped_j += impulse * closing;
             self.push_apart(m.k, impulse, 0.0);
-        }
-    }
-
-    /// An impulse between the bodies at interface `k`, and its moment about the step's end.
-    fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
-        let (behind, ahead) = (self.places.of(k), self.places.of(k + 1));
-        self.v[behind] -= impulse * self.per_kg[behind];
-        self.v[ahead] += impulse * self.per_kg[ahead];
-        self.x_m[behind] -= moment * self.per_kg[behind];
-        self.x_m[ahead] += moment * self.per_kg[ahead];
-        if k + 1 == self.chain.bodies().len() {
-            self.wall_impulse += impulse;
         }
     }
 

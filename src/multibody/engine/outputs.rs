@@ -1,11 +1,11 @@
 //! Outputs: the state at the end of each output interval, into the ledger and the histories.
 
 use super::super::bank::At;
-use super::super::integrator::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
 use super::super::ledger::{Account, Balance};
 use super::super::rows::{LANES, Places, Row, Rows, each, larger};
+use super::super::run::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
 use super::super::train::Chain;
-use super::Engine;
+use super::state::Engine;
 
 /// Outputs that are kept before they are appended to the histories: one history at a time is
 /// written faster than one value of each.

@@ -1,0 +1,79 @@
+//! The state at the first contact.
+
+use super::super::bank::{At, Bank};
+use super::super::rows::{Places, Rows};
+use super::super::train::{Chain, Tension};
+use super::super::watch::Watch;
+use super::state::{Engine, Rates};
+
+impl<'a> Engine<'a> {
+    /// The chain at its first contact.
+    pub(super) fn new(chain: &'a Chain, step_s: f64) -> Self {
+        let (bodies, interfaces) = (chain.bodies(), chain.interfaces());
+        let places = Places::new(bodies.len());
+        let laws: Vec<_> = interfaces.iter().map(|i| (Some(&*i.law), i.gap_m)).collect();
+        let couples = interfaces.iter().any(|i| i.tension.is_some());
+        let pull = couples.then(|| {
+            let law = |t: &'a Tension| (Some(&*t.law), t.slack_m);
+            let laws: Vec<_> =
+                interfaces.iter().map(|i| i.tension.as_ref().map_or((None, 0.0), law)).collect();
+            Bank::new(&places, &laws, -1.0)
+        });
+        let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, bodies.len(), value);
+        let net = couples || chain.has_rates();
+        let mut engine = Self {
+            chain,
+            x_m: of(&|_| 0.0),
+            v: of(&|i| bodies[i].speed_m_per_s),
+            a: of(&|_| 0.0),
+            a_start: of(&|_| 0.0),
+            by_contacts: chain.has_resistance().then(|| of(&|_| 0.0)),
+            mass_kg: of(&|i| bodies[i].mass_kg),
+            per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
+            push: Bank::new(&places, &laws, 1.0),
+            net_n: net.then(|| of(&|_| 0.0)),
+            pull,
+            missed: Vec::new(),
+            left: Vec::new(),
+            step_s,
+            end_s: 0.0,
+            rates: Rates::default(),
+            wall_impulse: 0.0,
+            watch: Watch::new(chain, &places),
+            places,
+        };
+        engine.move_to_first_contact();
+        engine.accelerate_and_kick::<0>(At::End, 0.0, 0.0);
+        for k in 0..interfaces.len() {
+            if engine.push.is_loading(k) {
+                engine.watch.contact(k, engine.closing(k));
+                if !engine.push.presses(k) {
+                    continue;
+                }
+                for i in engine.sides(k) {
+                    engine.watch.body(i, true, 0.0, bodies[i].speed_m_per_s);
+                }
+            }
+        }
+        engine
+    }
+
+    /// Free motion until the first gap closes; none if no interface closes.
+    fn move_to_first_contact(&mut self) {
+        let (flight_s, flights) = self.chain.flights();
+        self.drift::<0>(flight_s);
+        for (k, interface) in self.chain.interfaces().iter().enumerate() {
+            let closing = self.closing(k);
+            // Exactly 0 where contact begins, whatever the rounding.
+            let at = |begins_s: f64, closing: f64, gap_m: f64| match begins_s == flight_s {
+                true => 0.0,
+                false => closing * flight_s - gap_m,
+            };
+            let deflection = at(flights[k].0, closing, interface.gap_m);
+            self.push.place(k, deflection, closing > 0.0);
+            if let (Some(pull), Some(tension)) = (&mut self.pull, &interface.tension) {
+                pull.place(k, at(flights[k].1, -closing, tension.slack_m), closing < 0.0);
+            }
+        }
+    }
+}
