@@ -351,7 +351,7 @@ fn fit_nsdm(
 ) -> Result<(Row, NsdmReport), CompareError> {
     let own = Reference::of(fixed)?;
     let target = nsdm_target(&own)?;
-    let choices = nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
+    let choices = nsdm::FitSettings { start: settings.nsdm_start, ..nsdm::FitSettings::default() };
     let mut fits = Vec::new();
     for seed in settings.nsdm_seeds() {
         let start = Instant::now();

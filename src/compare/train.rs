@@ -273,7 +273,7 @@ fn methods<'a>(
         for (name, (case, _)) in &groups {
             let target = nsdm_target(&Reference::of(case)?)?;
             let choices =
-                nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
+                nsdm::FitSettings { start: settings.nsdm_start, ..nsdm::FitSettings::default() };
             let seeds: Vec<u64> = settings.nsdm_seeds();
             let fits = nsdm::fit_seeds(&target, &choices, &seeds)?;
             let best = fits.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective));

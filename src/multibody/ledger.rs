@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::train::Chain;
+use super::chain::Chain;
 
 /// Energies in J and the worst imbalances over a run.
 ///

@@ -4,25 +4,25 @@
 //! body `i`, acting on its deflection `δ = (x_i − x_{i+1}) − gap`, and `R_i` the resistance of
 //! the track.
 
-mod bank;
+mod chain;
+mod contacts;
 mod damping;
 mod engine;
-mod extrapolation;
-mod interface;
+mod law;
 mod ledger;
+mod recorder;
+mod reference;
 mod rows;
 mod run;
-mod train;
-mod watch;
 
+pub use chain::{
+    Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension,
+};
 pub use damping::{Damping, DampingError};
-pub use interface::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
+pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 pub use ledger::Ledger;
 pub use run::{
     BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError,
-};
-pub use train::{
-    Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension,
 };
 
 /// A curve's own run ends where the curve does, but for rounding.
@@ -66,7 +66,7 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
     }
     run.reserve(outputs + 1, settings.record);
     match settings.method {
-        Method::Reference => extrapolation::run(chain, settings, &mut run, outputs)?,
+        Method::Reference => reference::run(chain, settings, &mut run, outputs)?,
         method => {
             let times = (outputs, settings.output_interval_s);
             engine::run(chain, method, settings.record, &mut run, per_output, times)?;

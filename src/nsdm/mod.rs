@@ -9,7 +9,7 @@
 //! and look at their [`Identifiability`].
 //!
 //! ```
-//! use crumple::nsdm::{Settings, Target, fit};
+//! use crumple::nsdm::{FitSettings, Target, fit};
 //!
 //! // A mass of 24 t that bounces off a spring of 40 MN/m.
 //! let omega = (40e6_f64 / 24e3).sqrt();
@@ -18,7 +18,7 @@
 //! let acceleration = time_s.iter().map(|t| -10.0 * omega * (omega * t).sin()).collect();
 //!
 //! let target = Target::new(24e3, 10.0, time_s, velocity, acceleration)?;
-//! let settings = Settings { population: 30, generations: 20, ..Settings::default() };
+//! let settings = FitSettings { population: 30, generations: 20, ..FitSettings::default() };
 //! let fit = fit(&target, &settings, 1)?;
 //! assert!(fit.velocity_l1 < 0.05);
 //! # Ok::<(), crumple::nsdm::NsdmError>(())
@@ -201,7 +201,7 @@ pub enum Start {
 
 /// How long and for what to search; the default is the reference method.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct FitSettings {
     /// Individuals of a generation, at least 4.
     pub population: usize,
     /// Generations of the genetic algorithm; 0 leaves the first population.
@@ -213,7 +213,7 @@ pub struct Settings {
     pub start: Start,
 }
 
-impl Default for Settings {
+impl Default for FitSettings {
     fn default() -> Self {
         Self {
             population: 120,
@@ -253,8 +253,9 @@ pub struct Fit {
 /// # Errors
 /// [`NsdmError`] for settings out of range, or if no law found has a finite motion
 /// ([`NsdmError::Diverged`]).
-pub fn fit(target: &Target, settings: &Settings, seed: u64) -> Result<Fit, NsdmError> {
-    let Settings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } = *settings;
+pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, NsdmError> {
+    let FitSettings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } =
+        *settings;
     if !(2 * genetic::ELITES..=MAX_POPULATION).contains(&population) {
         return Err(NsdmError::Population { population });
     }
@@ -292,14 +293,14 @@ pub fn fit(target: &Target, settings: &Settings, seed: u64) -> Result<Fit, NsdmE
 /// As [`fit`].
 pub fn fit_seeds(
     target: &Target,
-    settings: &Settings,
+    settings: &FitSettings,
     seeds: &[u64],
 ) -> Result<Vec<Fit>, NsdmError> {
     seeds.par_iter().map(|&seed| fit(target, settings, seed)).collect()
 }
 
 /// Individuals at least squares, if the settings ask for them.
-fn first_individuals(target: &Target, settings: &Settings, seed: u64) -> Vec<Genes> {
+fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<Genes> {
     let count = match settings.start {
         Start::Random => 0,
         Start::LeastSquares => settings.population.div_ceil(LEAST_SQUARES_SHARE),
@@ -361,11 +362,11 @@ mod tests {
         let (light, stiff) = (target(10.0), [1.0; genes::VARIABLES]);
         let steps = Steps::new(&light.time_s).unwrap();
         assert_eq!(light.objective(&stiff, &steps, 1.0), PENALTY);
-        let settings = Settings {
+        let settings = FitSettings {
             population: 20,
             generations: 5,
             simplex_evaluations: 200,
-            ..Settings::default()
+            ..FitSettings::default()
         };
         let found = fit(&light, &settings, 1).unwrap();
         assert!(found.objective < PENALTY && found.history.iter().all(|h| !h.is_nan()));

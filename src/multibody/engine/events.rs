@@ -1,9 +1,9 @@
 //! Events: what happens where an interface leaves its piece within a step.
 
-use super::super::bank::{At, Move};
-use super::super::rows::Place;
+use super::super::contacts::{Move, StepPoint};
+use super::super::rows::Slot;
 use super::super::run::{Method, SimulationError};
-use super::state::{Engine, Missed, Turn, ahead};
+use super::state::{Crossing, Engine, Turn, ahead};
 
 /// Rounding of a sum of works, and the share of a force from which on it counts as noise.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -13,33 +13,33 @@ impl Engine<'_> {
     /// Finds the pieces of all interfaces that have left theirs.
     #[cold]
     #[inline(never)]
-    pub(super) fn settle(&mut self, at: At, h: f64, share: f64) {
+    pub(super) fn settle(&mut self, at: StepPoint, h: f64, share: f64) {
         let mut left = std::mem::take(&mut self.left);
-        self.push.left(|place| left.push((false, place)));
+        self.push.left(|slot| left.push((false, slot)));
         if let Some(pull) = &self.pull {
-            pull.left(|place| left.push((true, place)));
+            pull.left(|slot| left.push((true, slot)));
         }
-        for &(pulls, place) in &left {
-            self.settle_one(pulls, place, at, h, share);
+        for &(pulls, slot) in &left {
+            self.settle_one(pulls, slot, at, h, share);
         }
         left.clear();
         self.left = left;
     }
 
     #[inline(always)]
-    fn settle_one(&mut self, pulls: bool, place: Place, at: At, h: f64, share: f64) {
-        let k = self.places.index(place);
+    fn settle_one(&mut self, pulls: bool, slot: Slot, at: StepPoint, h: f64, share: f64) {
+        let k = self.layout.index(slot);
         let known = self.missed.iter().position(|m| m.k == k && m.pulls == pulls);
         let known = known.unwrap_or_else(|| {
-            let (work_j, sum_jm) = self.bank(pulls).work(At::Start, place);
+            let (work_j, sum_jm) = self.contacts(pulls).work(StepPoint::Start, slot);
             let what = Move::default();
-            self.missed.push(Missed { pulls, k, place, work_j, sum_jm, what, turn: None });
+            self.missed.push(Crossing { pulls, k, slot, work_j, sum_jm, what, turn: None });
             self.missed.len() - 1
         });
-        let what = if self.bank(pulls).turns(at, k, place) {
+        let what = if self.contacts(pulls).turns(at, k, slot) {
             self.turn(pulls, k, known, at, h, share)
         } else {
-            self.bank_mut(pulls).settle(at, k, place, None)
+            self.contacts_mut(pulls).settle(at, k, slot, None)
         };
         let seen = &mut self.missed[known].what;
         seen.loads |= what.loads;
@@ -50,8 +50,16 @@ impl Engine<'_> {
     }
 
     /// The deflection of an interface has begun to fall.
-    fn turn(&mut self, pulls: bool, k: usize, missed: usize, at: At, h: f64, share: f64) -> Move {
-        let place = self.places.of(k);
+    fn turn(
+        &mut self,
+        pulls: bool,
+        k: usize,
+        missed: usize,
+        at: StepPoint,
+        h: f64,
+        share: f64,
+    ) -> Move {
+        let slot = self.layout.of(k);
         // Where it was largest: the vertex of the parabola through the nearest state whose speed
         // is known.
         let sign = if pulls { -1.0 } else { 1.0 };
@@ -62,14 +70,14 @@ impl Engine<'_> {
         let near_s = if share >= 0.0 { 0.0 } else { h };
         let after_s = (near_s + into).clamp(-h, h);
         let into_s = after_s - near_s;
-        let bank = self.bank_mut(pulls);
-        let near = bank.deflection_m(if share >= 0.0 { At::Start } else { at }, k);
+        let contacts = self.contacts_mut(pulls);
+        let near = contacts.deflection_m(if share >= 0.0 { StepPoint::Start } else { at }, k);
         let top_m = near + (speed + 0.5 * rate * into_s) * into_s;
-        let stiffness = bank.slope_n_per_m(place);
-        let what = bank.settle(at, k, place, Some(top_m));
-        let stiffer_n_per_m = bank.slope_n_per_m(place) - stiffness;
-        let largest_m = bank.largest_m(at, k);
-        self.watch.turned(pulls, k, largest_m, self.end_s - h + after_s);
+        let stiffness = contacts.slope_n_per_m(slot);
+        let what = contacts.settle(at, k, slot, Some(top_m));
+        let stiffer_n_per_m = contacts.slope_n_per_m(slot) - stiffness;
+        let largest_m = contacts.largest_m(at, k);
+        self.events.turned(pulls, k, largest_m, self.end_s - h + after_s);
         let turn = &mut self.missed[missed].turn;
         *turn = turn.or(Some(Turn { after_s, rate, stiffer_n_per_m }));
         what
@@ -98,7 +106,7 @@ impl Engine<'_> {
             }
         }
         if happened {
-            self.watch_contacts(&missed, h, method);
+            self.record_contacts(&missed, h, method);
         }
         self.missed = missed;
         self.missed.clear();
@@ -107,13 +115,13 @@ impl Engine<'_> {
 
     /// Fails if a curve that must not be left has ended.
     #[inline(always)]
-    fn check_end(&self, m: &Missed) -> Result<(), SimulationError> {
+    fn check_end(&self, m: &Crossing) -> Result<(), SimulationError> {
         let interface = &self.chain.interfaces()[m.k];
-        let (law, bank, what) = match (&interface.tension, &self.pull) {
+        let (law, contacts, what) = match (&interface.tension, &self.pull) {
             (Some(tension), Some(pull)) if m.pulls => (&tension.law, pull, "pulled apart by"),
             _ => (&interface.law, &self.push, "crushed"),
         };
-        let deflection_m = bank.deflection_m(At::End, m.k);
+        let deflection_m = contacts.deflection_m(StepPoint::End, m.k);
         if !law.is_beyond_end(deflection_m) {
             return Ok(());
         }
@@ -123,29 +131,32 @@ impl Engine<'_> {
     }
 
     /// Forces that began or ended in the step; restitution is that of compression.
-    fn watch_contacts(&mut self, missed: &[Missed], h: f64, method: Method) {
+    fn record_contacts(&mut self, missed: &[Crossing], h: f64, method: Method) {
         for m in missed {
             let k = m.k;
             let behind = ahead(method) * h;
             let rate = self.between(&self.a, k);
             let closing = self.closing(k) - behind * rate;
-            let bank = self.bank(m.pulls);
-            let (start, end) = (bank.deflection_m(At::Start, k), bank.deflection_m(At::End, k));
+            let contacts = self.contacts(m.pulls);
+            let (start, end) = (
+                contacts.deflection_m(StepPoint::Start, k),
+                contacts.deflection_m(StepPoint::End, k),
+            );
             let end_s = self.end_s;
             let crossing = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
             if m.what.loads && start <= 0.0 && !m.pulls {
                 // What the contact has not yet braked.
                 let before = closing - h * rate * end / (end - start);
-                self.watch.contact(k, before.max(closing));
+                self.events.contact(k, before.max(closing));
             }
             if let Some(at_m) = m.what.pressed_m {
-                self.watch_sides(k, crossing(at_m), behind);
+                self.record_sides(k, crossing(at_m), behind);
             }
             if let Some(at_m) = m.what.released_m {
                 if !m.pulls {
-                    self.watch.released(k, -closing);
+                    self.events.released(k, -closing);
                 }
-                self.watch_sides(k, crossing(at_m), behind);
+                self.record_sides(k, crossing(at_m), behind);
             }
         }
     }
@@ -153,25 +164,28 @@ impl Engine<'_> {
     /// Impulse and moment about the step's end that the quadrature has missed where the
     /// deflection went on in one direction.
     #[inline(always)]
-    fn missed_along(&self, m: &Missed, h: f64, method: Method) -> (f64, f64) {
-        let bank = self.bank(m.pulls);
-        let place = m.place;
-        let moved = bank.deflections_m(At::End)[place] - bank.deflections_m(At::Start)[place];
+    fn missed_along(&self, m: &Crossing, h: f64, method: Method) -> (f64, f64) {
+        let contacts = self.contacts(m.pulls);
+        let slot = m.slot;
+        let moved = contacts.deflections_m(StepPoint::End)[slot]
+            - contacts.deflections_m(StepPoint::Start)[slot];
         if moved == 0.0 {
             return (0.0, 0.0);
         }
-        let (first, last) = (bank.forces_n(At::Start)[place], bank.forces_n(At::End)[place]);
+        let (first, last) =
+            (contacts.forces_n(StepPoint::Start)[slot], contacts.forces_n(StepPoint::End)[slot]);
         // Means over the step of the force, and of the force times the share of the step that is
         // still to come, as the quadrature has them.
         let (by_rule, ahead_by_rule) = match method {
             Method::FourthOrder => {
-                let inside = bank.forces_n(At::Inside)[place] + bank.gradient_n()[place];
+                let inside =
+                    contacts.forces_n(StepPoint::Inside)[slot] + contacts.gradient_n()[slot];
                 ((first + 4.0 * inside + last) / 6.0, first / 6.0 + inside / 3.0)
             }
             Method::Verlet | Method::Reference => (0.5 * (first + last), 0.5 * first),
         };
         // The same from the law, at constant speed.
-        let (work_j, sum_jm) = bank.work(At::End, place);
+        let (work_j, sum_jm) = contacts.work(StepPoint::End, slot);
         let mean = (work_j - m.work_j) / moved;
         // Over next to no way the difference of two works is nothing but their rounding.
         let scale = mean.abs().max(first.abs()).max(last.abs());
@@ -197,18 +211,21 @@ impl Engine<'_> {
 
     /// Impulse of a damper that acted over a part of the step only, where its contact closed or
     /// a coupling opened; the quadrature has half of it.
-    fn damp_part_of_step(&mut self, m: &Missed, h: f64) {
+    fn damp_part_of_step(&mut self, m: &Crossing, h: f64) {
         let interface = &self.chain.interfaces()[m.k];
         let Some(damping) = &interface.damping else { return };
-        let bank = self.bank(m.pulls);
-        let (start, end) = (bank.deflection_m(At::Start, m.k), bank.deflection_m(At::End, m.k));
+        let contacts = self.contacts(m.pulls);
+        let (start, end) = (
+            contacts.deflection_m(StepPoint::Start, m.k),
+            contacts.deflection_m(StepPoint::End, m.k),
+        );
         let mut part = 0.0;
         if let Some(closed_m) = m.what.closed_m {
             part += ((end - closed_m) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
         // What only pushes has no force any more when it opens.
         if m.what.opened && interface.tension.is_some() {
-            part += ((bank.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
+            part += ((contacts.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
         let closing = self.closing(m.k) - ahead(Method::Verlet) * h * self.between(&self.a, m.k);
         let impulse = part * h * damping.at(closing) * closing;
@@ -218,15 +235,16 @@ impl Engine<'_> {
         }
     }
 
-    /// Tells the watch whether forces act on the bodies at interface `k` from `at_s` on; `v` is
+    /// Tells the recorder whether forces act on the bodies at interface `k` from `at_s` on; `v` is
     /// `ahead_s` ahead.
-    fn watch_sides(&mut self, k: usize, at_s: f64, ahead_s: f64) {
+    fn record_sides(&mut self, k: usize, at_s: f64, ahead_s: f64) {
         for i in self.sides(k) {
-            let forces =
-                |j: usize| j < self.chain.interfaces().len() && self.force_n(At::End, j) != 0.0;
+            let forces = |j: usize| {
+                j < self.chain.interfaces().len() && self.force_n(StepPoint::End, j) != 0.0
+            };
             let touched = forces(i) || i > 0 && forces(i - 1);
-            let place = self.places.of(i);
-            self.watch.body(i, touched, at_s, self.v[place] - ahead_s * self.a[place]);
+            let slot = self.layout.of(i);
+            self.events.body(i, touched, at_s, self.v[slot] - ahead_s * self.a[slot]);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Forces and accelerations at the present positions and speeds.
 
-use super::super::bank::{At, Bank};
+use super::super::contacts::{Contacts, StepPoint};
 use super::super::rows::{behind, each};
 use super::state::Engine;
 
@@ -9,7 +9,7 @@ impl Engine<'_> {
     /// `share` is the part of a step by which `v` is ahead of the step's start, below 0 if it
     /// lags behind the step's end (and `a` is that of its middle).
     #[inline(always)]
-    pub(super) fn evaluate<const N: usize>(&mut self, at: At, h: f64, share: f64) {
+    pub(super) fn evaluate<const N: usize>(&mut self, at: StepPoint, h: f64, share: f64) {
         let pushed = self.push.evaluate::<N>(&self.x_m, at);
         let pulled = self.pull.as_mut().is_some_and(|pull| pull.evaluate::<N>(&self.x_m, at));
         if pushed || pulled {
@@ -20,12 +20,17 @@ impl Engine<'_> {
     /// Accelerations from the forces, then speeds by `kick_s`; where forces depend on speeds,
     /// `v` is `lag` seconds behind.
     #[inline(always)]
-    pub(super) fn accelerate_and_kick<const N: usize>(&mut self, at: At, lag_s: f64, kick_s: f64) {
+    pub(super) fn accelerate_and_kick<const N: usize>(
+        &mut self,
+        at: StepPoint,
+        lag_s: f64,
+        kick_s: f64,
+    ) {
         if self.net_n.is_some() {
             self.accelerate_by_all(at, lag_s);
             return self.kick::<N>(kick_s);
         }
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let forces = self.push.forces_n(at).values(n);
         let per_kg = self.per_kg.values(n);
         let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
@@ -38,8 +43,8 @@ impl Engine<'_> {
 
     /// Accelerations with tension, dampers and resistance.
     #[inline(never)]
-    pub(super) fn accelerate_by_all(&mut self, at: At, lag_s: f64) {
-        let n = self.places.rows();
+    pub(super) fn accelerate_by_all(&mut self, at: StepPoint, lag_s: f64) {
+        let n = self.layout.rows();
         let Some(mut net) = self.net_n.take() else { return };
         net.clone_from(self.push.forces_n(at));
         if let Some(pull) = &self.pull {
@@ -52,39 +57,41 @@ impl Engine<'_> {
         for (k, interface) in self.chain.interfaces().iter().enumerate() {
             let Some(damping) = &interface.damping else { continue };
             // At 0 only where bodies meet at the start.
-            let touches = |bank: &Bank<'_>| bank.deflection_m(at, k) >= 0.0 && !bank.is_open(k);
+            let touches = |contacts: &Contacts<'_>| {
+                contacts.deflection_m(at, k) >= 0.0 && !contacts.is_open(k)
+            };
             let pulls = self.pull.as_ref().is_some_and(|pull| pull.has_law(k) && touches(pull));
             if !(touches(&self.push) || pulls) {
                 continue;
             }
             let closing = self.closing(k) + lag_s * self.between(&self.a_start, k);
-            let spring = net[self.places.of(k)];
+            let spring = net[self.layout.of(k)];
             let mut force = spring + damping.at(closing) * closing;
             if interface.tension.is_none() {
                 // What only pushes does not pull when it opens fast.
                 force = force.max(0.0);
             }
-            net[self.places.of(k)] = force;
+            net[self.layout.of(k)] = force;
             self.rates.damper_w += (force - spring) * closing;
-            self.watch.peak_n(k, force);
-            self.watch.tension(k, -force, 0.0);
+            self.events.peak_n(k, force);
+            self.events.tension(k, -force, 0.0);
         }
         (self.rates.resistance_w, self.rates.resistance_n) = (0.0, 0.0);
         let mut behind = 0.0;
         for (i, body) in self.chain.bodies().iter().enumerate() {
-            let place = self.places.of(i);
+            let slot = self.layout.of(i);
             let mut resistance = 0.0;
             if !body.resistance.is_none() {
-                let v = self.v[place] + lag_s * self.a_start[place];
+                let v = self.v[slot] + lag_s * self.a_start[slot];
                 resistance = body.resistance.force_n(body.mass_kg, v);
                 self.rates.resistance_w += resistance * v;
                 self.rates.resistance_n += resistance;
             }
-            self.a[place] = (behind - net[place] - resistance) * self.per_kg[place];
+            self.a[slot] = (behind - net[slot] - resistance) * self.per_kg[slot];
             if let Some(by_contacts) = &mut self.by_contacts {
-                by_contacts[place] = (behind - net[place]) * self.per_kg[place];
+                by_contacts[slot] = (behind - net[slot]) * self.per_kg[slot];
             }
-            behind = net[place];
+            behind = net[slot];
         }
         self.net_n = Some(net);
     }
@@ -98,7 +105,7 @@ impl Engine<'_> {
         kick_s: f64,
         drift_s: f64,
     ) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let factor = h * h / 24.0;
         self.push.take_gradient::<N>(&self.a, factor);
         if let (Some(pull), Some(net)) = (&mut self.pull, &mut self.net_n) {
@@ -121,7 +128,7 @@ impl Engine<'_> {
             x[c] = each(|j| x[c][j] + drift_s * v[c][j]);
         }
         if self.chain.has_wall() {
-            let last = self.places.of(self.chain.bodies().len() - 1);
+            let last = self.layout.of(self.chain.bodies().len() - 1);
             let gradient = self.net_n.as_ref().unwrap_or(self.push.gradient_n());
             self.wall_impulse += kick_s * gradient[last];
         }

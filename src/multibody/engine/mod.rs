@@ -13,11 +13,11 @@ mod state;
 
 use multiversion::multiversion;
 
-use super::bank::At;
+use super::chain::Chain;
+use super::contacts::StepPoint;
+use super::recorder::LOOK_S;
 use super::run::{Method, Record, Run, SimulationError};
-use super::train::Chain;
-use super::watch::LOOK_S;
-use outputs::Recorder;
+use outputs::OutputRecorder;
 use state::{Engine, ahead};
 
 /// Runs the chain with `steps_per_output` steps of `step_s` each.
@@ -30,10 +30,10 @@ pub(super) fn run(
     (outputs, interval_s): (usize, f64),
 ) -> Result<(), SimulationError> {
     let mut engine = Engine::new(chain, run.step_s);
-    let mut recorder = Recorder::new(chain, &engine.places, record);
+    let mut recorder = OutputRecorder::new(chain, &engine.layout, record);
     engine.output::<0>(&mut recorder, run, 0.0)?;
     let times = (outputs, interval_s);
-    let run_outputs = match engine.places.rows() {
+    let run_outputs = match engine.layout.rows() {
         1 => self::outputs::<1>,
         2 => self::outputs::<2>,
         3 => self::outputs::<3>,
@@ -52,7 +52,7 @@ pub(super) fn run(
 fn outputs<'a, const N: usize>(
     engine: &mut Engine<'a>,
     method: Method,
-    recorder: &mut Recorder,
+    recorder: &mut OutputRecorder,
     run: &mut Run,
     steps_per_output: usize,
     (outputs, interval_s): (usize, f64),
@@ -63,7 +63,7 @@ fn outputs<'a, const N: usize>(
     let (mut done, mut until_look) = (0, steps_per_look);
     for output in 1..=outputs {
         engine.kick::<N>(ahead * h);
-        engine.on_wall(At::End, ahead * h);
+        engine.on_wall(StepPoint::End, ahead * h);
         for step in 1..=steps_per_output {
             done += 1;
             engine.end_s = done as f64 * h;
@@ -81,7 +81,7 @@ fn outputs<'a, const N: usize>(
             }
         }
         engine.kick::<N>(-ahead * h);
-        engine.on_wall(At::End, -ahead * h);
+        engine.on_wall(StepPoint::End, -ahead * h);
         engine.output::<N>(recorder, run, output as f64 * interval_s)?;
     }
     Ok(())
@@ -95,9 +95,9 @@ impl Engine<'_> {
             (self.rates.damper_w, self.rates.resistance_w, self.rates.resistance_n);
         self.next();
         self.drift::<N>(h);
-        self.evaluate::<N>(At::End, h, 0.5);
-        self.accelerate_and_kick::<N>(At::End, 0.5 * h, h);
-        self.on_wall(At::End, h);
+        self.evaluate::<N>(StepPoint::End, h, 0.5);
+        self.accelerate_and_kick::<N>(StepPoint::End, 0.5 * h, h);
+        self.on_wall(StepPoint::End, h);
         if self.net_n.is_some() {
             let mean = 0.5 * h;
             self.rates.damped_j += mean * (damper_w + self.rates.damper_w);
@@ -113,35 +113,35 @@ impl Engine<'_> {
     fn fourth_order<const N: usize>(&mut self, h: f64) {
         self.next();
         self.drift::<N>(0.5 * h);
-        self.evaluate::<N>(At::Inside, h, 1.0 / 6.0);
-        self.accelerate_and_kick::<N>(At::Inside, 0.0, 0.0);
-        self.on_wall(At::Inside, 2.0 / 3.0 * h);
+        self.evaluate::<N>(StepPoint::Inside, h, 1.0 / 6.0);
+        self.accelerate_and_kick::<N>(StepPoint::Inside, 0.0, 0.0);
+        self.on_wall(StepPoint::Inside, 2.0 / 3.0 * h);
         self.add_gradient_kick_and_drift::<N>(h, 2.0 / 3.0 * h, 0.5 * h);
-        self.evaluate::<N>(At::End, h, -1.0 / 6.0);
-        self.accelerate_and_kick::<N>(At::End, 0.0, h / 3.0);
-        self.on_wall(At::End, h / 3.0);
+        self.evaluate::<N>(StepPoint::End, h, -1.0 / 6.0);
+        self.accelerate_and_kick::<N>(StepPoint::End, 0.0, h / 3.0);
+        self.on_wall(StepPoint::End, h / 3.0);
     }
 
-    /// Tells the watch where forces on bodies have begun or changed their sign since the last
+    /// Tells the recorder where forces on bodies have begun or changed their sign since the last
     /// look.
     #[inline(always)]
     fn look<const N: usize>(&mut self, ahead_s: f64) {
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
-        if self.watch.is_news::<N>(a) {
+        if self.events.is_news::<N>(a) {
             self.follow_bodies(ahead_s);
         }
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
-        self.watch.looked::<N>(a, self.end_s);
+        self.events.looked::<N>(a, self.end_s);
     }
 
     #[cold]
     #[inline(never)]
     fn follow_bodies(&mut self, ahead_s: f64) {
         for i in 0..self.chain.bodies().len() {
-            let place = self.places.of(i);
-            let a = self.by_contacts.as_ref().unwrap_or(&self.a)[place];
-            let v = self.v[place] - ahead_s * self.a[place];
-            self.watch.follow(i, self.end_s, v, a);
+            let slot = self.layout.of(i);
+            let a = self.by_contacts.as_ref().unwrap_or(&self.a)[slot];
+            let v = self.v[slot] - ahead_s * self.a[slot];
+            self.events.follow(i, self.end_s, v, a);
         }
     }
 }

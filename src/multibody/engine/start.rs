@@ -1,25 +1,25 @@
 //! The state at the first contact.
 
-use super::super::bank::{At, Bank};
-use super::super::rows::{Places, Rows};
-use super::super::train::{Chain, Tension};
-use super::super::watch::Watch;
+use super::super::chain::{Chain, Tension};
+use super::super::contacts::{Contacts, StepPoint};
+use super::super::recorder::EventRecorder;
+use super::super::rows::{Layout, Rows};
 use super::state::{Engine, Rates};
 
 impl<'a> Engine<'a> {
     /// The chain at its first contact.
     pub(super) fn new(chain: &'a Chain, step_s: f64) -> Self {
         let (bodies, interfaces) = (chain.bodies(), chain.interfaces());
-        let places = Places::new(bodies.len());
+        let layout = Layout::new(bodies.len());
         let laws: Vec<_> = interfaces.iter().map(|i| (Some(&*i.law), i.gap_m)).collect();
         let couples = interfaces.iter().any(|i| i.tension.is_some());
         let pull = couples.then(|| {
             let law = |t: &'a Tension| (Some(&*t.law), t.slack_m);
             let laws: Vec<_> =
                 interfaces.iter().map(|i| i.tension.as_ref().map_or((None, 0.0), law)).collect();
-            Bank::new(&places, &laws, -1.0)
+            Contacts::new(&layout, &laws, -1.0)
         });
-        let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, bodies.len(), value);
+        let of = |value: &dyn Fn(usize) -> f64| Rows::of(&layout, bodies.len(), value);
         let net = couples || chain.has_rates();
         let mut engine = Self {
             chain,
@@ -30,7 +30,7 @@ impl<'a> Engine<'a> {
             by_contacts: chain.has_resistance().then(|| of(&|_| 0.0)),
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
-            push: Bank::new(&places, &laws, 1.0),
+            push: Contacts::new(&layout, &laws, 1.0),
             net_n: net.then(|| of(&|_| 0.0)),
             pull,
             missed: Vec::new(),
@@ -39,19 +39,19 @@ impl<'a> Engine<'a> {
             end_s: 0.0,
             rates: Rates::default(),
             wall_impulse: 0.0,
-            watch: Watch::new(chain, &places),
-            places,
+            events: EventRecorder::new(chain, &layout),
+            layout,
         };
         engine.move_to_first_contact();
-        engine.accelerate_and_kick::<0>(At::End, 0.0, 0.0);
+        engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);
         for k in 0..interfaces.len() {
             if engine.push.is_loading(k) {
-                engine.watch.contact(k, engine.closing(k));
+                engine.events.contact(k, engine.closing(k));
                 if !engine.push.presses(k) {
                     continue;
                 }
                 for i in engine.sides(k) {
-                    engine.watch.body(i, true, 0.0, bodies[i].speed_m_per_s);
+                    engine.events.body(i, true, 0.0, bodies[i].speed_m_per_s);
                 }
             }
         }
@@ -70,9 +70,9 @@ impl<'a> Engine<'a> {
                 false => closing * flight_s - gap_m,
             };
             let deflection = at(flights[k].0, closing, interface.gap_m);
-            self.push.place(k, deflection, closing > 0.0);
+            self.push.set_start(k, deflection, closing > 0.0);
             if let (Some(pull), Some(tension)) = (&mut self.pull, &interface.tension) {
-                pull.place(k, at(flights[k].1, -closing, tension.slack_m), closing < 0.0);
+                pull.set_start(k, at(flights[k].1, -closing, tension.slack_m), closing < 0.0);
             }
         }
     }

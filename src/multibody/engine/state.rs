@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
-use super::super::bank::{At, Bank, Move};
-use super::super::rows::{Place, Places, Rows, each};
+use super::super::chain::Chain;
+use super::super::contacts::{Contacts, Move, StepPoint};
+use super::super::recorder::EventRecorder;
+use super::super::rows::{Layout, Rows, Slot, each};
 use super::super::run::Method;
-use super::super::train::Chain;
-use super::super::watch::Watch;
 
 /// Everything that changes from step to step.
 pub(super) struct Engine<'a> {
     pub(super) chain: &'a Chain,
-    pub(super) places: Places,
+    pub(super) layout: Layout,
     pub(super) x_m: Rows,
     /// Between the outputs half a step (Verlet) or a sixth (fourth order) ahead of `x`.
     pub(super) v: Rows,
@@ -22,19 +22,19 @@ pub(super) struct Engine<'a> {
     pub(super) by_contacts: Option<Rows>,
     pub(super) mass_kg: Rows,
     pub(super) per_kg: Rows,
-    pub(super) push: Bank<'a>,
-    pub(super) pull: Option<Bank<'a>>,
+    pub(super) push: Contacts<'a>,
+    pub(super) pull: Option<Contacts<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     pub(super) net_n: Option<Rows>,
-    pub(super) missed: Vec<Missed>,
+    pub(super) missed: Vec<Crossing>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
-    pub(super) left: Vec<(bool, Place)>,
+    pub(super) left: Vec<(bool, Slot)>,
     pub(super) step_s: f64,
     /// End of the present step.
     pub(super) end_s: f64,
     pub(super) rates: Rates,
     pub(super) wall_impulse: f64,
-    pub(super) watch: Watch,
+    pub(super) events: EventRecorder,
 }
 
 /// Work and impulse of what depends on speeds.
@@ -50,10 +50,10 @@ pub(super) struct Rates {
 }
 
 /// An interface that has left its piece within the step.
-pub(super) struct Missed {
+pub(super) struct Crossing {
     pub(super) pulls: bool,
     pub(super) k: usize,
-    pub(super) place: Place,
+    pub(super) slot: Slot,
     /// Work done up to the start of the step in J, and its integral over the deflection.
     pub(super) work_j: f64,
     pub(super) sum_jm: f64,
@@ -77,13 +77,13 @@ impl<'a> Engine<'a> {
     }
 
     /// Net force of interface `k`.
-    pub(super) fn force_n(&self, at: At, k: usize) -> f64 {
-        self.forces_n(at)[self.places.of(k)]
+    pub(super) fn force_n(&self, at: StepPoint, k: usize) -> f64 {
+        self.forces_n(at)[self.layout.of(k)]
     }
 
     /// Net forces of all interfaces.
     #[inline(always)]
-    pub(super) fn forces_n(&self, at: At) -> &Rows {
+    pub(super) fn forces_n(&self, at: StepPoint) -> &Rows {
         self.net_n.as_ref().unwrap_or(self.push.forces_n(at))
     }
 
@@ -94,12 +94,12 @@ impl<'a> Engine<'a> {
 
     /// By how much a value of the body behind interface `k` exceeds that of what is in front.
     pub(super) fn between(&self, values: &Rows, k: usize) -> f64 {
-        values[self.places.of(k)] - values[self.places.of(k + 1)]
+        values[self.layout.of(k)] - values[self.layout.of(k + 1)]
     }
 
     #[inline(always)]
     pub(super) fn kick<const N: usize>(&mut self, dt: f64) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let (v, a) = (self.v.values_mut(n), self.a.values(n));
         for c in 0..n {
             v[c] = each(|j| v[c][j] + dt * a[c][j]);
@@ -108,7 +108,7 @@ impl<'a> Engine<'a> {
 
     #[inline(always)]
     pub(super) fn drift<const N: usize>(&mut self, dt: f64) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let (x, v) = (self.x_m.values_mut(n), self.v.values(n));
         for c in 0..n {
             x[c] = each(|j| x[c][j] + dt * v[c][j]);
@@ -117,7 +117,7 @@ impl<'a> Engine<'a> {
 
     /// Impulse of the wall over `dt` at the present forces.
     #[inline(always)]
-    pub(super) fn on_wall(&mut self, at: At, dt: f64) {
+    pub(super) fn on_wall(&mut self, at: StepPoint, dt: f64) {
         if self.chain.has_wall() {
             self.wall_impulse += dt * self.force_n(at, self.chain.bodies().len() - 1);
         }
@@ -125,7 +125,7 @@ impl<'a> Engine<'a> {
 
     /// An impulse between the bodies at interface `k`, and its moment about the step's end.
     pub(super) fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
-        let (behind, ahead) = (self.places.of(k), self.places.of(k + 1));
+        let (behind, ahead) = (self.layout.of(k), self.layout.of(k + 1));
         self.v[behind] -= impulse * self.per_kg[behind];
         self.v[ahead] += impulse * self.per_kg[ahead];
         self.x_m[behind] -= moment * self.per_kg[behind];
@@ -145,7 +145,7 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn bank(&self, pulls: bool) -> &Bank<'a> {
+    pub(super) fn contacts(&self, pulls: bool) -> &Contacts<'a> {
         match &self.pull {
             Some(pull) if pulls => pull,
             _ => &self.push,
@@ -153,7 +153,7 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn bank_mut(&mut self, pulls: bool) -> &mut Bank<'a> {
+    pub(super) fn contacts_mut(&mut self, pulls: bool) -> &mut Contacts<'a> {
         match &mut self.pull {
             Some(pull) if pulls => pull,
             _ => &mut self.push,

@@ -7,12 +7,12 @@
 //! where a deflection turns, so the error does not show a step over the turn, which would leave
 //! the memory short of the top: steps end at turns.
 
-use super::interface::ForceLaw;
+use super::chain::{Body, Chain};
+use super::law::ForceLaw;
 use super::ledger::{Account, Balance};
-use super::rows::{Places, Rows};
+use super::recorder::EventRecorder;
+use super::rows::{Layout, Rows};
 use super::run::{Record, Run, RunSettings, SimulationError};
-use super::train::{Body, Chain};
-use super::watch::Watch;
 
 /// Error per step, relative to the speeds and crushes of the run.
 const TOLERANCE: f64 = 1e-12;
@@ -226,10 +226,11 @@ pub(super) fn run(
         })
         .collect();
     let mut account = Account::open(chain);
-    let places = Places::new(n);
-    let mut watch = Watch::new(chain, &places);
+    let layout = Layout::new(n);
+    let mut events = EventRecorder::new(chain, &layout);
     let mut h = settings.step_s.min(settings.output_interval_s) / 64.0;
-    let mut interfaces_j = record(&motion, &y, 0.0, settings.record, run, &mut account, &mut watch);
+    let mut interfaces_j =
+        record(&motion, &y, 0.0, settings.record, run, &mut account, &mut events);
     for output in 1..=outputs {
         let end_s = output as f64 * settings.output_interval_s;
         let mut time_s = (output - 1) as f64 * settings.output_interval_s;
@@ -247,9 +248,9 @@ pub(super) fn run(
                 time_s = if last { end_s } else { time_s + step };
                 let contacts = motion.by_contacts(&y);
                 for (i, &a) in contacts.iter().enumerate() {
-                    watch.follow(i, time_s, y[n + i], a);
+                    events.follow(i, time_s, y[n + i], a);
                 }
-                watch.looked::<0>(&Rows::of(&places, n, |i| contacts[i]), time_s);
+                events.looked::<0>(&Rows::of(&layout, n, |i| contacts[i]), time_s);
                 for (k, interface) in interfaces.iter().enumerate() {
                     let contact = motion.contact(&y, k);
                     if interface.law.is_beyond_end(contact.deflection_m) {
@@ -262,8 +263,8 @@ pub(super) fn run(
                         });
                     }
                     let force_n = contact.spring_n + contact.damper_n;
-                    watch.output_interface(k, contact.deflection_m, force_n, time_s);
-                    watch.tension(k, -force_n, contact.extension_m);
+                    events.output_interface(k, contact.deflection_m, force_n, time_s);
+                    events.tension(k, -force_n, contact.extension_m);
                     motion.pushed_m[k] = motion.pushed_m[k].max(contact.deflection_m);
                     motion.pulled_m[k] = motion.pulled_m[k].max(contact.extension_m);
                 }
@@ -281,9 +282,9 @@ pub(super) fn run(
                 return Err(SimulationError::Stuck { step_s: SHORTEST_S, time_s });
             }
         }
-        interfaces_j = record(&motion, &y, end_s, settings.record, run, &mut account, &mut watch);
+        interfaces_j = record(&motion, &y, end_s, settings.record, run, &mut account, &mut events);
     }
-    watch.close(run, settings.record, settings.output_interval_s);
+    events.close(run, settings.record, settings.output_interval_s);
     run.ledger = account.close(interfaces_j.0, interfaces_j.1);
     Ok(())
 }
@@ -296,7 +297,7 @@ fn record(
     what: Record,
     run: &mut Run,
     account: &mut Account,
-    watch: &mut Watch,
+    events: &mut EventRecorder,
 ) -> (f64, f64) {
     let chain = motion.chain;
     let n = chain.bodies().len();
@@ -316,7 +317,7 @@ fn record(
         stored_j += stored;
         dissipated_j += dissipated;
         let force_n = contact.spring_n + contact.damper_n;
-        watch.output_interface(k, contact.deflection_m, force_n, time_s);
+        events.output_interface(k, contact.deflection_m, force_n, time_s);
         if histories {
             history.deflection_m.push(contact.deflection_m);
             history.force_n.push(force_n);
@@ -335,9 +336,9 @@ fn record(
             history.a_m_per_s2.push(rates[n + i]);
         }
     }
-    let places = Places::new(n);
-    let of = |value: &dyn Fn(usize) -> f64| Rows::of(&places, n, value);
-    watch.output_bodies::<0>(&of(&|i| y[n + i]), time_s);
+    let layout = Layout::new(n);
+    let of = |value: &dyn Fn(usize) -> f64| Rows::of(&layout, n, value);
+    events.output_bodies::<0>(&of(&|i| y[n + i]), time_s);
     if histories {
         run.time_s.push(time_s);
     }

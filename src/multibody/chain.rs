@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::damping::Damping;
-use super::interface::ForceLaw;
+use super::law::ForceLaw;
 
 /// One mass.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,14 +1,14 @@
-//! Bank: all interfaces of a chain side by side, each on one straight piece of its law.
+//! Contacts: all interfaces of a chain side by side, each on one straight piece of its law.
 //!
 //! A step's forces are one pass of multiply-adds over arrays; only an interface that has left
 //! its piece is looked at by itself.
 
-use super::interface::{Branch, ForceLaw, Piece};
-use super::rows::{LANES, Place, Places, Row, Rows, ahead, each, larger};
+use super::law::{Branch, ForceLaw, Piece};
+use super::rows::{LANES, Layout, Row, Rows, Slot, ahead, each, larger};
 
-/// Which of the states a bank keeps: at the start of a step, inside it, at its end.
+/// Which of the states of a step is meant: at the start of a step, inside it, at its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum At {
+pub(super) enum StepPoint {
     Start = 0,
     Inside = 1,
     End = 2,
@@ -105,9 +105,9 @@ impl Contact<'_> {
     }
 }
 
-/// All interfaces' compression, or all their tension.
-pub(super) struct Bank<'a> {
-    places: Places,
+/// All interfaces under compression, or all under tension.
+pub(super) struct Contacts<'a> {
+    layout: Layout,
     /// 1 for compression, −1 for tension.
     sign: f64,
     lanes: Vec<Lanes>,
@@ -135,9 +135,9 @@ pub(super) struct Move {
     pub opened: bool,
 }
 
-impl<'a> Bank<'a> {
+impl<'a> Contacts<'a> {
     /// Laws and gaps of the interfaces, all open.
-    pub fn new(places: &Places, laws: &[(Option<&'a ForceLaw>, f64)], sign: f64) -> Self {
+    pub fn new(layout: &Layout, laws: &[(Option<&'a ForceLaw>, f64)], sign: f64) -> Self {
         let open = Lanes {
             gap_m: [0.0; LANES],
             from_m: [f64::NEG_INFINITY; LANES],
@@ -161,37 +161,37 @@ impl<'a> Bank<'a> {
             branch: Branch::default(),
             peak_n: 0.0,
         };
-        let mut bank = Self {
+        let mut contacts = Self {
             contacts: laws.iter().map(contact).collect(),
             sign,
-            lanes: vec![open; places.rows()],
-            totals: vec![none; places.rows()],
-            deflection_m: std::array::from_fn(|_| Rows::zeros(places)),
-            force_n: std::array::from_fn(|_| Rows::zeros(places)),
-            gradient_n: Rows::zeros(places),
-            outside_m: Rows::zeros(places),
-            places: places.clone(),
+            lanes: vec![open; layout.rows()],
+            totals: vec![none; layout.rows()],
+            deflection_m: std::array::from_fn(|_| Rows::zeros(layout)),
+            force_n: std::array::from_fn(|_| Rows::zeros(layout)),
+            gradient_n: Rows::zeros(layout),
+            outside_m: Rows::zeros(layout),
+            layout: layout.clone(),
         };
         for (k, &(law, gap_m)) in laws.iter().enumerate() {
-            let place = places.of(k);
-            bank.lanes[place.row()].gap_m[place.lane()] = gap_m;
+            let slot = layout.of(k);
+            contacts.lanes[slot.row()].gap_m[slot.lane()] = gap_m;
             if law.is_some() {
-                bank.set(k, place, Piece::open_to(0.0, 0.0, 0.0));
+                contacts.set(k, slot, Piece::open_to(0.0, 0.0, 0.0));
             }
         }
-        bank
+        contacts
     }
 
     #[inline(always)]
-    fn set(&mut self, k: usize, place: Place, piece: Piece) {
-        let lane = place.lane();
+    fn set(&mut self, k: usize, slot: Slot, piece: Piece) {
+        let lane = slot.lane();
         let contact = &self.contacts[k];
-        let lanes = &mut self.lanes[place.row()];
+        let lanes = &mut self.lanes[slot.row()];
         lanes.from_m[lane] = piece.from_m;
         lanes.to_m[lane] = piece.to_m;
         lanes.at_zero_n[lane] = piece.at_zero_n;
         lanes.slope_n_per_m[lane] = piece.slope_n_per_m;
-        let totals = &mut self.totals[place.row()];
+        let totals = &mut self.totals[slot.row()];
         totals.known_m[lane] = piece.known.deflection_m;
         totals.known_n[lane] = piece.known.force_n;
         totals.known_j[lane] = piece.known.work_j;
@@ -209,26 +209,26 @@ impl<'a> Bank<'a> {
         }
     }
 
-    pub fn deflection_m(&self, at: At, k: usize) -> f64 {
-        self.deflection_m[at as usize][self.places.of(k)]
+    pub fn deflection_m(&self, at: StepPoint, k: usize) -> f64 {
+        self.deflection_m[at as usize][self.layout.of(k)]
     }
 
-    pub fn force_n(&self, at: At, k: usize) -> f64 {
-        self.force_n[at as usize][self.places.of(k)]
+    pub fn force_n(&self, at: StepPoint, k: usize) -> f64 {
+        self.force_n[at as usize][self.layout.of(k)]
     }
 
     #[inline(always)]
-    pub fn deflections_m(&self, at: At) -> &Rows {
+    pub fn deflections_m(&self, at: StepPoint) -> &Rows {
         &self.deflection_m[at as usize]
     }
 
     #[inline(always)]
-    pub fn forces_n(&self, at: At) -> &Rows {
+    pub fn forces_n(&self, at: StepPoint) -> &Rows {
         &self.force_n[at as usize]
     }
 
-    pub fn slope_n_per_m(&self, place: Place) -> f64 {
-        self.lanes[place.row()].slope_n_per_m[place.lane()]
+    pub fn slope_n_per_m(&self, slot: Slot) -> f64 {
+        self.lanes[slot.row()].slope_n_per_m[slot.lane()]
     }
 
     pub fn has_law(&self, k: usize) -> bool {
@@ -237,38 +237,38 @@ impl<'a> Bank<'a> {
 
     /// Largest force on the law up to the end of the last step.
     pub fn peak_n(&self, k: usize) -> f64 {
-        self.contacts[k].peak_n.max(self.force_n(At::End, k))
+        self.contacts[k].peak_n.max(self.force_n(StepPoint::End, k))
     }
 
     /// Sets the deflection at the end of the flight to first contact, and the piece it is on.
-    pub fn place(&mut self, k: usize, deflection_m: f64, closes: bool) {
-        let place = self.places.of(k);
-        self.deflection_m[At::End as usize][place] = deflection_m;
+    pub fn set_start(&mut self, k: usize, deflection_m: f64, closes: bool) {
+        let slot = self.layout.of(k);
+        self.deflection_m[StepPoint::End as usize][slot] = deflection_m;
         // Bodies that touch and close are already on the envelope: a curve may begin above 0.
         if deflection_m == 0.0
             && closes
             && let Some(law) = self.contacts[k].law
         {
             self.contacts[k].stage = Stage::Loading;
-            self.set(k, place, Piece { from_m: 0.0, ..law.envelope_piece(0) });
-            self.force_n[At::End as usize][place] = law.envelope_n(0.0);
+            self.set(k, slot, Piece { from_m: 0.0, ..law.envelope_piece(0) });
+            self.force_n[StepPoint::End as usize][slot] = law.envelope_n(0.0);
         }
     }
 
     /// The end of a step becomes the start of the next.
     #[inline(always)]
     pub fn next(&mut self) {
-        self.deflection_m.swap(At::Start as usize, At::End as usize);
-        self.force_n.swap(At::Start as usize, At::End as usize);
+        self.deflection_m.swap(StepPoint::Start as usize, StepPoint::End as usize);
+        self.force_n.swap(StepPoint::Start as usize, StepPoint::End as usize);
     }
 
     /// Deflections and forces at positions `x_m`; whether some interface has left its piece. At
     /// the end of a step the largest deflections follow.
     #[inline(always)]
-    pub fn evaluate<const N: usize>(&mut self, x_m: &Rows, at: At) -> bool {
+    pub fn evaluate<const N: usize>(&mut self, x_m: &Rows, at: StepPoint) -> bool {
         match at {
-            At::End => self.pass::<N, true>(x_m, at as usize),
-            At::Start | At::Inside => self.pass::<N, false>(x_m, at as usize),
+            StepPoint::End => self.pass::<N, true>(x_m, at as usize),
+            StepPoint::Start | StepPoint::Inside => self.pass::<N, false>(x_m, at as usize),
         }
     }
 
@@ -276,7 +276,7 @@ impl<'a> Bank<'a> {
     fn pass<const N: usize, const FOLLOW: bool>(&mut self, x_m: &Rows, at: usize) -> bool {
         let sign = self.sign;
         let mut out = [0.0_f64; LANES];
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let deflections = self.deflection_m[at].values_mut(n);
         let forces = self.force_n[at].values_mut(n);
         let outside = self.outside_m.values_mut(n);
@@ -306,7 +306,7 @@ impl<'a> Bank<'a> {
     /// Takes `factor` times the change of the forces along `a`.
     #[inline(always)]
     pub fn take_gradient<const N: usize>(&mut self, a: &Rows, factor: f64) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let factor = self.sign * factor;
         let a = a.values(n);
         let gradient = self.gradient_n.values_mut(n);
@@ -324,14 +324,14 @@ impl<'a> Bank<'a> {
         &self.gradient_n
     }
 
-    /// Calls `leave` with the place of each interface that has left its piece in the last
+    /// Calls `leave` with the slot of each interface that has left its piece in the last
     /// [`Self::evaluate`].
     #[inline(always)]
-    pub fn left(&self, mut leave: impl FnMut(Place)) {
+    pub fn left(&self, mut leave: impl FnMut(Slot)) {
         for (row, outside) in self.outside_m.values(self.lanes.len()).iter().enumerate() {
             for (lane, &outside) in outside.iter().enumerate() {
                 if outside > 0.0 {
-                    leave(Place::new(row, lane));
+                    leave(Slot::new(row, lane));
                 }
             }
         }
@@ -339,25 +339,26 @@ impl<'a> Bank<'a> {
 
     /// Whether the deflection of `k` has fallen below its largest, along the envelope so far.
     #[inline(always)]
-    pub fn turns(&self, at: At, k: usize, place: Place) -> bool {
+    pub fn turns(&self, at: StepPoint, k: usize, slot: Slot) -> bool {
         self.contacts[k].stage == Stage::Loading
-            && self.deflections_m(at)[place] < self.lanes[place.row()].from_m[place.lane()]
+            && self.deflections_m(at)[slot] < self.lanes[slot.row()].from_m[slot.lane()]
     }
 
     /// Finds the piece for the deflection of `k`. If it [turns](Self::turns), it was largest at
     /// `top_m`.
     #[inline(always)]
-    pub fn settle(&mut self, at: At, k: usize, place: Place, top_m: Option<f64>) -> Move {
+    pub fn settle(&mut self, at: StepPoint, k: usize, slot: Slot, top_m: Option<f64>) -> Move {
         let contact = &mut self.contacts[k];
         let Some(law) = contact.law else { return Move::default() };
-        let deflection = self.deflection_m[at as usize][place];
+        let deflection = self.deflection_m[at as usize][slot];
         let mut what = Move::default();
         let piece = match (contact.stage, top_m) {
             // The next piece of the envelope, as a rule.
             (Stage::Loading, None) => contact.load(law, deflection),
             _ => {
                 if let Some(top_m) = top_m {
-                    contact.turn(law, top_m.max(self.deflection_m[At::Start as usize][place]));
+                    contact
+                        .turn(law, top_m.max(self.deflection_m[StepPoint::Start as usize][slot]));
                 }
                 let piece = if deflection > 0.0 && deflection >= contact.branch.largest_m {
                     what.loads = true;
@@ -365,7 +366,7 @@ impl<'a> Bank<'a> {
                 } else {
                     contact.unload(law, deflection)
                 };
-                let (lanes, lane) = (&self.lanes[place.row()], place.lane());
+                let (lanes, lane) = (&self.lanes[slot.row()], slot.lane());
                 let was_open = lanes.from_m[lane] == f64::NEG_INFINITY;
                 let is_open = piece.from_m == f64::NEG_INFINITY;
                 what.opened = is_open && !was_open;
@@ -373,7 +374,7 @@ impl<'a> Bank<'a> {
                 piece
             }
         };
-        let (lanes, lane) = (&self.lanes[place.row()], place.lane());
+        let (lanes, lane) = (&self.lanes[slot.row()], slot.lane());
         if lanes.is_idle(lane) != piece.is_idle() {
             let goes_up = deflection > lanes.to_m[lane];
             let left_m = if goes_up { lanes.to_m[lane] } else { lanes.from_m[lane] };
@@ -385,21 +386,21 @@ impl<'a> Bank<'a> {
             }
         }
         let force = piece.at_zero_n + piece.slope_n_per_m * deflection;
-        if at == At::End && force > contact.peak_n {
+        if at == StepPoint::End && force > contact.peak_n {
             contact.peak_n = force;
         }
-        self.set(k, place, piece);
-        self.force_n[at as usize][place] = force;
+        self.set(k, slot, piece);
+        self.force_n[at as usize][slot] = force;
         what
     }
 
     /// Work done at an interface so far in J (what is stored and dissipated, from the law's
     /// tables), and its integral over the deflection in J m.
     #[inline(always)]
-    pub fn work(&self, at: At, place: Place) -> (f64, f64) {
-        let (totals, lane) = (&self.totals[place.row()], place.lane());
-        let along = self.deflections_m(at)[place] - totals.known_m[lane];
-        let (known, force) = (totals.known_n[lane], self.forces_n(at)[place]);
+    pub fn work(&self, at: StepPoint, slot: Slot) -> (f64, f64) {
+        let (totals, lane) = (&self.totals[slot.row()], slot.lane());
+        let along = self.deflections_m(at)[slot] - totals.known_m[lane];
+        let (known, force) = (totals.known_n[lane], self.forces_n(at)[slot]);
         let work_j = totals.known_j[lane] + 0.5 * (known + force) * along;
         let mean_j = totals.known_j[lane] + (2.0 * known + force) * (1.0 / 6.0) * along;
         (work_j, totals.known_jm[lane] + mean_j * along)
@@ -408,8 +409,9 @@ impl<'a> Bank<'a> {
     /// The work of all interfaces, into `out_j`.
     #[inline(always)]
     pub fn works_j<const N: usize>(&self, out_j: &mut Rows) {
-        let n = self.places.known::<N>();
-        let (d, f) = (self.deflections_m(At::End).values(n), self.forces_n(At::End).values(n));
+        let n = self.layout.known::<N>();
+        let (d, f) =
+            (self.deflections_m(StepPoint::End).values(n), self.forces_n(StepPoint::End).values(n));
         let (all, out) = (&self.totals[..n], out_j.values_mut(n));
         for c in 0..n {
             let Totals { known_m, known_n, known_j, .. } = &all[c];
@@ -426,8 +428,9 @@ impl<'a> Bank<'a> {
         largest_m: &mut Rows,
         lost_j: &mut Rows,
     ) {
-        let n = self.places.known::<N>();
-        let (d, f) = (self.deflections_m(At::End).values(n), self.forces_n(At::End).values(n));
+        let n = self.layout.known::<N>();
+        let (d, f) =
+            (self.deflections_m(StepPoint::End).values(n), self.forces_n(StepPoint::End).values(n));
         let (largest, lost) = (largest_m.values_mut(n), lost_j.values_mut(n));
         let (all, work_j) = (&self.totals[..n], work_j.values(n));
         for c in 0..n {
@@ -436,7 +439,7 @@ impl<'a> Bank<'a> {
             lost[c] = totals.dissipated_j;
             for j in 0..LANES {
                 if totals.largest_m[j] == f64::NEG_INFINITY {
-                    let contact = &self.contacts[self.places.index(Place::new(c, j))];
+                    let contact = &self.contacts[self.layout.index(Slot::new(c, j))];
                     let Some(law) = contact.law else { continue };
                     let stored = law.stored_j(contact.index, d[c][j], f[c][j], work_j[c][j]);
                     lost[c][j] = work_j[c][j] - stored;
@@ -446,7 +449,7 @@ impl<'a> Bank<'a> {
     }
 
     /// Largest deflection so far.
-    pub fn largest_m(&self, at: At, k: usize) -> f64 {
+    pub fn largest_m(&self, at: StepPoint, k: usize) -> f64 {
         match self.contacts[k].stage {
             Stage::Loading => self.deflection_m(at, k),
             Stage::Below => self.contacts[k].branch.largest_m,
@@ -460,18 +463,18 @@ impl<'a> Bank<'a> {
 
     /// Whether the piece of `k` has any force.
     pub fn presses(&self, k: usize) -> bool {
-        let place = self.places.of(k);
-        !self.lanes[place.row()].is_idle(place.lane())
+        let slot = self.layout.of(k);
+        !self.lanes[slot.row()].is_idle(slot.lane())
     }
 
     /// Deflection below which `k` is open.
     pub fn opens_at_m(&self, k: usize) -> f64 {
-        let place = self.places.of(k);
-        self.lanes[place.row()].to_m[place.lane()]
+        let slot = self.layout.of(k);
+        self.lanes[slot.row()].to_m[slot.lane()]
     }
 
     pub fn is_open(&self, k: usize) -> bool {
-        let place = self.places.of(k);
-        self.lanes[place.row()].from_m[place.lane()] == f64::NEG_INFINITY
+        let slot = self.layout.of(k);
+        self.lanes[slot.row()].from_m[slot.lane()] == f64::NEG_INFINITY
     }
 }

@@ -1,8 +1,8 @@
-//! Watch: extremes and events of a run between its outputs.
+//! EventRecorder: extremes and events of a run between its outputs.
 
-use super::rows::{LANES, Place, Places, Row, Rows, each, larger};
+use super::chain::Chain;
+use super::rows::{LANES, Layout, Row, Rows, Slot, each, larger};
 use super::run::{Record, Run};
-use super::train::Chain;
 
 /// Window of the moving mean deceleration, in s (EN 15227).
 const MOVING_MEAN_S: f64 = 0.120;
@@ -10,10 +10,10 @@ const MOVING_MEAN_S: f64 = 0.120;
 /// Between outputs further apart the largest mean would be missed by too much.
 const COARSEST_S: f64 = 0.005;
 
-pub(super) struct Watch {
+pub(super) struct EventRecorder {
     interfaces: Vec<Extremes>,
     bodies: Vec<Phase>,
-    places: Places,
+    layout: Layout,
     present: Present,
 }
 
@@ -88,10 +88,10 @@ pub(super) const LOOK_S: f64 = 0.25e-3;
 /// No restitution of what meets more slowly, in m/s: it would be a ratio to nothing.
 const SLOWEST_APPROACH: f64 = 0.1;
 
-impl Watch {
-    pub fn new(chain: &Chain, places: &Places) -> Self {
+impl EventRecorder {
+    pub fn new(chain: &Chain, layout: &Layout) -> Self {
         let bodies = chain.bodies();
-        let of = |value: &dyn Fn(usize) -> f64| Rows::of(places, bodies.len(), value);
+        let of = |value: &dyn Fn(usize) -> f64| Rows::of(layout, bodies.len(), value);
         let none = || of(&|_| 0.0);
         let present = Present {
             is_free: of(&|_| 1.0),
@@ -107,7 +107,7 @@ impl Watch {
         Self {
             interfaces: vec![Extremes::default(); chain.interfaces().len()],
             bodies: bodies.iter().map(phase).collect(),
-            places: places.clone(),
+            layout: layout.clone(),
             present,
         }
     }
@@ -153,37 +153,37 @@ impl Watch {
 
     /// Contact forces on body `i` act or have ended at `time_s`, with its speed.
     pub fn body(&mut self, i: usize, touched: bool, time_s: f64, speed: f64) {
-        let place = self.places.of(i);
+        let slot = self.layout.of(i);
         match (touched, self.bodies[i].open) {
             (true, None) => {
-                let begin_v = self.present.free_speed[place];
-                self.open(i, place, Span { begin_s: time_s, begin_v, ..Span::default() });
+                let begin_v = self.present.free_speed[slot];
+                self.open(i, slot, Span { begin_s: time_s, begin_v, ..Span::default() });
             }
             (false, Some(_)) => {
-                self.close_span(i, place, time_s, speed);
-                self.present.free_speed[place] = speed;
+                self.close_span(i, slot, time_s, speed);
+                self.present.free_speed[slot] = speed;
             }
             _ => {}
         }
     }
 
-    fn open(&mut self, i: usize, place: Place, span: Span) {
+    fn open(&mut self, i: usize, slot: Slot, span: Span) {
         self.bodies[i].open = Some(span);
-        self.present.is_free[place] = 0.0;
-        self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
+        self.present.is_free[slot] = 0.0;
+        self.bound(slot, (f64::INFINITY, f64::NEG_INFINITY));
     }
 
-    fn close_span(&mut self, i: usize, place: Place, end_s: f64, end_v: f64) {
-        let Some(span) = self.free(i, place) else { return };
+    fn close_span(&mut self, i: usize, slot: Slot, end_s: f64, end_v: f64) {
+        let Some(span) = self.free(i, slot) else { return };
         self.bodies[i].close(Span { end_s, end_v, ..span });
     }
 
     /// From here on no force acts on the body; the span that was open.
-    fn free(&mut self, i: usize, place: Place) -> Option<Span> {
+    fn free(&mut self, i: usize, slot: Slot) -> Option<Span> {
         let phase = &mut self.bodies[i];
         let (least, span) = (LEAST_N / phase.mass_kg, phase.open.take());
-        self.present.is_free[place] = 1.0;
-        self.bound(place, (-least, least));
+        self.present.is_free[slot] = 1.0;
+        self.bound(slot, (-least, least));
         span
     }
 
@@ -198,7 +198,7 @@ impl Watch {
     /// Whether the accelerations by contact forces are news to [`Self::follow`].
     #[inline(always)]
     pub fn is_news<const N: usize>(&self, a: &Rows) -> bool {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let (least, most) = (self.present.least.values(n), self.present.most.values(n));
         let mut outside: Row = [0.0; LANES];
         for (c, a) in a.values(n).iter().enumerate() {
@@ -211,63 +211,63 @@ impl Watch {
     /// Closes the span of body `i` if its net force has ended or changed its sign since the last
     /// look; learns the sign of a new one; opens those that no contact has announced.
     pub fn follow(&mut self, i: usize, end_s: f64, end_v: f64, end_a: f64) {
-        let place = self.places.of(i);
+        let slot = self.layout.of(i);
         let present = &self.present;
-        let (start_s, start_a) = (present.seen_s, present.seen_a[place]);
-        if end_a >= present.least[place] && end_a <= present.most[place] {
+        let (start_s, start_a) = (present.seen_s, present.seen_a[slot]);
+        if end_a >= present.least[slot] && end_a <= present.most[slot] {
             return;
         }
         let least = LEAST_N / self.bodies[i].mass_kg;
         let is_small = end_a.abs() <= least;
         // As if the force had grown evenly since it began.
-        let since_s = 2.0 * (end_v - present.free_speed[place]) / end_a;
+        let since_s = 2.0 * (end_v - present.free_speed[slot]) / end_a;
         let begin_s = end_s - since_s.clamp(0.0, end_s - start_s);
-        let mut begin = (begin_s, present.free_speed[place]);
+        let mut begin = (begin_s, present.free_speed[slot]);
         match self.bodies[i].open {
             None => {}
             Some(span) if span.sign == 0.0 => begin = (span.begin_s, span.begin_v),
             Some(_) if end_a == 0.0 => {
-                self.close_span(i, place, 0.5 * (start_s + end_s), end_v);
+                self.close_span(i, slot, 0.5 * (start_s + end_s), end_v);
             }
             Some(span) if is_small && !span.fades => {
                 // Somewhere in between.
                 let ends_s = 0.5 * (start_s + end_s);
                 self.bodies[i].open = Some(Span { fades: true, end_s: ends_s, end_v, ..span });
-                return self.bound(place, (f64::INFINITY, f64::NEG_INFINITY));
+                return self.bound(slot, (f64::INFINITY, f64::NEG_INFINITY));
             }
             Some(span) if !is_small && end_a * span.sign > 0.0 => {
                 self.bodies[i].open = Some(Span { fades: false, ..span });
-                return self.bound_sign(place, span.sign, least);
+                return self.bound_sign(slot, span.sign, least);
             }
             Some(span) if is_small && end_s - span.end_s < LOOK_S => return,
             Some(span) if span.fades => {
                 begin = (span.end_s, span.end_v);
-                self.close_span(i, place, span.end_s, span.end_v);
+                self.close_span(i, slot, span.end_s, span.end_v);
             }
             Some(_) => {
                 let left_s = (end_s - start_s) * (end_a / (end_a - start_a)).clamp(0.0, 1.0);
                 begin = (end_s - left_s, end_v - 0.5 * end_a * left_s);
-                self.close_span(i, place, begin.0, begin.1);
+                self.close_span(i, slot, begin.0, begin.1);
             }
         }
         if is_small {
-            self.free(i, place);
-            self.present.free_speed[place] = end_v;
+            self.free(i, slot);
+            self.present.free_speed[slot] = end_v;
             return;
         }
         let ((begin_s, begin_v), sign) = (begin, end_a.signum());
-        self.open(i, place, Span { begin_s, begin_v, sign, ..Span::default() });
-        self.bound_sign(place, sign, least);
+        self.open(i, slot, Span { begin_s, begin_v, sign, ..Span::default() });
+        self.bound_sign(slot, sign, least);
     }
 
     /// An acceleration between these will be nothing new.
-    fn bound(&mut self, place: Place, (least, most): (f64, f64)) {
-        (self.present.least[place], self.present.most[place]) = (least, most);
+    fn bound(&mut self, slot: Slot, (least, most): (f64, f64)) {
+        (self.present.least[slot], self.present.most[slot]) = (least, most);
     }
 
-    fn bound_sign(&mut self, place: Place, sign: f64, least: f64) {
+    fn bound_sign(&mut self, slot: Slot, sign: f64, least: f64) {
         self.bound(
-            place,
+            slot,
             match sign > 0.0 {
                 true => (least, f64::INFINITY),
                 false => (f64::NEG_INFINITY, -least),
@@ -278,7 +278,7 @@ impl Watch {
     /// Ends a look at accelerations by contact forces.
     #[inline(always)]
     pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
         self.present.seen_s = at_s;
     }
@@ -286,7 +286,7 @@ impl Watch {
     /// Speeds of all bodies at an output.
     #[inline(always)]
     pub fn output_bodies<const N: usize>(&mut self, v: &Rows, time_s: f64) {
-        let n = self.places.known::<N>();
+        let n = self.layout.known::<N>();
         let vs = v.values(n);
         let Present { is_free, free_speed, .. } = &mut self.present;
         let (is_free, free_speed) = (is_free.values(n), free_speed.values_mut(n));
@@ -301,8 +301,8 @@ impl Watch {
     /// Fills in the summary; `interval_s` lies between the outputs.
     pub fn close(mut self, run: &mut Run, record: Record, interval_s: f64) {
         for i in 0..self.bodies.len() {
-            let place = self.places.of(i);
-            let mut end = (self.present.time_s, self.present.v[place]);
+            let slot = self.layout.of(i);
+            let mut end = (self.present.time_s, self.present.v[slot]);
             if let Some(span) = &mut self.bodies[i].open {
                 // A force that was never looked at is none that counts.
                 span.is_cut = !span.fades && span.sign != 0.0;
@@ -310,8 +310,8 @@ impl Watch {
                     end = (span.end_s, span.end_v);
                 }
             }
-            self.close_span(i, place, end.0, end.1);
-            run.bodies[i].final_v_m_per_s = self.present.v[place];
+            self.close_span(i, slot, end.0, end.1);
+            run.bodies[i].final_v_m_per_s = self.present.v[slot];
         }
         for (history, seen) in run.interfaces.iter_mut().zip(self.interfaces) {
             history.peak_force_n = seen.peak_n;
