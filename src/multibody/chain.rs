@@ -8,9 +8,11 @@ use super::law::ForceLaw;
 /// One mass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
+    /// Its name in messages and outputs.
     pub name: String,
+    /// Mass in kg, above 0.
     pub mass_kg: f64,
-    /// Initial speed, positive in the direction in which the first train moves.
+    /// Initial speed in m/s, positive in the direction in which the first train moves.
     pub speed_m_per_s: f64,
     /// Running and braking resistance; none by default.
     pub resistance: Resistance,
@@ -43,6 +45,7 @@ pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
 const SMOOTH_M_PER_S: f64 = 0.05;
 
 impl Resistance {
+    /// Whether the body runs without resistance.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
@@ -76,6 +79,7 @@ pub struct Interface {
 /// A law on the extension beyond the distance at which the bodies stand at first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tension {
+    /// Force over the extension.
     pub law: Arc<ForceLaw>,
     /// Extension before the coupling pulls, in m.
     pub slack_m: f64,
@@ -117,18 +121,51 @@ pub struct Chain {
 /// Why bodies and interfaces are no chain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ChainError {
+    /// A chain needs a body.
     #[error("there are no bodies")]
     NoBodies,
+    /// Number of interfaces that fits neither a wall nor a free end.
     #[error("{bodies} bodies need {} interfaces, or {bodies} with a wall in front, found {interfaces}", bodies - 1)]
-    Interfaces { bodies: usize, interfaces: usize },
+    Interfaces {
+        /// Number of bodies.
+        bodies: usize,
+        /// Number of interfaces.
+        interfaces: usize,
+    },
+    /// A mass that is not above 0.
     #[error("the mass of {name} is {mass_kg} kg: expected more than 0")]
-    Mass { name: String, mass_kg: f64 },
+    Mass {
+        /// Its name.
+        name: String,
+        /// Mass in kg.
+        mass_kg: f64,
+    },
+    /// A speed that is not finite.
     #[error("the speed of {name} is {speed_m_per_s} m/s: expected a finite number")]
-    Speed { name: String, speed_m_per_s: f64 },
+    Speed {
+        /// Its name.
+        name: String,
+        /// Speed in m/s.
+        speed_m_per_s: f64,
+    },
+    /// A gap or slack below 0.
     #[error("the {what} of {name} is {length_m} m: expected 0 or more")]
-    Length { what: &'static str, name: String, length_m: f64 },
+    Length {
+        /// `gap` or `slack`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+        /// Length in m.
+        length_m: f64,
+    },
+    /// A term of the resistance below 0.
     #[error("the resistance of {name} has the term {value}: expected 0 or more")]
-    Resistance { name: String, value: f64 },
+    Resistance {
+        /// Its name.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
 }
 
 impl Chain {
@@ -208,10 +245,12 @@ impl Chain {
         Ok(())
     }
 
+    /// From back to front.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
 
+    /// The one in front of each body, in the bodies' order.
     pub fn interfaces(&self) -> &[Interface] {
         &self.interfaces
     }

@@ -12,12 +12,16 @@ use super::chain::Chain;
 /// check nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Ledger {
+    /// At the first contact.
     #[serde(rename = "initial_kinetic_J")]
     pub initial_kinetic_j: f64,
+    /// At the end, as all that follow.
     #[serde(rename = "kinetic_J")]
     pub kinetic_j: f64,
+    /// In all interfaces.
     #[serde(rename = "stored_J")]
     pub stored_j: f64,
+    /// In all interfaces.
     #[serde(rename = "dissipated_J")]
     pub dissipated_j: f64,
     /// By dampers.

@@ -15,74 +15,72 @@ use multiversion::multiversion;
 
 use super::chain::Chain;
 use super::contacts::StepPoint;
-use super::recorder::LOOK_S;
-use super::run::{Method, Record, Run, SimulationError};
+use super::recorder::{LOOK_S, Moment};
+use super::run::{Grid, Record, Run, SimulationError};
+use events::Speeds;
 use outputs::OutputRecorder;
-use state::{Engine, ahead};
+use state::Engine;
+pub(super) use state::Scheme;
 
-/// Runs the chain with `steps_per_output` steps of `step_s` each.
+/// Runs the chain and fills in `run`.
 pub(super) fn run(
     chain: &Chain,
-    method: Method,
+    scheme: Scheme,
     record: Record,
+    grid: &Grid,
     run: &mut Run,
-    steps_per_output: usize,
-    (outputs, interval_s): (usize, f64),
 ) -> Result<(), SimulationError> {
-    let mut engine = Engine::new(chain, run.step_s);
-    let mut recorder = OutputRecorder::new(chain, &engine.layout, record);
+    let mut engine = Engine::new(chain, scheme, grid.step_s);
+    let mut recorder = OutputRecorder::new(chain, &engine.fixed.layout, record);
     engine.output::<0>(&mut recorder, run, 0.0)?;
-    let times = (outputs, interval_s);
-    let run_outputs = match engine.layout.rows() {
-        1 => self::outputs::<1>,
-        2 => self::outputs::<2>,
-        3 => self::outputs::<3>,
-        4 => self::outputs::<4>,
-        _ => self::outputs::<0>,
+    let all_outputs = match engine.fixed.layout.rows() {
+        1 => all_outputs::<1>,
+        2 => all_outputs::<2>,
+        3 => all_outputs::<3>,
+        4 => all_outputs::<4>,
+        _ => all_outputs::<0>,
     };
-    run_outputs(&mut engine, method, &mut recorder, run, steps_per_output, times)?;
-    let used_interval_s = run.step_s * steps_per_output as f64;
-    engine.close(recorder, run, outputs as f64 * interval_s, used_interval_s);
+    all_outputs(&mut engine, &mut recorder, run, grid)?;
+    engine.close(recorder, run, grid);
     Ok(())
 }
 
-/// All outputs of a run, with `steps_per_output` steps before each. Vectors as wide as the
-/// machine has them; the bits are the same for any width.
+/// All outputs of a run after the first. Vectors as wide as the machine has them; the bits are
+/// the same for any width.
 #[multiversion(targets("x86_64+avx+avx2"))]
-fn outputs<'a, const N: usize>(
+fn all_outputs<'a, const N: usize>(
     engine: &mut Engine<'a>,
-    method: Method,
     recorder: &mut OutputRecorder,
     run: &mut Run,
-    steps_per_output: usize,
-    (outputs, interval_s): (usize, f64),
+    grid: &Grid,
 ) -> Result<(), SimulationError> {
-    let h = engine.step_s;
-    let ahead = ahead(method);
+    let h = grid.step_s;
+    let scheme = engine.fixed.scheme;
+    let ahead_s = engine.fixed.ahead_s();
     let steps_per_look = (LOOK_S / h).max(1.0) as usize;
     let (mut done, mut until_look) = (0, steps_per_look);
-    for output in 1..=outputs {
-        engine.kick::<N>(ahead * h);
-        engine.on_wall(StepPoint::End, ahead * h);
-        for step in 1..=steps_per_output {
+    for output in 1..=grid.outputs {
+        engine.kick::<N>(ahead_s);
+        engine.on_wall(StepPoint::End, ahead_s);
+        for step in 1..=grid.steps_per_output {
             done += 1;
             engine.end_s = done as f64 * h;
-            match method {
-                Method::FourthOrder => engine.fourth_order::<N>(h),
-                Method::Verlet | Method::Reference => engine.verlet::<N>(h),
+            match scheme {
+                Scheme::FourthOrder => engine.fourth_order::<N>(h),
+                Scheme::Verlet => engine.verlet::<N>(h),
             }
-            if !engine.missed.is_empty() {
-                engine.finish(h, method)?;
+            if !engine.crossings.is_empty() {
+                engine.finish()?;
             }
             until_look -= 1;
-            if until_look == 0 || step == steps_per_output {
-                engine.look::<N>(ahead * h);
+            if until_look == 0 || step == grid.steps_per_output {
+                engine.look::<N>(ahead_s);
                 until_look = steps_per_look;
             }
         }
-        engine.kick::<N>(-ahead * h);
-        engine.on_wall(StepPoint::End, -ahead * h);
-        engine.output::<N>(recorder, run, output as f64 * interval_s)?;
+        engine.kick::<N>(-ahead_s);
+        engine.on_wall(StepPoint::End, -ahead_s);
+        engine.output::<N>(recorder, run, grid.output_s(output))?;
     }
     Ok(())
 }
@@ -91,18 +89,18 @@ impl Engine<'_> {
     /// One step of velocity Verlet; `v` is half a step ahead before and after.
     #[inline(always)]
     fn verlet<const N: usize>(&mut self, h: f64) {
-        let (damper_w, resistance_w, resistance_n) =
-            (self.rates.damper_w, self.rates.resistance_w, self.rates.resistance_n);
+        let before = self.losses.power;
         self.next();
         self.drift::<N>(h);
-        self.evaluate::<N>(StepPoint::End, h, 0.5);
+        self.evaluate::<N>(StepPoint::End, Speeds::AfterStart(0.5));
         self.accelerate_and_kick::<N>(StepPoint::End, 0.5 * h, h);
         self.on_wall(StepPoint::End, h);
         if self.net_n.is_some() {
             let mean = 0.5 * h;
-            self.rates.damped_j += mean * (damper_w + self.rates.damper_w);
-            self.rates.resisted_j += mean * (resistance_w + self.rates.resistance_w);
-            self.rates.impulse += mean * (resistance_n + self.rates.resistance_n);
+            let now = self.losses.power;
+            self.losses.damped_j += mean * (before.damper_w + now.damper_w);
+            self.losses.resisted_j += mean * (before.resistance_w + now.resistance_w);
+            self.losses.impulse += mean * (before.resistance_n + now.resistance_n);
         }
     }
 
@@ -113,22 +111,22 @@ impl Engine<'_> {
     fn fourth_order<const N: usize>(&mut self, h: f64) {
         self.next();
         self.drift::<N>(0.5 * h);
-        self.evaluate::<N>(StepPoint::Inside, h, 1.0 / 6.0);
+        self.evaluate::<N>(StepPoint::Inside, Speeds::AfterStart(1.0 / 6.0));
         self.accelerate_and_kick::<N>(StepPoint::Inside, 0.0, 0.0);
         self.on_wall(StepPoint::Inside, 2.0 / 3.0 * h);
         self.add_gradient_kick_and_drift::<N>(h, 2.0 / 3.0 * h, 0.5 * h);
-        self.evaluate::<N>(StepPoint::End, h, -1.0 / 6.0);
+        self.evaluate::<N>(StepPoint::End, Speeds::BeforeEnd(1.0 / 6.0));
         self.accelerate_and_kick::<N>(StepPoint::End, 0.0, h / 3.0);
         self.on_wall(StepPoint::End, h / 3.0);
     }
 
     /// Tells the recorder where forces on bodies have begun or changed their sign since the last
-    /// look.
+    /// look; `v` is `ahead_s` ahead.
     #[inline(always)]
     fn look<const N: usize>(&mut self, ahead_s: f64) {
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
         if self.events.is_news::<N>(a) {
-            self.follow_bodies(ahead_s);
+            self.look_at_bodies(ahead_s);
         }
         let a = self.by_contacts.as_ref().unwrap_or(&self.a);
         self.events.looked::<N>(a, self.end_s);
@@ -136,12 +134,12 @@ impl Engine<'_> {
 
     #[cold]
     #[inline(never)]
-    fn follow_bodies(&mut self, ahead_s: f64) {
-        for i in 0..self.chain.bodies().len() {
-            let slot = self.layout.of(i);
+    fn look_at_bodies(&mut self, ahead_s: f64) {
+        for i in 0..self.fixed.chain.bodies().len() {
+            let slot = self.fixed.layout.of(i);
             let a = self.by_contacts.as_ref().unwrap_or(&self.a)[slot];
-            let v = self.v[slot] - ahead_s * self.a[slot];
-            self.events.follow(i, self.end_s, v, a);
+            let v_m_per_s = self.v[slot] - ahead_s * self.a[slot];
+            self.events.look(i, Moment { time_s: self.end_s, v_m_per_s }, a);
         }
     }
 }

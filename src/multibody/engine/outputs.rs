@@ -4,7 +4,7 @@ use super::super::chain::Chain;
 use super::super::contacts::StepPoint;
 use super::super::ledger::{Account, Balance};
 use super::super::rows::{LANES, Layout, Row, Rows, each, larger};
-use super::super::run::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
+use super::super::run::{BodyHistory, Grid, InterfaceHistory, Record, Run, SimulationError};
 use super::state::Engine;
 
 /// Outputs that are kept before they are appended to the histories: one history at a time is
@@ -110,9 +110,9 @@ impl Engine<'_> {
         run: &mut Run,
         time_s: f64,
     ) -> Result<(), SimulationError> {
-        let n = self.layout.known::<N>();
+        let n = self.fixed.layout.known::<N>();
         let (mut twice_kinetic, mut momentum) = ([0.0; LANES], [0.0; LANES]);
-        let (m, v) = (self.mass_kg.values(n), self.v.values(n));
+        let (m, v) = (self.fixed.mass_kg.values(n), self.v.values(n));
         for c in 0..n {
             let of_row = each(|j| m[c][j] * v[c][j]);
             momentum = each(|j| momentum[j] + of_row[j]);
@@ -120,8 +120,8 @@ impl Engine<'_> {
         }
         let kinetic_j = 0.5 * twice_kinetic.iter().sum::<f64>();
         if !kinetic_j.is_finite()
-            && let Some((_, body)) = (self.chain.bodies().iter().enumerate())
-                .find(|&(i, _)| !self.v[self.layout.of(i)].is_finite())
+            && let Some((_, body)) = (self.fixed.chain.bodies().iter().enumerate())
+                .find(|&(i, _)| !self.v[self.fixed.layout.of(i)].is_finite())
         {
             return Err(SimulationError::Diverged { body: body.name.clone(), time_s });
         }
@@ -129,10 +129,10 @@ impl Engine<'_> {
         recorder.account.audit(&Balance {
             kinetic_j,
             interfaces_j,
-            damped_j: self.rates.damped_j,
-            resisted_j: self.rates.resisted_j,
+            damped_j: self.losses.damped_j,
+            resisted_j: self.losses.resisted_j,
             momentum: momentum.iter().sum(),
-            impulse: self.wall_impulse + self.rates.impulse,
+            impulse: self.wall_impulse + self.losses.impulse,
         });
         self.events.output_bodies::<N>(&self.v, time_s);
         let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
@@ -145,7 +145,7 @@ impl Engine<'_> {
         }
         recorder.recent.outputs += 1;
         if recorder.recent.outputs == OUTPUTS {
-            recorder.recent.flush(recorder.record, run, &self.layout);
+            recorder.recent.flush(recorder.record, run, &self.fixed.layout);
         }
         Ok(())
     }
@@ -153,7 +153,7 @@ impl Engine<'_> {
     /// Work done at all interfaces so far, in J.
     #[inline(always)]
     fn sum_work<const N: usize>(&self, recorder: &mut OutputRecorder) -> f64 {
-        let n = self.layout.known::<N>();
+        let n = self.fixed.layout.known::<N>();
         self.push.works_j::<N>(&mut recorder.work_j);
         let Some(pull) = &self.pull else { return recorder.work_j.sum(n) };
         pull.works_j::<0>(&mut recorder.pulled[0]);
@@ -166,7 +166,7 @@ impl Engine<'_> {
         let OutputRecorder { work_j, largest_m, dissipated_j, pulled, .. } = recorder;
         self.push.largest_and_dissipated::<N>(work_j, largest_m, dissipated_j);
         if let Some(pull) = &self.pull {
-            let n = self.layout.rows();
+            let n = self.fixed.layout.rows();
             let [pulled_j, largest_m, lost_j] = pulled;
             pull.largest_and_dissipated::<0>(pulled_j, largest_m, lost_j);
             for (ours, pulls) in [(work_j, pulled_j), (dissipated_j, lost_j)] {
@@ -179,7 +179,7 @@ impl Engine<'_> {
 
     #[inline(always)]
     fn record_interfaces<const N: usize>(&self, recorder: &mut OutputRecorder) {
-        let n = self.layout.known::<N>();
+        let n = self.fixed.layout.known::<N>();
         self.split_work::<N>(recorder);
         let OutputRecorder { recent, work_j, largest_m, dissipated_j, .. } = recorder;
         let (d, f) = (
@@ -199,26 +199,22 @@ impl Engine<'_> {
     }
 
     /// Fills in what is known at the end of the run.
-    pub(super) fn close(
-        mut self,
-        mut recorder: OutputRecorder,
-        run: &mut Run,
-        end_s: f64,
-        interval_s: f64,
-    ) {
-        recorder.recent.flush(recorder.record, run, &self.layout);
+    pub(super) fn close(mut self, mut recorder: OutputRecorder, run: &mut Run, grid: &Grid) {
+        recorder.recent.flush(recorder.record, run, &self.fixed.layout);
         self.sum_work::<0>(&mut recorder);
         self.split_work::<0>(&mut recorder);
-        let n = self.layout.rows();
+        let n = self.fixed.layout.rows();
         let dissipated_j = recorder.dissipated_j.sum(n);
         run.ledger = recorder.account.close(recorder.work_j.sum(n) - dissipated_j, dissipated_j);
-        for k in 0..self.chain.interfaces().len() {
-            let deflection_m = self.push.deflection_m(StepPoint::End, k);
-            self.events.output_interface(k, deflection_m, self.push.peak_n(k), end_s);
+        let end_s = grid.output_s(grid.outputs);
+        for k in 0..self.fixed.chain.interfaces().len() {
+            self.events.pressed(k, self.push.peak_n(k));
+            self.events.deflected(k, self.push.deflection_m(StepPoint::End, k), end_s);
             if let Some(pull) = &self.pull {
-                self.events.tension(k, pull.peak_n(k), pull.largest_m(StepPoint::End, k).max(0.0));
+                self.events.pulled(k, pull.peak_n(k));
+                self.events.extended(k, pull.largest_m(StepPoint::End, k).max(0.0));
             }
         }
-        self.events.close(run, recorder.record, interval_s);
+        self.events.close(run, recorder.record, grid.steps_s());
     }
 }
