@@ -46,7 +46,7 @@ const SMOOTH_M_PER_S: f64 = 0.05;
 
 impl Resistance {
     /// Whether the body runs without resistance.
-    pub fn is_none(&self) -> bool {
+    pub(super) fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
@@ -102,7 +102,7 @@ impl Interface {
     }
 
     /// Largest stiffness of all that acts here, in N/m.
-    pub fn max_stiffness_n_per_m(&self) -> f64 {
+    fn max_stiffness_n_per_m(&self) -> f64 {
         let pulls = self.tension.as_ref().map_or(0.0, |t| t.law.max_stiffness_n_per_m());
         self.law.max_stiffness_n_per_m().max(pulls)
     }
@@ -190,7 +190,7 @@ impl Chain {
     /// # Errors
     /// [`ChainError`] names the body or interface whose value breaks the invariant; the chain is
     /// then not to be run.
-    pub fn adjust(
+    pub(crate) fn adjust(
         &mut self,
         motions: &[(f64, f64)],
         gaps_m: &[f64],
@@ -266,14 +266,14 @@ impl Chain {
     }
 
     /// Whether the track brakes any body.
-    pub fn has_resistance(&self) -> bool {
+    pub(super) fn has_resistance(&self) -> bool {
         self.bodies.iter().any(|b| !b.resistance.is_none())
     }
 
     /// Shortest `sqrt(m/k)` of all interfaces in s, with the lighter of the two bodies and the
     /// stiffest part of the law (a damper counts as `m/c`), and the interface's index;
     /// infinite for interfaces without stiffness.
-    pub fn shortest_time_s(&self) -> (f64, usize) {
+    pub(super) fn shortest_time_s(&self) -> (f64, usize) {
         let mass = |i: usize| self.bodies.get(i).map_or(f64::INFINITY, |b| b.mass_kg);
         let mut shortest = (f64::INFINITY, 0);
         for (k, interface) in self.interfaces.iter().enumerate() {

@@ -83,7 +83,7 @@ impl Damping {
     }
 
     /// Largest coefficient, in N s/m.
-    pub fn largest(&self) -> f64 {
+    pub(super) fn largest(&self) -> f64 {
         self.coefficient_n_s_per_m.iter().copied().fold(0.0, f64::max)
     }
 }

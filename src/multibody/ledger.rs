@@ -57,9 +57,9 @@ impl Ledger {
 }
 
 /// Imbalance of energy over which a warning is due.
-pub const ENERGY_TOLERANCE: f64 = 1e-3;
+const ENERGY_TOLERANCE: f64 = 1e-3;
 /// Imbalance of momentum over which a warning is due.
-pub const MOMENTUM_TOLERANCE: f64 = 1e-10;
+const MOMENTUM_TOLERANCE: f64 = 1e-10;
 
 /// What is where at an output: energies in J, momentum and impulse in N s.
 pub(super) struct Balance {

@@ -6,9 +6,9 @@ use super::ledger::Ledger;
 /// Default step of velocity Verlet: at 0.05 ms (a fifteenth of the output interval) the crush
 /// of a 24 t car on a 40 MN/m spring is off in the sixth digit; at 0.01 ms all seven printed
 /// ones hold.
-pub const DEFAULT_STEP_S: f64 = 1e-5;
+const DEFAULT_STEP_S: f64 = 1e-5;
 /// Default step of the fourth-order scheme.
-pub const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
+const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
 
 /// How the motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

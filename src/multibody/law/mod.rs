@@ -159,7 +159,7 @@ impl ForceLaw {
     }
 
     /// Largest stiffness that an integrator meets, in N/m.
-    pub fn max_stiffness_n_per_m(&self) -> f64 {
+    pub(super) fn max_stiffness_n_per_m(&self) -> f64 {
         match &self.memory {
             None => self.slope_n_per_m.iter().map(|s| s.abs()).fold(0.0, f64::max),
             // Line of stiffness k: slope k. Shape: k × 2 share × its steepest fall.
@@ -171,7 +171,7 @@ impl ForceLaw {
     }
 
     /// Force on the loading branch, in N, at `deflection_m` of 0 or more.
-    pub fn envelope_n(&self, deflection_m: f64) -> f64 {
+    pub(super) fn envelope_n(&self, deflection_m: f64) -> f64 {
         self.on_envelope(self.piece_index(0, deflection_m), deflection_m).force_n
     }
 
