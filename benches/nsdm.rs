@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use crumple::nsdm::{Settings, Start, Target, fit, fit_seeds};
+use crumple::nsdm::{FitSettings, Start, Target, fit, fit_seeds};
 use crumple::signal::derivative;
 use divan::{Bencher, black_box};
 
@@ -45,26 +45,27 @@ fn target(states: usize) -> Target {
 #[divan::bench(args = [210, 400], sample_count = 5)]
 fn fit_one_seed(bencher: Bencher, states: usize) {
     let target = target(states);
-    bencher.bench(|| fit(black_box(&target), &Settings::default(), 1));
+    bencher.bench(|| fit(black_box(&target), &FitSettings::default(), 1));
 }
 
 #[divan::bench(sample_count = 5)]
 fn fit_one_seed_from_least_squares(bencher: Bencher) {
     let target = target(210);
-    let settings = Settings { start: Start::LeastSquares, ..Settings::default() };
+    let settings = FitSettings { start: Start::LeastSquares, ..FitSettings::default() };
     bencher.bench(|| fit(black_box(&target), &settings, 1));
 }
 
 #[divan::bench(sample_count = 3)]
 fn fit_three_seeds(bencher: Bencher) {
     let target = target(210);
-    bencher.bench(|| fit_seeds(black_box(&target), &Settings::default(), &[1, 2, 3]));
+    bencher.bench(|| fit_seeds(black_box(&target), &FitSettings::default(), &[1, 2, 3]));
 }
 
 #[divan::bench]
 fn one_motion_of_400_states(bencher: Bencher) {
     let (mass_kg, speed_m_per_s, time_s, _) = motion();
-    let settings = Settings { generations: 10, simplex_evaluations: 0, ..Settings::default() };
+    let settings =
+        FitSettings { generations: 10, simplex_evaluations: 0, ..FitSettings::default() };
     let law = fit(&target(210), &settings, 1).expect("a fit").model;
     bencher.bench(|| black_box(&law).run(*mass_kg, *speed_m_per_s, time_s));
 }

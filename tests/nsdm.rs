@@ -6,8 +6,8 @@ use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading, simulate,
 };
 use crumple::nsdm::{
-    DAMPING_N_S_PER_M, Fit, Identifiability, Nsdm, NsdmError, PiecewiseLinear, STIFFNESS_N_PER_M,
-    Settings, Start, Target, fit, fit_seeds,
+    DAMPING_N_S_PER_M, Fit, FitSettings, Identifiability, Nsdm, NsdmError, PiecewiseLinear,
+    STIFFNESS_N_PER_M, Start, Target, fit, fit_seeds,
 };
 use crumple::signal::{derivative, l1_ratio};
 
@@ -36,8 +36,13 @@ fn target_of(law: &Nsdm) -> Target {
     Target::new(MASS_KG, SPEED_M_PER_S, time_s, motion.v_m_per_s, motion.a_m_per_s2).unwrap()
 }
 
-fn short() -> Settings {
-    Settings { population: 40, generations: 40, simplex_evaluations: 1_000, ..Settings::default() }
+fn short() -> FitSettings {
+    FitSettings {
+        population: 40,
+        generations: 40,
+        simplex_evaluations: 1_000,
+        ..FitSettings::default()
+    }
 }
 
 fn cases() -> Vec<Case> {
@@ -67,7 +72,7 @@ fn target_at(cases: &[Case], name: &str) -> Target {
 #[test]
 fn a_known_law_is_repeated() {
     let target = target_of(&known());
-    let found = fit(&target, &Settings::default(), 1).unwrap();
+    let found = fit(&target, &FitSettings::default(), 1).unwrap();
     assert!(found.velocity_l1 < 0.002, "{}", found.velocity_l1);
     assert!(found.acceleration_l1 < 0.01, "{}", found.acceleration_l1);
     assert!(found.objective < 1e-3 * found.history[0], "{}", found.objective);
@@ -85,7 +90,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let target = target_of(&known());
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = Settings { start: Start::LeastSquares, ..short() };
+        let settings = FitSettings { start: Start::LeastSquares, ..short() };
         pool.install(|| fit_seeds(&target, &settings, &[7, 8]).unwrap())
     };
     let (one, two, three) = (with(1), with(2), with(3));
@@ -99,7 +104,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn least_squares_begin_better_and_end_no_worse() {
     let target = target_at(&cases(), "48kmh");
     let with = |start| {
-        let settings = Settings { start, simplex_evaluations: 0, ..short() };
+        let settings = FitSettings { start, simplex_evaluations: 0, ..short() };
         fit_seeds(&target, &settings, &[1, 2, 3]).unwrap()
     };
     for (least, random) in with(Start::LeastSquares).iter().zip(&with(Start::Random)) {
@@ -112,7 +117,7 @@ fn least_squares_begin_better_and_end_no_worse() {
 fn the_simplex_search_improves_what_the_generations_leave() {
     let target = target_of(&known());
     let with = |simplex_evaluations| {
-        fit(&target, &Settings { simplex_evaluations, ..short() }, 1).unwrap()
+        fit(&target, &FitSettings { simplex_evaluations, ..short() }, 1).unwrap()
     };
     let (without, little, much) = (with(0), with(100), with(4_000));
     assert_eq!(without.objective, without.history[40]);
@@ -126,7 +131,7 @@ fn the_simplex_search_improves_what_the_generations_leave() {
 fn weight_on_the_velocity_improves_it() {
     let target = target_at(&cases(), "48kmh");
     let with = |velocity_weight_per_s2| {
-        let settings = Settings { velocity_weight_per_s2, ..short() };
+        let settings = FitSettings { velocity_weight_per_s2, ..short() };
         let fits = fit_seeds(&target, &settings, &[1, 2, 3]).unwrap();
         fits.iter().map(|fit| fit.velocity_l1).sum::<f64>()
     };
@@ -150,12 +155,12 @@ fn errors_over_speeds(fit: &Fit, cases: &[Case]) -> Vec<(f64, f64, f64)> {
 fn fe_motion_is_fitted_at_its_own_speed_and_missed_at_others() {
     let cases = cases();
     let target = target_at(&cases, "48kmh");
-    let settings = Settings {
+    let settings = FitSettings {
         population: 60,
         generations: 80,
         simplex_evaluations: 3_000,
         start: Start::LeastSquares,
-        ..Settings::default()
+        ..FitSettings::default()
     };
     let fits = fit_seeds(&target, &settings, &[1, 2, 3]).unwrap();
     for fit in &fits {
@@ -277,13 +282,13 @@ fn wrong_settings_are_named() {
     let target = target_of(&known());
     let refused = |settings| fit(&target, &settings, 0).unwrap_err().to_string();
     assert_eq!(
-        refused(Settings { population: 3, ..short() }),
+        refused(FitSettings { population: 3, ..short() }),
         "the population is 3: expected 4 to 1000000"
     );
     assert_eq!(
-        refused(Settings { velocity_weight_per_s2: -1.0, ..short() }),
+        refused(FitSettings { velocity_weight_per_s2: -1.0, ..short() }),
         "the weight of the velocity is -1 1/s²: expected a finite number of 0 or more"
     );
-    let smallest = Settings { population: 4, generations: 0, simplex_evaluations: 0, ..short() };
+    let smallest = FitSettings { population: 4, generations: 0, simplex_evaluations: 0, ..short() };
     assert_eq!(fit(&target, &smallest, 0).unwrap().evaluations, 4);
 }

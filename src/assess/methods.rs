@@ -88,7 +88,7 @@ impl FittedNsdm {
 pub(super) fn fit_nsdm(fixed: &Case, settings: &Settings) -> Result<FittedNsdm, CompareError> {
     let reference = Reference::of(fixed)?;
     let target = nsdm_target(&reference)?;
-    let choices = nsdm::Settings { start: settings.nsdm_start, ..nsdm::Settings::default() };
+    let choices = nsdm::FitSettings { start: settings.nsdm_start, ..nsdm::FitSettings::default() };
     let mut fits = Vec::new();
     for seed in settings.nsdm_seeds() {
         let start = Instant::now();

@@ -4,9 +4,9 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crumple::file::write_whole;
-use crumple::multibody::integrator::BodyHistory;
-use crumple::multibody::ledger::Ledger;
-use crumple::multibody::{Run, STANDARD_GRAVITY_M_PER_S2, SimulationError, simulate};
+use crumple::multibody::{
+    BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2, SimulationError, simulate,
+};
 use crumple::scenario::{self, Prepared};
 use crumple::unit::km_per_h;
 use serde::Serialize;

@@ -14,14 +14,28 @@ pub struct Damping {
 /// Why two columns are no damper.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DampingError {
+    /// Columns that differ in length or are empty.
     #[error(
         "a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}"
     )]
-    Lengths { speeds: usize, coefficients: usize },
+    Lengths {
+        /// Number of speeds.
+        speeds: usize,
+        /// Number of coefficients.
+        coefficients: usize,
+    },
+    /// A point that breaks the invariant.
     #[error(
         "point {point} of the damper is ({speed_m_per_s} m/s, {coefficient_n_s_per_m} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more"
     )]
-    Point { point: usize, speed_m_per_s: f64, coefficient_n_s_per_m: f64 },
+    Point {
+        /// Counted from 1.
+        point: usize,
+        /// Speed in m/s.
+        speed_m_per_s: f64,
+        /// Coefficient in N s/m.
+        coefficient_n_s_per_m: f64,
+    },
 }
 
 impl Damping {
@@ -69,7 +83,7 @@ impl Damping {
     }
 
     /// Largest coefficient, in N s/m.
-    pub fn largest(&self) -> f64 {
+    pub(super) fn largest(&self) -> f64 {
         self.coefficient_n_s_per_m.iter().copied().fold(0.0, f64::max)
     }
 }

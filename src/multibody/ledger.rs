@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::train::Chain;
+use super::chain::Chain;
 
 /// Energies in J and the worst imbalances over a run.
 ///
@@ -12,12 +12,16 @@ use super::train::Chain;
 /// check nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Ledger {
+    /// At the first contact.
     #[serde(rename = "initial_kinetic_J")]
     pub initial_kinetic_j: f64,
+    /// At the end, as all that follow.
     #[serde(rename = "kinetic_J")]
     pub kinetic_j: f64,
+    /// In all interfaces.
     #[serde(rename = "stored_J")]
     pub stored_j: f64,
+    /// In all interfaces.
     #[serde(rename = "dissipated_J")]
     pub dissipated_j: f64,
     /// By dampers.
@@ -53,9 +57,9 @@ impl Ledger {
 }
 
 /// Imbalance of energy over which a warning is due.
-pub const ENERGY_TOLERANCE: f64 = 1e-3;
+const ENERGY_TOLERANCE: f64 = 1e-3;
 /// Imbalance of momentum over which a warning is due.
-pub const MOMENTUM_TOLERANCE: f64 = 1e-10;
+const MOMENTUM_TOLERANCE: f64 = 1e-10;
 
 /// What is where at an output: energies in J, momentum and impulse in N s.
 pub(super) struct Balance {

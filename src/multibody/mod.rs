@@ -4,22 +4,110 @@
 //! body `i`, acting on its deflection `δ = (x_i − x_{i+1}) − gap`, and `R_i` the resistance of
 //! the track.
 
-mod bank;
-pub mod damping;
+mod chain;
+mod contacts;
+mod damping;
 mod driven;
 mod engine;
-mod extrapolation;
-pub mod integrator;
-pub mod interface;
-pub mod ledger;
+mod law;
+mod ledger;
+mod recorder;
+mod reference;
 mod rows;
-pub mod train;
-mod watch;
+mod run;
 
-pub use damping::Damping;
-pub use driven::UnloadingChoice;
-pub use integrator::{Method, Record, Run, RunSettings, RunWarning, SimulationError, simulate};
-pub use interface::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
-pub use train::{
+pub use chain::{
     Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension,
 };
+pub use damping::{Damping, DampingError};
+pub use driven::UnloadingChoice;
+pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
+pub use ledger::Ledger;
+pub use run::{
+    BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError,
+};
+
+use engine::Scheme;
+use run::Grid;
+
+/// A curve's own run ends where the curve does, but for rounding.
+const AT_END_M: f64 = 1e-4;
+
+/// Runs the chain from the first contact (t = 0) for `duration_s`.
+///
+/// x counts from where each body stands before gaps close; bodies move freely up to the
+/// first contact.
+///
+/// # Errors
+/// [`SimulationError`] names the interface or body.
+pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, SimulationError> {
+    let grid = Grid::new(chain, settings)?;
+    let mut run = Run::new(chain, &grid, settings.record);
+    run.warnings.extend(shortened_step(chain, settings, grid.step_s));
+    match settings.method {
+        Method::Reference => reference::run(chain, settings, &grid, &mut run)?,
+        Method::Verlet => engine::run(chain, Scheme::Verlet, settings.record, &grid, &mut run)?,
+        Method::FourthOrder => {
+            refuse_rates(chain)?;
+            engine::run(chain, Scheme::FourthOrder, settings.record, &grid, &mut run)?;
+        }
+    }
+    run.warnings.extend(beyond_ends(chain, &run));
+    run.warnings.extend(still_loaded(chain, &run, grid.output_s(grid.outputs)));
+    Ok(run)
+}
+
+/// The fourth-order scheme takes no forces that depend on speeds.
+fn refuse_rates(chain: &Chain) -> Result<(), SimulationError> {
+    if !chain.has_rates() {
+        return Ok(());
+    }
+    let damped = chain.interfaces().iter().find(|i| i.damping.is_some());
+    let what = match damped {
+        Some(interface) => format!("the damper of interface {}", interface.name),
+        None => "running or braking resistance".into(),
+    };
+    Err(SimulationError::Rates { what })
+}
+
+/// Of a step that was asked for and is too long. Nobody has asked for the default one.
+fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<RunWarning> {
+    let RunSettings { step_s: asked_s, method, .. } = *settings;
+    let (shortest_s, k) = chain.shortest_time_s();
+    if asked_s == method.default_step_s() || asked_s <= method.step_rule() * shortest_s {
+        return None;
+    }
+    let interface = chain.interfaces()[k].name.clone();
+    Some(RunWarning::StepShortened { asked_s, used_s, interface })
+}
+
+/// Of interfaces that went beyond the end of their curves.
+fn beyond_ends(chain: &Chain, run: &Run) -> Vec<RunWarning> {
+    let mut warnings = Vec::new();
+    for (interface, history) in chain.interfaces().iter().zip(&run.interfaces) {
+        let tension_end_m = interface.tension.as_ref().map_or(f64::INFINITY, |t| t.law.end_m());
+        let reached = [
+            ("crushed", history.max_deflection_m, interface.law.end_m()),
+            ("pulled apart by", history.max_extension_m, tension_end_m),
+        ];
+        for (what, deflection_m, end_m) in reached {
+            if deflection_m > end_m + AT_END_M {
+                let interface = interface.name.clone();
+                warnings.push(RunWarning::BeyondEnd { interface, what, deflection_m, end_m });
+            }
+        }
+    }
+    warnings
+}
+
+/// Of bodies that a contact still loads at the end of the run.
+fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<RunWarning> {
+    let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| b.is_loaded_at_end);
+    let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
+    if bodies.is_empty() {
+        return None;
+    }
+    // Without the rounding of a product.
+    let end_s = (end_s * 1e9).round() / 1e9;
+    Some(RunWarning::StillLoaded { end_s, bodies: bodies.join(", ") })
+}

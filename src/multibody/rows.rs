@@ -23,9 +23,9 @@ pub(super) fn larger(a: Row, b: Row) -> Row {
 
 /// Where a body, or the interface in front of it, stands: counted along the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place(usize);
+pub(super) struct Slot(usize);
 
-impl Place {
+impl Slot {
     pub fn new(row: usize, lane: usize) -> Self {
         Self(row * LANES + lane)
     }
@@ -41,24 +41,24 @@ impl Place {
     }
 }
 
-/// The places of a chain.
+/// The layout of a chain.
 #[derive(Clone, Debug)]
-pub(super) struct Places(Vec<Place>);
+pub(super) struct Layout(Vec<Slot>);
 
-impl Places {
+impl Layout {
     /// Of as many bodies, and of a last one that never moves.
     pub fn new(bodies: usize) -> Self {
         let rows = bodies.div_ceil(LANES);
         // Without a body that is only a pad, the last one stands behind the end.
-        let place = |i: usize| match i < rows * LANES {
-            true => Place::new(i % rows, i / rows),
-            false => Place::new(rows, 0),
+        let slot = |i: usize| match i < rows * LANES {
+            true => Slot::new(i % rows, i / rows),
+            false => Slot::new(rows, 0),
         };
-        Self((0..=bodies).map(place).collect())
+        Self((0..=bodies).map(slot).collect())
     }
 
     #[inline(always)]
-    pub fn of(&self, i: usize) -> Place {
+    pub fn of(&self, i: usize) -> Slot {
         self.0[i]
     }
 
@@ -75,10 +75,10 @@ impl Places {
         (self.0.len() - 1).div_ceil(LANES)
     }
 
-    /// What stands at a place.
+    /// What stands at a slot.
     #[inline(always)]
-    pub fn index(&self, place: Place) -> usize {
-        place.lane() * self.rows() + place.row()
+    pub fn index(&self, slot: Slot) -> usize {
+        slot.lane() * self.rows() + slot.row()
     }
 }
 
@@ -87,15 +87,15 @@ impl Places {
 pub(super) struct Rows(Vec<Row>);
 
 impl Rows {
-    pub fn zeros(places: &Places) -> Self {
-        Self(vec![[0.0; LANES]; places.rows() + 1])
+    pub fn zeros(layout: &Layout) -> Self {
+        Self(vec![[0.0; LANES]; layout.rows() + 1])
     }
 
     /// A value for each of the first `count` bodies.
-    pub fn of(places: &Places, count: usize, value: impl Fn(usize) -> f64) -> Self {
-        let mut rows = Self::zeros(places);
+    pub fn of(layout: &Layout, count: usize, value: impl Fn(usize) -> f64) -> Self {
+        let mut rows = Self::zeros(layout);
         for i in 0..count {
-            rows[places.of(i)] = value(i);
+            rows[layout.of(i)] = value(i);
         }
         rows
     }
@@ -142,18 +142,18 @@ pub(super) fn behind(rows: &[Row], c: usize) -> Row {
     }
 }
 
-impl Index<Place> for Rows {
+impl Index<Slot> for Rows {
     type Output = f64;
 
     #[inline(always)]
-    fn index(&self, place: Place) -> &f64 {
-        &self.0.as_flattened()[place.0]
+    fn index(&self, slot: Slot) -> &f64 {
+        &self.0.as_flattened()[slot.0]
     }
 }
 
-impl IndexMut<Place> for Rows {
+impl IndexMut<Slot> for Rows {
     #[inline(always)]
-    fn index_mut(&mut self, place: Place) -> &mut f64 {
-        &mut self.0.as_flattened_mut()[place.0]
+    fn index_mut(&mut self, slot: Slot) -> &mut f64 {
+        &mut self.0.as_flattened_mut()[slot.0]
     }
 }

@@ -36,10 +36,12 @@ impl PiecewiseLinear {
         Ok(Self { nodes, values })
     }
 
+    /// Magnitudes at the nodes.
     pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }
 
+    /// Values at the nodes.
     pub fn values(&self) -> &[f64] {
         &self.values
     }

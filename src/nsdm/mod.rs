@@ -9,7 +9,7 @@
 //! and look at their [`Identifiability`].
 //!
 //! ```
-//! use crumple::nsdm::{Settings, Target, fit};
+//! use crumple::nsdm::{FitSettings, Target, fit};
 //!
 //! // A mass of 24 t that bounces off a spring of 40 MN/m.
 //! let omega = (40e6_f64 / 24e3).sqrt();
@@ -18,7 +18,7 @@
 //! let acceleration = time_s.iter().map(|t| -10.0 * omega * (omega * t).sin()).collect();
 //!
 //! let target = Target::new(24e3, 10.0, time_s, velocity, acceleration)?;
-//! let settings = Settings { population: 30, generations: 20, ..Settings::default() };
+//! let settings = FitSettings { population: 30, generations: 20, ..FitSettings::default() };
 //! let fit = fit(&target, &settings, 1)?;
 //! assert!(fit.velocity_l1 < 0.05);
 //! # Ok::<(), crumple::nsdm::NsdmError>(())
@@ -47,7 +47,7 @@ pub use spread::{Identifiability, LawSpread, Range};
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
 /// Bounds of the damping at its nodes, in N s/m.
 pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
-/// What a law is worth whose motion is not finite: more than any other, and comparable.
+/// Objective of a law that diverges: larger than any other, and comparable.
 const PENALTY: f64 = f64::MAX;
 /// One in so many of the first population begins at least squares, if asked for.
 const LEAST_SQUARES_SHARE: usize = 4;
@@ -73,46 +73,127 @@ pub struct Target {
 /// Why there is no target, law, motion or fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NsdmError {
+    /// Too few samples.
     #[error("a motion needs at least {FEWEST_SAMPLES} samples, found {samples}")]
-    TooShort { samples: usize },
+    TooShort {
+        /// Number of samples.
+        samples: usize,
+    },
+    /// Columns that differ in length.
     #[error(
         "columns differ in length: {time} times, {velocity} velocities, {acceleration} accelerations"
     )]
-    Lengths { time: usize, velocity: usize, acceleration: usize },
+    Lengths {
+        /// Number of times.
+        time: usize,
+        /// Number of velocities.
+        velocity: usize,
+        /// Number of accelerations.
+        acceleration: usize,
+    },
+    /// A value that is not finite.
     #[error("the {column} of sample {sample} is {value}: expected a finite number")]
-    NotFinite { column: &'static str, sample: usize, value: f64 },
+    NotFinite {
+        /// Name of the column.
+        column: &'static str,
+        /// Counted from 1.
+        sample: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A time that does not increase.
     #[error("time does not increase at sample {sample}: {time_s} s follows {before_s} s")]
-    TimeOrder { sample: usize, time_s: f64, before_s: f64 },
+    TimeOrder {
+        /// Counted from 1.
+        sample: usize,
+        /// Time in s.
+        time_s: f64,
+        /// Time of the sample before, in s.
+        before_s: f64,
+    },
+    /// A time below 0.
     #[error("the first time is {time_s} s: times count from contact, so expected 0 or more")]
-    BeforeContact { time_s: f64 },
+    BeforeContact {
+        /// Time in s.
+        time_s: f64,
+    },
+    /// A gap between two times that is too long to be in seconds.
     #[error(
         "no sample for {interval_s} s before {time_s} s, too long to follow: expected times in seconds"
     )]
-    Interval { interval_s: f64, time_s: f64 },
+    Interval {
+        /// Length of the gap in s.
+        interval_s: f64,
+        /// Time at its end, in s.
+        time_s: f64,
+    },
+    /// A mass or speed that is not above 0.
     #[error("the {what} is {value}: expected a finite number above 0")]
-    NotPositive { what: &'static str, value: f64 },
+    NotPositive {
+        /// Which quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The reference never moves forwards.
     #[error("the reference never moves forwards: is the velocity positive at contact?")]
     NoDisplacement,
+    /// Nodes and values that differ in number, or fewer than two.
     #[error(
         "a law needs a value at each of at least 2 nodes, found {nodes} nodes and {values} values"
     )]
-    NodeCount { nodes: usize, values: usize },
+    NodeCount {
+        /// Number of nodes.
+        nodes: usize,
+        /// Number of values.
+        values: usize,
+    },
+    /// A node or value that breaks the invariant of a law.
     #[error(
         "node {node} of a law is ({at}, {value}): expected nodes that increase from 0 and values of 0 or more, all finite"
     )]
-    Node { node: usize, at: f64, value: f64 },
+    Node {
+        /// Counted from 1.
+        node: usize,
+        /// Where it is, in m or m/s.
+        at: f64,
+        /// Its value.
+        value: f64,
+    },
+    /// A motion that is not finite.
     #[error("the motion of {mass_kg} kg is not finite: it is too light for this spring or damper")]
-    Diverged { mass_kg: f64 },
+    Diverged {
+        /// Mass in kg.
+        mass_kg: f64,
+    },
+    /// A population out of range.
     #[error("the population is {population}: expected 4 to {MAX_POPULATION}")]
-    Population { population: usize },
+    Population {
+        /// Individuals of a generation.
+        population: usize,
+    },
+    /// Too many generations.
     #[error("{count} generations: expected fewer than 2^32")]
-    Generations { count: usize },
+    Generations {
+        /// Number of generations.
+        count: usize,
+    },
+    /// A weight of the velocity below 0.
     #[error(
         "the weight of the velocity is {weight_per_s2} 1/s²: expected a finite number of 0 or more"
     )]
-    Weight { weight_per_s2: f64 },
+    Weight {
+        /// Weight in 1/s².
+        weight_per_s2: f64,
+    },
+    /// Too few fits to show a spread.
     #[error("{seeds} fits show no spread: at least {fewest} seeds are needed")]
-    Seeds { seeds: usize, fewest: usize },
+    Seeds {
+        /// Number of fits.
+        seeds: usize,
+        /// Number that is needed.
+        fewest: usize,
+    },
 }
 
 impl Target {
@@ -201,7 +282,7 @@ pub enum Start {
 
 /// How long and for what to search; the default is the reference method.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct FitSettings {
     /// Individuals of a generation, at least 4.
     pub population: usize,
     /// Generations of the genetic algorithm; 0 leaves the first population.
@@ -210,10 +291,11 @@ pub struct Settings {
     pub simplex_evaluations: usize,
     /// Weight of the squared differences of velocity, in 1/s²; 0 fits accelerations alone.
     pub velocity_weight_per_s2: f64,
+    /// Where the search begins.
     pub start: Start,
 }
 
-impl Default for Settings {
+impl Default for FitSettings {
     fn default() -> Self {
         Self {
             population: 120,
@@ -228,7 +310,9 @@ impl Default for Settings {
 /// A fitted law and how it was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fit {
+    /// The law.
     pub model: Nsdm,
+    /// Seed of its search.
     pub seed: u64,
     /// `Σ (a − a_ref)² + w Σ (v − v_ref)²`, in m²/s⁴.
     pub objective: f64,
@@ -238,6 +322,7 @@ pub struct Fit {
     pub acceleration_l1: f64,
     /// Motions computed.
     pub evaluations: usize,
+    /// Generations of the genetic algorithm.
     pub generations: usize,
     /// Best objective of the first population and after each generation.
     pub history: Vec<f64>,
@@ -253,8 +338,9 @@ pub struct Fit {
 /// # Errors
 /// [`NsdmError`] for settings out of range, or if no law found has a finite motion
 /// ([`NsdmError::Diverged`]).
-pub fn fit(target: &Target, settings: &Settings, seed: u64) -> Result<Fit, NsdmError> {
-    let Settings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } = *settings;
+pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, NsdmError> {
+    let FitSettings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } =
+        *settings;
     if !(2 * genetic::ELITES..=MAX_POPULATION).contains(&population) {
         return Err(NsdmError::Population { population });
     }
@@ -292,14 +378,14 @@ pub fn fit(target: &Target, settings: &Settings, seed: u64) -> Result<Fit, NsdmE
 /// As [`fit`].
 pub fn fit_seeds(
     target: &Target,
-    settings: &Settings,
+    settings: &FitSettings,
     seeds: &[u64],
 ) -> Result<Vec<Fit>, NsdmError> {
     seeds.par_iter().map(|&seed| fit(target, settings, seed)).collect()
 }
 
 /// Individuals at least squares, if the settings ask for them.
-fn first_individuals(target: &Target, settings: &Settings, seed: u64) -> Vec<Genes> {
+fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<Genes> {
     let count = match settings.start {
         Start::Random => 0,
         Start::LeastSquares => settings.population.div_ceil(LEAST_SQUARES_SHARE),
@@ -361,11 +447,11 @@ mod tests {
         let (light, stiff) = (target(10.0), [1.0; genes::VARIABLES]);
         let steps = Steps::new(&light.time_s).unwrap();
         assert_eq!(light.objective(&stiff, &steps, 1.0), PENALTY);
-        let settings = Settings {
+        let settings = FitSettings {
             population: 20,
             generations: 5,
             simplex_evaluations: 200,
-            ..Settings::default()
+            ..FitSettings::default()
         };
         let found = fit(&light, &settings, 1).unwrap();
         assert!(found.objective < PENALTY && found.history.iter().all(|h| !h.is_nan()));

@@ -16,8 +16,11 @@ const MAX_STEPS: f64 = 1e7;
 /// A motion at given times: displacement, speed and acceleration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
+    /// Displacement in m.
     pub x_m: Vec<f64>,
+    /// Speed in m/s.
     pub v_m_per_s: Vec<f64>,
+    /// Acceleration in m/s².
     pub a_m_per_s2: Vec<f64>,
 }
 

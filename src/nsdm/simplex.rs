@@ -54,13 +54,7 @@ fn search<const N: usize>(
     let n = N as f64;
     let (expansion, contraction, shrinkage) =
         (1.0 + 2.0 / n, 0.75 - 1.0 / (2.0 * n), 1.0 - 1.0 / n);
-    let mut simplex = vec![start];
-    for i in 0..N {
-        let mut genes = start.genes;
-        let step = if (0.0..=1.0).contains(&(genes[i] + edge)) { edge } else { -edge };
-        genes[i] = (genes[i] + step).clamp(0.0, 1.0);
-        simplex.push(objective(&genes));
-    }
+    let mut simplex = first_simplex(&objective, start, edge);
     let mut used = N;
     loop {
         simplex.sort_by(|a, b| a.objective.total_cmp(&b.objective));
@@ -106,6 +100,21 @@ fn search<const N: usize>(
         }
         used += N;
     }
+}
+
+/// The start and a point beside it along each edge of the cube.
+fn first_simplex<const N: usize>(
+    objective: impl Fn(&[f64; N]) -> Individual<N>,
+    start: Individual<N>,
+    edge: f64,
+) -> Vec<Individual<N>> {
+    let beside = |i: usize| {
+        let mut genes = start.genes;
+        let step = if (0.0..=1.0).contains(&(genes[i] + edge)) { edge } else { -edge };
+        genes[i] = (genes[i] + step).clamp(0.0, 1.0);
+        objective(&genes)
+    };
+    std::iter::once(start).chain((0..N).map(beside)).collect()
 }
 
 #[cfg(test)]

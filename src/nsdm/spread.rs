@@ -13,8 +13,11 @@ const PLACES: usize = 200;
 /// Smallest, largest and mean value over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Range {
+    /// Smallest value.
     pub min: f64,
+    /// Largest value.
     pub max: f64,
+    /// Mean value.
     pub mean: f64,
 }
 
@@ -37,8 +40,9 @@ impl Range {
 /// How far laws lie apart along their axis, as `(max − min) / mean` over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LawSpread {
-    /// The largest along the axis, and where it is, in m or m/s.
+    /// The largest along the axis.
     pub largest: f64,
+    /// Where that is, in m or m/s.
     pub largest_at: f64,
     /// The mean along the axis.
     pub mean: f64,
@@ -66,12 +70,17 @@ impl LawSpread {
 /// and damper stand in for each other, and what the law does at another speed is chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
+    /// Number of fits.
     pub seeds: usize,
+    /// Objective of the fits, in m²/s⁴.
     pub objective: Range,
-    /// `Σ|p − r|/Σ|r|` at the fitted speed.
+    /// `Σ|p − r|/Σ|r|` of the velocity at the fitted speed.
     pub velocity_l1: Range,
+    /// The same of the acceleration.
     pub acceleration_l1: Range,
+    /// Spread of the springs.
     pub stiffness: LawSpread,
+    /// Spread of the dampers.
     pub damping: LawSpread,
 }
 

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use super::layout::{Layout, Role, Slot, layout};
 use super::spring::{SpringError, spring};
 use super::{CheckedScenario, LimitsTable, Prepared, ScenarioError, Source, Sources, Used};
-use crate::multibody::damping::DampingError;
-use crate::multibody::{Chain, Damping, ForceLaw, Interface, Method, RunSettings, Tension};
+use crate::multibody::{
+    Chain, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
+};
 use crate::unit::SpeedKind;
 
 /// Why a curve cannot stand where the scenario puts it.

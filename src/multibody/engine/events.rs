@@ -1,156 +1,144 @@
 //! Events: what happens where an interface leaves its piece within a step.
 
-use super::super::bank::{At, Bank, Move};
-use super::super::integrator::{Method, SimulationError};
-use super::super::rows::Place;
-use super::{Engine, ahead};
+use super::super::contacts::{Direction, Move, StepPoint};
+use super::super::recorder::Moment;
+use super::super::rows::Slot;
+use super::super::run::SimulationError;
+use super::state::{Crossing, Engine, Scheme, Turn};
 
 /// Rounding of a sum of works, and the share of a force from which on it counts as noise.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const NOISE: f64 = 1e-5;
 
-/// An interface that has left its piece within the step.
-pub(super) struct Missed {
-    pulls: bool,
-    k: usize,
-    place: Place,
-    /// Work done up to the start of the step in J, and its integral over the deflection.
-    work_j: f64,
-    sum_jm: f64,
-    what: Move,
-    turn: Option<Turn>,
+/// To which time in the step the speeds belong while forces are evaluated, as a share of the step.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Speeds {
+    /// So much after its start, whose accelerations are known.
+    AfterStart(f64),
+    /// So much before its end; the accelerations are those of its middle.
+    BeforeEnd(f64),
 }
 
-/// The deflection was largest `after_s` after the step's start (or before it); there the
-/// stiffness changed by `stiffer_n_per_m`. `rate` is the second derivative of the deflection.
-#[derive(Clone, Copy)]
-struct Turn {
-    after_s: f64,
-    rate: f64,
-    stiffer_n_per_m: f64,
-}
-
-impl<'a> Engine<'a> {
+impl Engine<'_> {
     /// Finds the pieces of all interfaces that have left theirs.
     #[cold]
     #[inline(never)]
-    pub(super) fn settle(&mut self, at: At, h: f64, share: f64) {
+    pub(super) fn settle(&mut self, at: StepPoint, speeds: Speeds) {
         let mut left = std::mem::take(&mut self.left);
-        self.push.left(|place| left.push((false, place)));
+        self.push.left(|slot| left.push((Direction::Compression, slot)));
         if let Some(pull) = &self.pull {
-            pull.left(|place| left.push((true, place)));
+            pull.left(|slot| left.push((Direction::Tension, slot)));
         }
-        for &(pulls, place) in &left {
-            self.settle_one(pulls, place, at, h, share);
+        for &(direction, slot) in &left {
+            self.settle_one(direction, slot, at, speeds);
         }
         left.clear();
         self.left = left;
     }
 
     #[inline(always)]
-    fn bank(&self, pulls: bool) -> &Bank<'a> {
-        match &self.pull {
-            Some(pull) if pulls => pull,
-            _ => &self.push,
-        }
-    }
-
-    #[inline(always)]
-    fn bank_mut(&mut self, pulls: bool) -> &mut Bank<'a> {
-        match &mut self.pull {
-            Some(pull) if pulls => pull,
-            _ => &mut self.push,
-        }
-    }
-
-    #[inline(always)]
-    fn settle_one(&mut self, pulls: bool, place: Place, at: At, h: f64, share: f64) {
-        let k = self.places.index(place);
-        let known = self.missed.iter().position(|m| m.k == k && m.pulls == pulls);
+    fn settle_one(&mut self, direction: Direction, slot: Slot, at: StepPoint, speeds: Speeds) {
+        let k = self.fixed.layout.index(slot);
+        let known = self.crossings.iter().position(|c| c.k == k && c.direction == direction);
         let known = known.unwrap_or_else(|| {
-            let (work_j, sum_jm) = self.bank(pulls).work(At::Start, place);
+            let (work_j, sum_jm) = self.contacts(direction).work(StepPoint::Start, slot);
             let what = Move::default();
-            self.missed.push(Missed { pulls, k, place, work_j, sum_jm, what, turn: None });
-            self.missed.len() - 1
+            self.crossings.push(Crossing { direction, k, slot, work_j, sum_jm, what, turn: None });
+            self.crossings.len() - 1
         });
-        let what = if self.bank(pulls).turns(at, k, place) {
-            self.turn(pulls, k, known, at, h, share)
+        let what = if self.contacts(direction).turns(at, k, slot) {
+            let (what, turn) = self.turn(direction, k, at, speeds);
+            let seen = &mut self.crossings[known].turn;
+            *seen = seen.or(Some(turn));
+            what
         } else {
-            self.bank_mut(pulls).settle(at, k, place, None)
+            self.contacts_mut(direction).settle(at, k, slot, None)
         };
-        let seen = &mut self.missed[known].what;
-        seen.loads |= what.loads;
-        seen.closed_m = seen.closed_m.or(what.closed_m);
-        seen.pressed_m = seen.pressed_m.or(what.pressed_m);
-        seen.released_m = seen.released_m.or(what.released_m);
-        seen.opened |= what.opened;
+        let seen = &mut self.crossings[known].what;
+        *seen = seen.then(what);
     }
 
     /// The deflection of an interface has begun to fall.
-    fn turn(&mut self, pulls: bool, k: usize, missed: usize, at: At, h: f64, share: f64) -> Move {
-        let place = self.places.of(k);
+    fn turn(
+        &mut self,
+        direction: Direction,
+        k: usize,
+        at: StepPoint,
+        speeds: Speeds,
+    ) -> (Move, Turn) {
+        let (slot, h) = (self.fixed.layout.of(k), self.fixed.step_s);
         // Where it was largest: the vertex of the parabola through the nearest state whose speed
         // is known.
-        let sign = if pulls { -1.0 } else { 1.0 };
-        let rate = sign * self.between(if share >= 0.0 { &self.a_start } else { &self.a }, k);
+        let (accelerations, share, near, near_s) = match speeds {
+            Speeds::AfterStart(share) => (&self.a_start, share, StepPoint::Start, 0.0),
+            Speeds::BeforeEnd(share) => (&self.a, -share, at, h),
+        };
+        let sign = direction.sign();
+        let rate = sign * self.between(accelerations, k);
         let speed = sign * self.closing(k) - share * h * rate;
         let into = if rate < 0.0 { speed / -rate } else { 0.0 };
         // In this step or the last: next to no rate would put the vertex anywhere.
-        let near_s = if share >= 0.0 { 0.0 } else { h };
         let after_s = (near_s + into).clamp(-h, h);
         let into_s = after_s - near_s;
-        let bank = self.bank_mut(pulls);
-        let near = bank.deflection_m(if share >= 0.0 { At::Start } else { at }, k);
-        let top_m = near + (speed + 0.5 * rate * into_s) * into_s;
-        let stiffness = bank.slope_n_per_m(place);
-        let what = bank.settle(at, k, place, Some(top_m));
-        let stiffer_n_per_m = bank.slope_n_per_m(place) - stiffness;
-        let largest_m = bank.largest_m(at, k);
-        self.watch.turned(pulls, k, largest_m, self.end_s - h + after_s);
-        let turn = &mut self.missed[missed].turn;
-        *turn = turn.or(Some(Turn { after_s, rate, stiffer_n_per_m }));
-        what
+        let contacts = self.contacts_mut(direction);
+        let top_m = contacts.deflection_m(near, k) + (speed + 0.5 * rate * into_s) * into_s;
+        let stiffness = contacts.slope_n_per_m(slot);
+        let what = contacts.settle(at, k, slot, Some(top_m));
+        let stiffer_n_per_m = contacts.slope_n_per_m(slot) - stiffness;
+        let largest_m = contacts.largest_m(at, k);
+        match direction {
+            Direction::Compression => {
+                self.events.turned(k, largest_m, self.end_s - h + after_s);
+            }
+            Direction::Tension => self.events.extended(k, largest_m),
+        }
+        (what, Turn { after_s, rate, stiffer_n_per_m })
     }
 
     /// What the quadrature of the step has missed, and what happened in it.
     #[cold]
     #[inline(never)]
-    pub(super) fn finish(&mut self, h: f64, method: Method) -> Result<(), SimulationError> {
-        let missed = std::mem::take(&mut self.missed);
+    pub(super) fn finish(&mut self) -> Result<(), SimulationError> {
+        let crossings = std::mem::take(&mut self.crossings);
         let mut happened = false;
-        for m in &missed {
-            self.check_end(m)?;
-            let (impulse, moment) = match m.turn {
-                Some(turn) if !(m.what.loads || m.what.released_m.is_some()) => {
-                    turn.missed(h, method)
+        for crossing in &crossings {
+            self.check_end(crossing)?;
+            let Crossing { direction, k, what, turn, .. } = *crossing;
+            let (impulse, moment) = match turn {
+                Some(turn) if !(what.loads || what.released_m.is_some()) => {
+                    turn.missed(self.fixed.step_s, self.fixed.scheme)
                 }
                 Some(_) => (0.0, 0.0),
-                None => self.missed_along(m, h, method),
+                None => self.missed_along(crossing),
             };
-            let sign = if m.pulls { -1.0 } else { 1.0 };
-            self.push_apart(m.k, sign * impulse, sign * moment);
-            if m.what != Move::default() {
+            let sign = direction.sign();
+            self.push_apart(k, sign * impulse, sign * moment);
+            if what != Move::default() {
                 happened = true;
-                self.damp_part_of_step(m, h);
+                self.damp_part_of_step(crossing);
             }
         }
         if happened {
-            self.watch_contacts(&missed, h, method);
+            for crossing in &crossings {
+                self.record_contact(crossing);
+            }
         }
-        self.missed = missed;
-        self.missed.clear();
+        self.crossings = crossings;
+        self.crossings.clear();
         Ok(())
     }
 
     /// Fails if a curve that must not be left has ended.
     #[inline(always)]
-    fn check_end(&self, m: &Missed) -> Result<(), SimulationError> {
-        let interface = &self.chain.interfaces()[m.k];
-        let (law, bank, what) = match (&interface.tension, &self.pull) {
-            (Some(tension), Some(pull)) if m.pulls => (&tension.law, pull, "pulled apart by"),
+    fn check_end(&self, m: &Crossing) -> Result<(), SimulationError> {
+        let interface = &self.fixed.chain.interfaces()[m.k];
+        let (law, contacts, what) = match (&interface.tension, &self.pull) {
+            (Some(tension), Some(pull)) if m.direction == Direction::Tension => {
+                (&tension.law, pull, "pulled apart by")
+            }
             _ => (&interface.law, &self.push, "crushed"),
         };
-        let deflection_m = bank.deflection_m(At::End, m.k);
+        let deflection_m = contacts.deflection_m(StepPoint::End, m.k);
         if !law.is_beyond_end(deflection_m) {
             return Ok(());
         }
@@ -159,58 +147,60 @@ impl<'a> Engine<'a> {
         Err(SimulationError::CurveEnd { interface, what, deflection_m, time_s, end_m })
     }
 
-    /// Forces that began or ended in the step; restitution is that of compression.
-    fn watch_contacts(&mut self, missed: &[Missed], h: f64, method: Method) {
-        for m in missed {
-            let k = m.k;
-            let behind = ahead(method) * h;
-            let rate = self.between(&self.a, k);
-            let closing = self.closing(k) - behind * rate;
-            let bank = self.bank(m.pulls);
-            let (start, end) = (bank.deflection_m(At::Start, k), bank.deflection_m(At::End, k));
-            let end_s = self.end_s;
-            let crossing = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
-            if m.what.loads && start <= 0.0 && !m.pulls {
-                // What the contact has not yet braked.
-                let before = closing - h * rate * end / (end - start);
-                self.watch.contact(k, before.max(closing));
+    /// A force that began or ended in the step; restitution is that of compression.
+    fn record_contact(&mut self, crossing: &Crossing) {
+        let Crossing { direction, k, what, .. } = *crossing;
+        let (h, end_s, ahead_s) = (self.fixed.step_s, self.end_s, self.fixed.ahead_s());
+        let rate = self.between(&self.a, k);
+        let closing = self.closing(k) - ahead_s * rate;
+        let contacts = self.contacts(direction);
+        let start = contacts.deflection_m(StepPoint::Start, k);
+        let end = contacts.deflection_m(StepPoint::End, k);
+        let time_of = |at_m: f64| end_s - h * ((end - at_m) / (end - start)).clamp(0.0, 1.0);
+        let compresses = direction == Direction::Compression;
+        if what.loads && start <= 0.0 && compresses {
+            // What the contact has not yet braked.
+            let before = closing - h * rate * end / (end - start);
+            self.events.contact_began(k, before.max(closing));
+        }
+        if let Some(at_m) = what.pressed_m {
+            self.record_sides(k, time_of(at_m));
+        }
+        if let Some(at_m) = what.released_m {
+            if compresses {
+                self.events.released(k, -closing);
             }
-            if let Some(at_m) = m.what.pressed_m {
-                self.watch_sides(k, crossing(at_m), behind);
-            }
-            if let Some(at_m) = m.what.released_m {
-                if !m.pulls {
-                    self.watch.released(k, -closing);
-                }
-                self.watch_sides(k, crossing(at_m), behind);
-            }
+            self.record_sides(k, time_of(at_m));
         }
     }
 
     /// Impulse and moment about the step's end that the quadrature has missed where the
     /// deflection went on in one direction.
     #[inline(always)]
-    fn missed_along(&self, m: &Missed, h: f64, method: Method) -> (f64, f64) {
-        let bank = self.bank(m.pulls);
-        let place = m.place;
-        let moved = bank.deflections_m(At::End)[place] - bank.deflections_m(At::Start)[place];
+    fn missed_along(&self, m: &Crossing) -> (f64, f64) {
+        let contacts = self.contacts(m.direction);
+        let (slot, h) = (m.slot, self.fixed.step_s);
+        let moved = contacts.deflections_m(StepPoint::End)[slot]
+            - contacts.deflections_m(StepPoint::Start)[slot];
         if moved == 0.0 {
             return (0.0, 0.0);
         }
-        let (first, last) = (bank.forces_n(At::Start)[place], bank.forces_n(At::End)[place]);
+        let (first, last) =
+            (contacts.forces_n(StepPoint::Start)[slot], contacts.forces_n(StepPoint::End)[slot]);
         // Means over the step of the force, and of the force times the share of the step that is
         // still to come, as the quadrature has them.
-        let (by_rule, ahead_by_rule) = match method {
-            Method::FourthOrder => {
-                let inside = bank.forces_n(At::Inside)[place] + bank.gradient_n()[place];
+        let (by_rule, ahead_by_rule) = match self.fixed.scheme {
+            Scheme::FourthOrder => {
+                let inside =
+                    contacts.forces_n(StepPoint::Inside)[slot] + contacts.gradient_n()[slot];
                 ((first + 4.0 * inside + last) / 6.0, first / 6.0 + inside / 3.0)
             }
-            Method::Verlet | Method::Reference => (0.5 * (first + last), 0.5 * first),
+            Scheme::Verlet => (0.5 * (first + last), 0.5 * first),
         };
         // The same from the law, at constant speed.
-        let (work_j, sum_jm) = bank.work(At::End, place);
+        let (work_j, sum_jm) = contacts.work(StepPoint::End, slot);
         let mean = (work_j - m.work_j) / moved;
-        // Over next to no way the difference of two works is nothing but their rounding.
+        // Where the deflection hardly moves, the difference of two works is only their rounding.
         let scale = mean.abs().max(first.abs()).max(last.abs());
         let noise = ROUNDING * (work_j.abs() + m.work_j.abs()) / moved.abs();
         if noise > NOISE * scale {
@@ -220,7 +210,7 @@ impl<'a> Engine<'a> {
         // What the speed's change adds to the mean: the path leaves the straight one by
         // `bend τ(τ − 1)`, whose product with the law's slope is integrated by parts. Not near a
         // turn.
-        let sign = if m.pulls { -1.0 } else { 1.0 };
+        let sign = m.direction.sign();
         let rates = self.between(&self.a_start, m.k) + self.between(&self.a, m.k);
         let bend = 0.25 * h * h * sign * rates;
         let sums = sum_jm.abs() + m.sum_jm.abs() + (m.work_j * moved).abs();
@@ -234,48 +224,42 @@ impl<'a> Engine<'a> {
 
     /// Impulse of a damper that acted over a part of the step only, where its contact closed or
     /// a coupling opened; the quadrature has half of it.
-    fn damp_part_of_step(&mut self, m: &Missed, h: f64) {
-        let interface = &self.chain.interfaces()[m.k];
+    fn damp_part_of_step(&mut self, m: &Crossing) {
+        let interface = &self.fixed.chain.interfaces()[m.k];
         let Some(damping) = &interface.damping else { return };
-        let bank = self.bank(m.pulls);
-        let (start, end) = (bank.deflection_m(At::Start, m.k), bank.deflection_m(At::End, m.k));
+        let contacts = self.contacts(m.direction);
+        let (start, end) = (
+            contacts.deflection_m(StepPoint::Start, m.k),
+            contacts.deflection_m(StepPoint::End, m.k),
+        );
         let mut part = 0.0;
         if let Some(closed_m) = m.what.closed_m {
             part += ((end - closed_m) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
         // What only pushes has no force any more when it opens.
         if m.what.opened && interface.tension.is_some() {
-            part += ((bank.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
+            part += ((contacts.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
-        let closing = self.closing(m.k) - ahead(Method::Verlet) * h * self.between(&self.a, m.k);
-        let impulse = part * h * damping.at(closing) * closing;
+        let closing = self.closing(m.k) - self.fixed.ahead_s() * self.between(&self.a, m.k);
+        let impulse = part * self.fixed.step_s * damping.at(closing) * closing;
         if impulse.is_finite() {
-            self.rates.damped_j += impulse * closing;
+            self.losses.damped_j += impulse * closing;
             self.push_apart(m.k, impulse, 0.0);
         }
     }
 
-    /// An impulse between the bodies at interface `k`, and its moment about the step's end.
-    fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
-        let (behind, ahead) = (self.places.of(k), self.places.of(k + 1));
-        self.v[behind] -= impulse * self.per_kg[behind];
-        self.v[ahead] += impulse * self.per_kg[ahead];
-        self.x_m[behind] -= moment * self.per_kg[behind];
-        self.x_m[ahead] += moment * self.per_kg[ahead];
-        if k + 1 == self.chain.bodies().len() {
-            self.wall_impulse += impulse;
-        }
-    }
-
-    /// Tells the watch whether forces act on the bodies at interface `k` from `at_s` on; `v` is
-    /// `ahead_s` ahead.
-    fn watch_sides(&mut self, k: usize, at_s: f64, ahead_s: f64) {
+    /// Tells the recorder whether forces act on the bodies at interface `k` from `time_s` on.
+    fn record_sides(&mut self, k: usize, time_s: f64) {
+        let interfaces = self.fixed.chain.interfaces().len();
         for i in self.sides(k) {
-            let forces =
-                |j: usize| j < self.chain.interfaces().len() && self.force_n(At::End, j) != 0.0;
-            let touched = forces(i) || i > 0 && forces(i - 1);
-            let place = self.places.of(i);
-            self.watch.body(i, touched, at_s, self.v[place] - ahead_s * self.a[place]);
+            let acts = |j: usize| j < interfaces && self.force_n(StepPoint::End, j) != 0.0;
+            if acts(i) || i > 0 && acts(i - 1) {
+                self.events.touched(i, time_s);
+            } else {
+                let slot = self.fixed.layout.of(i);
+                let v_m_per_s = self.v[slot] - self.fixed.ahead_s() * self.a[slot];
+                self.events.left_alone(i, Moment { time_s, v_m_per_s });
+            }
         }
     }
 }
@@ -283,15 +267,15 @@ impl<'a> Engine<'a> {
 impl Turn {
     /// Impulse and moment about the step's end that the quadrature has missed: after the turn
     /// the force differs by `stiffer × ½ rate (t − after)²` from what it was before.
-    fn missed(self, h: f64, method: Method) -> (f64, f64) {
+    fn missed(self, h: f64, scheme: Scheme) -> (f64, f64) {
         let factor = 0.5 * self.rate * self.stiffer_n_per_m;
         let left = h - self.after_s;
         let inside = (0.5 * h - self.after_s).max(0.0);
-        let (impulse, moment) = match method {
-            Method::FourthOrder => {
+        let (impulse, moment) = match scheme {
+            Scheme::FourthOrder => {
                 (h / 6.0 * (4.0 * inside * inside + left * left), h * h / 3.0 * inside * inside)
             }
-            Method::Verlet | Method::Reference => (0.5 * h * left * left, 0.0),
+            Scheme::Verlet => (0.5 * h * left * left, 0.0),
         };
         (factor * (left.powi(3) / 3.0 - impulse), factor * (left.powi(4) / 12.0 - moment))
     }

@@ -1,11 +1,11 @@
 //! Outputs: the state at the end of each output interval, into the ledger and the histories.
 
-use super::super::bank::At;
-use super::super::integrator::{BodyHistory, InterfaceHistory, Record, Run, SimulationError};
+use super::super::chain::Chain;
+use super::super::contacts::StepPoint;
 use super::super::ledger::{Account, Balance};
-use super::super::rows::{LANES, Places, Row, Rows, each, larger};
-use super::super::train::Chain;
-use super::Engine;
+use super::super::rows::{LANES, Layout, Row, Rows, each, larger};
+use super::super::run::{BodyHistory, Grid, InterfaceHistory, Record, Run, SimulationError};
+use super::state::Engine;
 
 /// Outputs that are kept before they are appended to the histories: one history at a time is
 /// written faster than one value of each.
@@ -31,7 +31,7 @@ fn kinds(record: Record) -> (&'static [OfBody], &'static [OfInterface]) {
 }
 
 /// What the outputs gather.
-pub(super) struct Recorder {
+pub(super) struct OutputRecorder {
     account: Account,
     record: Record,
     recent: Recent,
@@ -43,11 +43,11 @@ pub(super) struct Recorder {
     pulled: [Rows; 3],
 }
 
-impl Recorder {
-    pub fn new(chain: &Chain, places: &Places, record: Record) -> Self {
-        let zeros = || Rows::zeros(places);
+impl OutputRecorder {
+    pub fn new(chain: &Chain, layout: &Layout, record: Record) -> Self {
+        let zeros = || Rows::zeros(layout);
         let (of_body, of_interface) = kinds(record);
-        let rows = (of_body.len() + of_interface.len()) * places.rows();
+        let rows = (of_body.len() + of_interface.len()) * layout.rows();
         Self {
             account: Account::open(chain),
             record,
@@ -77,12 +77,12 @@ impl Recent {
     }
 
     /// Appends the last values to the histories.
-    fn flush(&mut self, record: Record, run: &mut Run, places: &Places) {
+    fn flush(&mut self, record: Record, run: &mut Run, layout: &Layout) {
         let (of_body, of_interface) = kinds(record);
         let recent = |kind: usize, i: usize| {
-            let place = places.of(i);
-            let values = &self.values[kind * places.rows() + place.row()][..self.outputs];
-            values.iter().map(move |row| row[place.lane()])
+            let slot = layout.of(i);
+            let values = &self.values[kind * layout.rows() + slot.row()][..self.outputs];
+            values.iter().map(move |row| row[slot.lane()])
         };
         for (i, body) in run.bodies.iter_mut().enumerate() {
             for (kind, of) in of_body.iter().enumerate() {
@@ -106,13 +106,13 @@ impl Engine<'_> {
     #[inline(always)]
     pub(super) fn output<const N: usize>(
         &mut self,
-        recorder: &mut Recorder,
+        recorder: &mut OutputRecorder,
         run: &mut Run,
         time_s: f64,
     ) -> Result<(), SimulationError> {
-        let n = self.places.known::<N>();
+        let n = self.fixed.layout.known::<N>();
         let (mut twice_kinetic, mut momentum) = ([0.0; LANES], [0.0; LANES]);
-        let (m, v) = (self.mass_kg.values(n), self.v.values(n));
+        let (m, v) = (self.fixed.mass_kg.values(n), self.v.values(n));
         for c in 0..n {
             let of_row = each(|j| m[c][j] * v[c][j]);
             momentum = each(|j| momentum[j] + of_row[j]);
@@ -120,8 +120,8 @@ impl Engine<'_> {
         }
         let kinetic_j = 0.5 * twice_kinetic.iter().sum::<f64>();
         if !kinetic_j.is_finite()
-            && let Some((_, body)) = (self.chain.bodies().iter().enumerate())
-                .find(|&(i, _)| !self.v[self.places.of(i)].is_finite())
+            && let Some((_, body)) = (self.fixed.chain.bodies().iter().enumerate())
+                .find(|&(i, _)| !self.v[self.fixed.layout.of(i)].is_finite())
         {
             return Err(SimulationError::Diverged { body: body.name.clone(), time_s });
         }
@@ -129,12 +129,12 @@ impl Engine<'_> {
         recorder.account.audit(&Balance {
             kinetic_j,
             interfaces_j,
-            damped_j: self.rates.damped_j,
-            resisted_j: self.rates.resisted_j,
+            damped_j: self.losses.damped_j,
+            resisted_j: self.losses.resisted_j,
             momentum: momentum.iter().sum(),
-            impulse: self.wall_impulse + self.rates.impulse,
+            impulse: self.wall_impulse + self.losses.impulse,
         });
-        self.watch.output_bodies::<N>(&self.v, time_s);
+        self.events.output_bodies::<N>(&self.v, time_s);
         let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
         recorder.recent.keep(0, n, |c| v[c]);
         if recorder.record == Record::Histories {
@@ -145,15 +145,15 @@ impl Engine<'_> {
         }
         recorder.recent.outputs += 1;
         if recorder.recent.outputs == OUTPUTS {
-            recorder.recent.flush(recorder.record, run, &self.places);
+            recorder.recent.flush(recorder.record, run, &self.fixed.layout);
         }
         Ok(())
     }
 
     /// Work done at all interfaces so far, in J.
     #[inline(always)]
-    fn sum_work<const N: usize>(&self, recorder: &mut Recorder) -> f64 {
-        let n = self.places.known::<N>();
+    fn sum_work<const N: usize>(&self, recorder: &mut OutputRecorder) -> f64 {
+        let n = self.fixed.layout.known::<N>();
         self.push.works_j::<N>(&mut recorder.work_j);
         let Some(pull) = &self.pull else { return recorder.work_j.sum(n) };
         pull.works_j::<0>(&mut recorder.pulled[0]);
@@ -162,11 +162,11 @@ impl Engine<'_> {
 
     /// After [`Self::sum_work`]: what of it is stored and dissipated, of all interfaces.
     #[inline(always)]
-    fn split_work<const N: usize>(&self, recorder: &mut Recorder) {
-        let Recorder { work_j, largest_m, dissipated_j, pulled, .. } = recorder;
+    fn split_work<const N: usize>(&self, recorder: &mut OutputRecorder) {
+        let OutputRecorder { work_j, largest_m, dissipated_j, pulled, .. } = recorder;
         self.push.largest_and_dissipated::<N>(work_j, largest_m, dissipated_j);
         if let Some(pull) = &self.pull {
-            let n = self.places.rows();
+            let n = self.fixed.layout.rows();
             let [pulled_j, largest_m, lost_j] = pulled;
             pull.largest_and_dissipated::<0>(pulled_j, largest_m, lost_j);
             for (ours, pulls) in [(work_j, pulled_j), (dissipated_j, lost_j)] {
@@ -178,11 +178,14 @@ impl Engine<'_> {
     }
 
     #[inline(always)]
-    fn record_interfaces<const N: usize>(&self, recorder: &mut Recorder) {
-        let n = self.places.known::<N>();
+    fn record_interfaces<const N: usize>(&self, recorder: &mut OutputRecorder) {
+        let n = self.fixed.layout.known::<N>();
         self.split_work::<N>(recorder);
-        let Recorder { recent, work_j, largest_m, dissipated_j, .. } = recorder;
-        let (d, f) = (self.push.deflections_m(At::End).values(n), self.forces_n(At::End).values(n));
+        let OutputRecorder { recent, work_j, largest_m, dissipated_j, .. } = recorder;
+        let (d, f) = (
+            self.push.deflections_m(StepPoint::End).values(n),
+            self.forces_n(StepPoint::End).values(n),
+        );
         let (work_j, lost_j) = (work_j.values(n), dissipated_j.values(n));
         let largest_m = largest_m.values(n);
         // A branch ends at zero but for rounding.
@@ -196,26 +199,22 @@ impl Engine<'_> {
     }
 
     /// Fills in what is known at the end of the run.
-    pub(super) fn close(
-        mut self,
-        mut recorder: Recorder,
-        run: &mut Run,
-        end_s: f64,
-        interval_s: f64,
-    ) {
-        recorder.recent.flush(recorder.record, run, &self.places);
+    pub(super) fn close(mut self, mut recorder: OutputRecorder, run: &mut Run, grid: &Grid) {
+        recorder.recent.flush(recorder.record, run, &self.fixed.layout);
         self.sum_work::<0>(&mut recorder);
         self.split_work::<0>(&mut recorder);
-        let n = self.places.rows();
+        let n = self.fixed.layout.rows();
         let dissipated_j = recorder.dissipated_j.sum(n);
         run.ledger = recorder.account.close(recorder.work_j.sum(n) - dissipated_j, dissipated_j);
-        for k in 0..self.chain.interfaces().len() {
-            let deflection_m = self.push.deflection_m(At::End, k);
-            self.watch.output_interface(k, deflection_m, self.push.peak_n(k), end_s);
+        let end_s = grid.output_s(grid.outputs);
+        for k in 0..self.fixed.chain.interfaces().len() {
+            self.events.pressed(k, self.push.peak_n(k));
+            self.events.deflected(k, self.push.deflection_m(StepPoint::End, k), end_s);
             if let Some(pull) = &self.pull {
-                self.watch.tension(k, pull.peak_n(k), pull.largest_m(At::End, k).max(0.0));
+                self.events.pulled(k, pull.peak_n(k));
+                self.events.extended(k, pull.largest_m(StepPoint::End, k).max(0.0));
             }
         }
-        self.watch.close(run, recorder.record, interval_s);
+        self.events.close(run, recorder.record, grid.steps_s());
     }
 }

@@ -1,20 +1,14 @@
-//! Runs: times, method, what is recorded.
+//! What a run is asked for and what it gives: method, times, histories, warnings, errors.
 
+use super::chain::Chain;
 use super::ledger::Ledger;
-use super::train::Chain;
-use super::{engine, extrapolation};
 
 /// Default step of velocity Verlet: at 0.05 ms (a fifteenth of the output interval) the crush
 /// of a 24 t car on a 40 MN/m spring is off in the sixth digit; at 0.01 ms all seven printed
 /// ones hold.
-pub const DEFAULT_STEP_S: f64 = 1e-5;
+const DEFAULT_STEP_S: f64 = 1e-5;
 /// Default step of the fourth-order scheme.
-pub const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
-/// A curve's own run ends where the curve does, but for rounding.
-const AT_END_M: f64 = 1e-4;
-/// Bounds that no real scenario reaches; they keep a mistyped duration from running for days.
-const MAX_STEPS: f64 = 1e8;
-const MAX_OUTPUTS: f64 = 1e6;
+const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
 
 /// How the motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,7 +37,7 @@ impl Method {
     ///
     /// Verlet's energy swings by about `(ω h)²/8` with `ω² ≤ 4 k_max/m_min`, so 0.03 keeps
     /// the ledger within its 1e-3; the usual 0.1 would not. The fourth order keeps it at 0.1.
-    fn step_rule(self) -> f64 {
+    pub(super) fn step_rule(self) -> f64 {
         match self {
             Self::Verlet => 0.03,
             Self::FourthOrder => 0.1,
@@ -65,11 +59,15 @@ pub enum Record {
 /// Times of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSettings {
+    /// From the first contact, in s.
     pub duration_s: f64,
+    /// Time between outputs in s.
     pub output_interval_s: f64,
-    /// Longest step; shortened to divide the output interval and to keep the step rule.
+    /// Longest step in s; shortened to divide the output interval and to keep the step rule.
     pub step_s: f64,
+    /// How the motion is integrated.
     pub method: Method,
+    /// What is kept beside the summary.
     pub record: Record,
 }
 
@@ -99,9 +97,13 @@ impl RunSettings {
 /// Histories of one body, one value per output.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyHistory {
+    /// Position in m.
     pub x_m: Vec<f64>,
+    /// Speed in m/s.
     pub v_m_per_s: Vec<f64>,
+    /// Acceleration in m/s².
     pub a_m_per_s2: Vec<f64>,
+    /// Speed at the end of the run, in m/s.
     pub final_v_m_per_s: f64,
     /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
     /// changes its sign. Up to 1 kN, longer than a look of 0.25 ms, it does not act; contacts that
@@ -117,21 +119,27 @@ pub struct BodyHistory {
 /// Histories of one interface, one value per output, and its extremes over all steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InterfaceHistory {
+    /// Deflection in m, below 0 while a gap is open.
     pub deflection_m: Vec<f64>,
-    /// Net force, below 0 where a coupling pulls.
+    /// Net force in N, below 0 where a coupling pulls.
     pub force_n: Vec<f64>,
-    /// Largest deflection so far.
+    /// Largest deflection so far, in m.
     pub largest_deflection_m: Vec<f64>,
+    /// Energy that would come back, in J.
     pub stored_j: Vec<f64>,
+    /// Energy that is lost, in J.
     pub dissipated_j: Vec<f64>,
+    /// Largest pushing force in N.
     pub peak_force_n: f64,
-    /// Of the coupling, with the largest extension; 0 without one.
+    /// Largest pulling force in N; 0 without a coupling.
     pub peak_tension_n: f64,
+    /// Largest extension of the coupling in m; 0 without one.
     pub max_extension_m: f64,
+    /// Largest deflection in m.
     pub max_deflection_m: f64,
-    /// Time of the largest deflection.
+    /// Time of the largest deflection in s.
     pub max_deflection_time_s: f64,
-    /// When both sides first had the same velocity.
+    /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,
     /// Speed of separation over speed of approach at the interface, once it has opened again;
     /// above 1 where neighbours drive the vehicles apart. `None` below 0.1 m/s of approach.
@@ -141,157 +149,215 @@ pub struct InterfaceHistory {
 /// What a run gives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
+    /// Times of the outputs in s.
     pub time_s: Vec<f64>,
+    /// In the order of the chain.
     pub bodies: Vec<BodyHistory>,
+    /// In the order of the chain.
     pub interfaces: Vec<InterfaceHistory>,
+    /// Where the energy is at the end.
     pub ledger: Ledger,
-    /// The step used.
+    /// The step used, in s.
     pub step_s: f64,
+    /// What a user must know; see [`Self::all_warnings`] for those of the ledger too.
     pub warnings: Vec<RunWarning>,
 }
 
 /// What a user must know about a run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RunWarning {
+    /// The step that was asked for breaks the step rule.
     #[error(
         "the step of {asked_s:.3e} s is too long for interface {interface}: {used_s:.3e} s was used"
     )]
-    StepShortened { asked_s: f64, used_s: f64, interface: String },
+    StepShortened {
+        /// Step that was asked for, in s.
+        asked_s: f64,
+        /// Step that was used, in s.
+        used_s: f64,
+        /// Name of the interface that asks for the shortest step.
+        interface: String,
+    },
+    /// An interface went beyond the end of its curve, where the force is an assumption.
     #[error(
         "interface {interface} is {what} {deflection_m:.4} m, beyond the end of its curve at {end_m:.4} m"
     )]
-    BeyondEnd { interface: String, what: &'static str, deflection_m: f64, end_m: f64 },
+    BeyondEnd {
+        /// Name of the interface.
+        interface: String,
+        /// How the curve was left: `crushed` or `pulled apart by`.
+        what: &'static str,
+        /// Deflection or extension in m.
+        deflection_m: f64,
+        /// Deflection in m at which the curve ends.
+        end_m: f64,
+    },
+    /// The run is shorter than the contact.
     #[error(
         "the run ends at {end_s} s while the contact still loads {bodies}: the mean deceleration is that up to there, and what comes may be more; lengthen duration"
     )]
-    StillLoaded { end_s: f64, bodies: String },
+    StillLoaded {
+        /// End of the run in s.
+        end_s: f64,
+        /// Names of the bodies.
+        bodies: String,
+    },
 }
 
 /// Why a run has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
+    /// A time that is not above 0.
     #[error("{what} is {value_s} s: expected a time above 0")]
-    Time { what: &'static str, value_s: f64 },
+    Time {
+        /// Which quantity.
+        what: &'static str,
+        /// Its value in s.
+        value_s: f64,
+    },
+    /// The run is shorter than an output interval.
     #[error("output_interval is {output_interval_s} s, longer than the duration of {duration_s} s")]
-    Interval { output_interval_s: f64, duration_s: f64 },
+    Interval {
+        /// Output interval in s.
+        output_interval_s: f64,
+        /// Duration in s.
+        duration_s: f64,
+    },
+    /// More steps or outputs than any real scenario needs.
     #[error(
         "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
     )]
-    TooLong { steps: f64, step_s: f64, outputs: f64, interface: String },
+    TooLong {
+        /// Number of steps.
+        steps: f64,
+        /// Step in s.
+        step_s: f64,
+        /// Number of outputs.
+        outputs: f64,
+        /// Name of the interface that asks for the shortest step.
+        interface: String,
+    },
+    /// An interface with [`EnvelopeEnd::Error`](super::EnvelopeEnd::Error) has reached the end of its curve.
     #[error(
         "interface {interface} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\""
     )]
-    CurveEnd { interface: String, what: &'static str, deflection_m: f64, time_s: f64, end_m: f64 },
+    CurveEnd {
+        /// Name of the interface.
+        interface: String,
+        /// How the curve was left: `crushed` or `pulled apart by`.
+        what: &'static str,
+        /// Deflection or extension in m.
+        deflection_m: f64,
+        /// Time in s.
+        time_s: f64,
+        /// Deflection in m at which the curve ends.
+        end_m: f64,
+    },
+    /// A position or speed is not finite any more.
     #[error(
         "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
     )]
-    Diverged { body: String, time_s: f64 },
+    Diverged {
+        /// Name of the body.
+        body: String,
+        /// Time in s.
+        time_s: f64,
+    },
+    /// A force that depends on the speed, which the fourth-order method does not take.
     #[error(
         "{what} depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
     )]
-    Rates { what: String },
+    Rates {
+        /// What causes the force.
+        what: String,
+    },
+    /// The reference method cannot follow the motion.
     #[error(
         "the step fell below {step_s:e} s at {time_s:.6} s: the reference method cannot follow this motion"
     )]
-    Stuck { step_s: f64, time_s: f64 },
+    Stuck {
+        /// Shortest step in s.
+        step_s: f64,
+        /// Time in s.
+        time_s: f64,
+    },
 }
 
-/// Runs the chain from the first contact (t = 0) for `duration_s`.
-///
-/// x counts from where each body stands before gaps close; bodies move freely up to the
-/// first contact.
-///
-/// # Errors
-/// [`SimulationError`] names the interface or body.
-pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, SimulationError> {
-    let (step_s, per_output, outputs) = steps(chain, settings)?;
-    if settings.method == Method::FourthOrder && chain.has_rates() {
-        let damped = chain.interfaces().iter().find(|i| i.damping.is_some());
-        let what = match damped {
-            Some(interface) => format!("the damper of interface {}", interface.name),
-            None => "running or braking resistance".into(),
-        };
-        return Err(SimulationError::Rates { what });
-    }
-    let mut run = Run {
-        time_s: Vec::new(),
-        bodies: vec![BodyHistory::default(); chain.bodies().len()],
-        interfaces: vec![InterfaceHistory::default(); chain.interfaces().len()],
-        ledger: Ledger::default(),
-        step_s,
-        warnings: Vec::new(),
-    };
-    let (shortest_s, k) = chain.shortest_time_s();
-    let interface = |k: usize| chain.interfaces()[k].name.clone();
-    // The default step is not what anybody asked for.
-    let is_asked = settings.step_s != settings.method.default_step_s();
-    if is_asked && settings.step_s > settings.method.step_rule() * shortest_s {
-        let (asked_s, used_s) = (settings.step_s, step_s);
-        run.warnings.push(RunWarning::StepShortened { asked_s, used_s, interface: interface(k) });
-    }
-    run.reserve(outputs + 1, settings.record);
-    match settings.method {
-        Method::Reference => extrapolation::run(chain, settings, &mut run, outputs)?,
-        method => {
-            let times = (outputs, settings.output_interval_s);
-            engine::run(chain, method, settings.record, &mut run, per_output, times)?;
-        }
-    }
-    for (k, history) in run.interfaces.iter().enumerate() {
-        let tension = chain.interfaces()[k].tension.as_ref();
-        let reached = [
-            ("crushed", history.max_deflection_m, chain.interfaces()[k].law.end_m()),
-            (
-                "pulled apart by",
-                history.max_extension_m,
-                tension.map_or(f64::INFINITY, |t| t.law.end_m()),
-            ),
-        ];
-        for (what, deflection_m, end_m) in reached {
-            if deflection_m > end_m + AT_END_M {
-                let interface = interface(k);
-                run.warnings.push(RunWarning::BeyondEnd { interface, what, deflection_m, end_m });
+/// Steps and outputs of a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    pub step_s: f64,
+    pub steps_per_output: usize,
+    /// Beside the one at the start.
+    pub outputs: usize,
+    interval_s: f64,
+}
+
+/// Bounds that no real scenario reaches; they keep a mistyped duration from running for days.
+const MAX_STEPS: f64 = 1e8;
+const MAX_OUTPUTS: f64 = 1e6;
+
+impl Grid {
+    /// The longest step that divides the output interval and keeps to the step rule.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for times that make no run, or one that is too long.
+    pub fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, SimulationError> {
+        let RunSettings { duration_s, output_interval_s, step_s, method, .. } = *settings;
+        let times =
+            [("duration", duration_s), ("output_interval", output_interval_s), ("step", step_s)];
+        for (what, value_s) in times {
+            if !(value_s > 0.0 && value_s.is_finite()) {
+                return Err(SimulationError::Time { what, value_s });
             }
         }
-    }
-    let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| b.is_loaded_at_end);
-    let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
-    if !bodies.is_empty() {
-        let end_s = outputs as f64 * settings.output_interval_s;
-        // Without the rounding of a product.
-        let (end_s, bodies) = ((end_s * 1e9).round() / 1e9, bodies.join(", "));
-        run.warnings.push(RunWarning::StillLoaded { end_s, bodies });
-    }
-    Ok(run)
-}
-
-/// Step, steps per output and outputs.
-fn steps(chain: &Chain, settings: &RunSettings) -> Result<(f64, usize, usize), SimulationError> {
-    let RunSettings { duration_s, output_interval_s, step_s, method, .. } = *settings;
-    let times =
-        [("duration", duration_s), ("output_interval", output_interval_s), ("step", step_s)];
-    for (what, value_s) in times {
-        if !(value_s > 0.0 && value_s.is_finite()) {
-            return Err(SimulationError::Time { what, value_s });
+        if output_interval_s > duration_s * (1.0 + 1e-12) {
+            return Err(SimulationError::Interval { output_interval_s, duration_s });
         }
+        let (shortest_s, k) = chain.shortest_time_s();
+        let longest = step_s.min(method.step_rule() * shortest_s);
+        let per_output = (output_interval_s / longest * (1.0 - 1e-12)).ceil().max(1.0);
+        let outputs = (duration_s / output_interval_s * (1.0 + 1e-12)).floor().max(1.0);
+        let steps = per_output * outputs;
+        let step_s = output_interval_s / per_output;
+        if !(steps <= MAX_STEPS && outputs <= MAX_OUTPUTS) {
+            let interface = chain.interfaces().get(k).map_or("none".into(), |i| i.name.clone());
+            return Err(SimulationError::TooLong { steps, step_s, outputs, interface });
+        }
+        Ok(Self {
+            step_s,
+            steps_per_output: per_output as usize,
+            outputs: outputs as usize,
+            interval_s: output_interval_s,
+        })
     }
-    if output_interval_s > duration_s * (1.0 + 1e-12) {
-        return Err(SimulationError::Interval { output_interval_s, duration_s });
+
+    /// Time of an output.
+    pub fn output_s(&self, output: usize) -> f64 {
+        output as f64 * self.interval_s
     }
-    let (shortest_s, k) = chain.shortest_time_s();
-    let longest = step_s.min(method.step_rule() * shortest_s);
-    let per_output = (output_interval_s / longest * (1.0 - 1e-12)).ceil().max(1.0);
-    let outputs = (duration_s / output_interval_s * (1.0 + 1e-12)).floor().max(1.0);
-    let steps = per_output * outputs;
-    let step_s = output_interval_s / per_output;
-    if !(steps <= MAX_STEPS && outputs <= MAX_OUTPUTS) {
-        let interface = chain.interfaces().get(k).map_or("none".into(), |i| i.name.clone());
-        return Err(SimulationError::TooLong { steps, step_s, outputs, interface });
+
+    /// Time of the steps between two outputs: the interval, with the rounding of the steps.
+    pub fn steps_s(&self) -> f64 {
+        self.step_s * self.steps_per_output as f64
     }
-    Ok((step_s, per_output as usize, outputs as usize))
 }
 
 impl Run {
+    /// A run to be filled in.
+    pub(super) fn new(chain: &Chain, grid: &Grid, record: Record) -> Self {
+        let mut run = Self {
+            time_s: Vec::new(),
+            bodies: vec![BodyHistory::default(); chain.bodies().len()],
+            interfaces: vec![InterfaceHistory::default(); chain.interfaces().len()],
+            ledger: Ledger::default(),
+            step_s: grid.step_s,
+            warnings: Vec::new(),
+        };
+        run.reserve(grid.outputs + 1, record);
+        run
+    }
+
     /// All that a user must know, as text.
     pub fn all_warnings(&self) -> Vec<String> {
         let mut warnings = self.ledger.warnings();

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use super::damping::Damping;
-use super::interface::ForceLaw;
+use super::law::ForceLaw;
 
 /// One mass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
+    /// Its name in messages and outputs.
     pub name: String,
+    /// Mass in kg, above 0.
     pub mass_kg: f64,
-    /// Initial speed, positive in the direction in which the first train moves.
+    /// Initial speed in m/s, positive in the direction in which the first train moves.
     pub speed_m_per_s: f64,
     /// Running and braking resistance; none by default.
     pub resistance: Resistance,
@@ -43,7 +45,8 @@ pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
 const SMOOTH_M_PER_S: f64 = 0.05;
 
 impl Resistance {
-    pub fn is_none(&self) -> bool {
+    /// Whether the body runs without resistance.
+    pub(super) fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
@@ -76,6 +79,7 @@ pub struct Interface {
 /// A law on the extension beyond the distance at which the bodies stand at first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tension {
+    /// Force over the extension.
     pub law: Arc<ForceLaw>,
     /// Extension before the coupling pulls, in m.
     pub slack_m: f64,
@@ -98,7 +102,7 @@ impl Interface {
     }
 
     /// Largest stiffness of all that acts here, in N/m.
-    pub fn max_stiffness_n_per_m(&self) -> f64 {
+    fn max_stiffness_n_per_m(&self) -> f64 {
         let pulls = self.tension.as_ref().map_or(0.0, |t| t.law.max_stiffness_n_per_m());
         self.law.max_stiffness_n_per_m().max(pulls)
     }
@@ -117,18 +121,51 @@ pub struct Chain {
 /// Why bodies and interfaces are no chain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ChainError {
+    /// A chain needs a body.
     #[error("there are no bodies")]
     NoBodies,
+    /// Number of interfaces that fits neither a wall nor a free end.
     #[error("{bodies} bodies need {} interfaces, or {bodies} with a wall in front, found {interfaces}", bodies - 1)]
-    Interfaces { bodies: usize, interfaces: usize },
+    Interfaces {
+        /// Number of bodies.
+        bodies: usize,
+        /// Number of interfaces.
+        interfaces: usize,
+    },
+    /// A mass that is not above 0.
     #[error("the mass of {name} is {mass_kg} kg: expected more than 0")]
-    Mass { name: String, mass_kg: f64 },
+    Mass {
+        /// Its name.
+        name: String,
+        /// Mass in kg.
+        mass_kg: f64,
+    },
+    /// A speed that is not finite.
     #[error("the speed of {name} is {speed_m_per_s} m/s: expected a finite number")]
-    Speed { name: String, speed_m_per_s: f64 },
+    Speed {
+        /// Its name.
+        name: String,
+        /// Speed in m/s.
+        speed_m_per_s: f64,
+    },
+    /// A gap or slack below 0.
     #[error("the {what} of {name} is {length_m} m: expected 0 or more")]
-    Length { what: &'static str, name: String, length_m: f64 },
+    Length {
+        /// `gap` or `slack`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+        /// Length in m.
+        length_m: f64,
+    },
+    /// A term of the resistance below 0.
     #[error("the resistance of {name} has the term {value}: expected 0 or more")]
-    Resistance { name: String, value: f64 },
+    Resistance {
+        /// Its name.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
 }
 
 impl Chain {
@@ -153,7 +190,7 @@ impl Chain {
     /// # Errors
     /// [`ChainError`] names the body or interface whose value breaks the invariant; the chain is
     /// then not to be run.
-    pub fn adjust(
+    pub(crate) fn adjust(
         &mut self,
         motions: &[(f64, f64)],
         gaps_m: &[f64],
@@ -208,10 +245,12 @@ impl Chain {
         Ok(())
     }
 
+    /// From back to front.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
 
+    /// The one in front of each body, in the bodies' order.
     pub fn interfaces(&self) -> &[Interface] {
         &self.interfaces
     }
@@ -227,14 +266,14 @@ impl Chain {
     }
 
     /// Whether the track brakes any body.
-    pub fn has_resistance(&self) -> bool {
+    pub(super) fn has_resistance(&self) -> bool {
         self.bodies.iter().any(|b| !b.resistance.is_none())
     }
 
     /// Shortest `sqrt(m/k)` of all interfaces in s, with the lighter of the two bodies and the
     /// stiffest part of the law (a damper counts as `m/c`), and the interface's index;
     /// infinite for interfaces without stiffness.
-    pub fn shortest_time_s(&self) -> (f64, usize) {
+    pub(super) fn shortest_time_s(&self) -> (f64, usize) {
         let mass = |i: usize| self.bodies.get(i).map_or(f64::INFINITY, |b| b.mass_kg);
         let mut shortest = (f64::INFINITY, 0);
         for (k, interface) in self.interfaces.iter().enumerate() {
@@ -248,5 +287,33 @@ impl Chain {
             }
         }
         shortest
+    }
+
+    /// Time of free motion in s until the first gap or slack closes, and the times of each
+    /// interface's; 0 if none closes.
+    pub(super) fn flights(&self) -> (f64, Vec<(f64, f64)>) {
+        let flight = |gap_m: f64, closing: f64| match closing > 0.0 {
+            true => gap_m / closing,
+            false => f64::INFINITY,
+        };
+        let speed = |i: usize| self.bodies.get(i).map_or(0.0, |b| b.speed_m_per_s);
+        let flights: Vec<(f64, f64)> = self
+            .interfaces
+            .iter()
+            .enumerate()
+            .map(|(k, interface)| {
+                let closing = speed(k) - speed(k + 1);
+                let slack = interface.tension.as_ref().map_or(f64::INFINITY, |t| t.slack_m);
+                (flight(interface.gap_m, closing), flight(slack, -closing))
+            })
+            .collect();
+        let shortest = flights.iter().map(|(a, b)| a.min(*b)).fold(f64::INFINITY, f64::min);
+        (if shortest.is_finite() { shortest } else { 0.0 }, flights)
+    }
+
+    /// Positions of the bodies at the first contact, in m.
+    pub(super) fn first_contact(&self) -> Vec<f64> {
+        let (flight_s, _) = self.flights();
+        self.bodies.iter().map(|b| b.speed_m_per_s * flight_s).collect()
     }
 }

@@ -1,0 +1,146 @@
+//! Forces and accelerations at the present positions and speeds.
+
+use super::super::contacts::{Contacts, StepPoint};
+use super::super::rows::{Rows, behind, each};
+use super::events::Speeds;
+use super::state::Engine;
+
+impl Engine<'_> {
+    /// Forces at the present positions; interfaces that have left their piece are settled.
+    #[inline(always)]
+    pub(super) fn evaluate<const N: usize>(&mut self, at: StepPoint, speeds: Speeds) {
+        let pushed = self.push.evaluate::<N>(&self.x_m, at);
+        let pulled = self.pull.as_mut().is_some_and(|pull| pull.evaluate::<N>(&self.x_m, at));
+        if pushed || pulled {
+            self.settle(at, speeds);
+        }
+    }
+
+    /// Accelerations from the forces, then speeds by `kick_s`; where forces depend on speeds,
+    /// `v` is `lag_s` behind.
+    #[inline(always)]
+    pub(super) fn accelerate_and_kick<const N: usize>(
+        &mut self,
+        at: StepPoint,
+        lag_s: f64,
+        kick_s: f64,
+    ) {
+        if self.net_n.is_some() {
+            self.accelerate_by_all(at, lag_s);
+            return self.kick::<N>(kick_s);
+        }
+        let n = self.fixed.layout.known::<N>();
+        let forces = self.push.forces_n(at).values(n);
+        let per_kg = self.fixed.per_kg.values(n);
+        let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
+        for c in 0..n {
+            let behind = behind(forces, c);
+            a[c] = each(|j| (behind[j] - forces[c][j]) * per_kg[c][j]);
+            v[c] = each(|j| v[c][j] + kick_s * a[c][j]);
+        }
+    }
+
+    /// Accelerations with tension, dampers and resistance.
+    #[inline(never)]
+    fn accelerate_by_all(&mut self, at: StepPoint, lag_s: f64) {
+        let n = self.fixed.layout.rows();
+        let Some(mut net) = self.net_n.take() else { return };
+        net.clone_from(self.push.forces_n(at));
+        if let Some(pull) = &self.pull {
+            let pulls = pull.forces_n(at).values(n);
+            for (net, pull) in net.values_mut(n).iter_mut().zip(pulls) {
+                *net = each(|j| net[j] - pull[j]);
+            }
+        }
+        self.add_dampers(&mut net, at, lag_s);
+        self.accelerate_against_resistance(&net, lag_s);
+        self.net_n = Some(net);
+    }
+
+    fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
+        self.losses.power.damper_w = 0.0;
+        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
+            let Some(damping) = &interface.damping else { continue };
+            // At 0 only where bodies meet at the start.
+            let touches = |contacts: &Contacts<'_>| {
+                contacts.deflection_m(at, k) >= 0.0 && !contacts.is_open(k)
+            };
+            let pulls = self.pull.as_ref().is_some_and(|pull| pull.has_law(k) && touches(pull));
+            if !(touches(&self.push) || pulls) {
+                continue;
+            }
+            let slot = self.fixed.layout.of(k);
+            let closing = self.closing(k) + lag_s * self.between(&self.a_start, k);
+            let spring = net_n[slot];
+            let mut force = spring + damping.at(closing) * closing;
+            if interface.tension.is_none() {
+                // What only pushes does not pull when it opens fast.
+                force = force.max(0.0);
+            }
+            net_n[slot] = force;
+            self.losses.power.damper_w += (force - spring) * closing;
+            self.events.pressed(k, force);
+            self.events.pulled(k, -force);
+        }
+    }
+
+    fn accelerate_against_resistance(&mut self, net_n: &Rows, lag_s: f64) {
+        let power = &mut self.losses.power;
+        (power.resistance_w, power.resistance_n) = (0.0, 0.0);
+        let mut behind = 0.0;
+        for (i, body) in self.fixed.chain.bodies().iter().enumerate() {
+            let slot = self.fixed.layout.of(i);
+            let (per_kg, net) = (self.fixed.per_kg[slot], net_n[slot]);
+            let mut resistance = 0.0;
+            if !body.resistance.is_none() {
+                let v = self.v[slot] + lag_s * self.a_start[slot];
+                resistance = body.resistance.force_n(body.mass_kg, v);
+                power.resistance_w += resistance * v;
+                power.resistance_n += resistance;
+            }
+            self.a[slot] = (behind - net - resistance) * per_kg;
+            if let Some(by_contacts) = &mut self.by_contacts {
+                by_contacts[slot] = (behind - net) * per_kg;
+            }
+            behind = net;
+        }
+    }
+
+    /// Adds `h²/24` times the change of the accelerations along themselves; then speeds by
+    /// `kick_s` and positions by `drift_s` in the same pass.
+    #[inline(always)]
+    pub(super) fn add_gradient_kick_and_drift<const N: usize>(
+        &mut self,
+        h: f64,
+        kick_s: f64,
+        drift_s: f64,
+    ) {
+        let n = self.fixed.layout.known::<N>();
+        let factor = h * h / 24.0;
+        self.push.take_gradient::<N>(&self.a, factor);
+        if let (Some(pull), Some(net)) = (&mut self.pull, &mut self.net_n) {
+            pull.take_gradient::<0>(&self.a, factor);
+            let gradients =
+                self.push.gradient_n().values(n).iter().zip(pull.gradient_n().values(n));
+            for (net, (push, pull)) in net.values_mut(n).iter_mut().zip(gradients) {
+                *net = each(|j| push[j] - pull[j]);
+            }
+        }
+        let gradient = self.net_n.as_ref().unwrap_or(self.push.gradient_n());
+        let gradient = gradient.values(n);
+        let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
+        let x = self.x_m.values_mut(n);
+        let per_kg = self.fixed.per_kg.values(n);
+        for c in 0..n {
+            let behind = behind(gradient, c);
+            a[c] = each(|j| a[c][j] + (behind[j] - gradient[c][j]) * per_kg[c][j]);
+            v[c] = each(|j| v[c][j] + kick_s * a[c][j]);
+            x[c] = each(|j| x[c][j] + drift_s * v[c][j]);
+        }
+        if self.fixed.chain.has_wall() {
+            let last = self.fixed.layout.of(self.fixed.chain.bodies().len() - 1);
+            let gradient = self.net_n.as_ref().unwrap_or(self.push.gradient_n());
+            self.wall_impulse += kick_s * gradient[last];
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Force law of an interface: elastic, or elastic-plastic with memory.
+
+mod memory;
+mod pieces;
+mod shape;
+
+use crate::curve::Envelope;
+use memory::{Memory, StoredBy};
+pub(super) use pieces::{Branch, OnEnvelope, Piece};
+pub use shape::UnloadingShape;
+
+/// What happens when the deflection falls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unloading {
+    /// The envelope is followed back (the reference model, which has no memory).
+    Elastic,
+    /// A straight line of this stiffness in N/m; reloading follows it back up. Where the
+    /// envelope rises more steeply than that, the line is stiffer: see [`ForceLaw`].
+    Memory {
+        /// Unloading stiffness in N/m, above 0.
+        stiffness_n_per_m: f64,
+    },
+}
+
+/// What the force does beyond the envelope's last point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvelopeEnd {
+    /// The last force is held.
+    Hold,
+    /// The last segment is continued if it rises, else the last force is held.
+    Slope,
+    /// The run ends with an error that names the interface.
+    Error,
+}
+
+/// Force over deflection at an interface.
+///
+/// Invariant: with memory, the dissipated energy never falls while the deflection grows, so
+/// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
+/// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
+/// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
+/// one stiff line for both would lose most of the rebound. Therefore the branch from δ stores
+///
+/// `stored = max(work − dissipated, storable(k_s))`, with
+/// `storable(k) = F min(F/2k, cδ)` and
+/// `dissipated = max over s ≤ δ of work(s) − storable(k)(s)`, not below 0.
+///
+/// `F` is the envelope's force at δ and `work` its integral up to there; `c = ½` for a straight
+/// line, whose stiffness is `F²/(2 stored)`, and less for a shape that gives back less. The bound
+/// `cδF` keeps the branch from reaching zero deflection with a force left, whose energy would be
+/// lost. With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForceLaw {
+    envelope: Envelope,
+    shape: UnloadingShape,
+    end: EnvelopeEnd,
+    /// Slope of the piece from each point of the envelope on; the last one beyond the end.
+    slope_n_per_m: Vec<f64>,
+    /// Integral of the work over the deflection at each point of the envelope.
+    sum_jm: Vec<f64>,
+    /// `None` where the envelope is followed back.
+    memory: Option<Memory>,
+}
+
+impl ForceLaw {
+    /// A law that unloads on a straight line. Forces below zero become zero, because an
+    /// interface only pushes.
+    pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
+        Self::with(envelope, unloading, UnloadingShape::line(), end, StoredBy::Force)
+    }
+
+    /// The same with an unloading branch that is no straight line; its energy is that of the
+    /// line of the unloading stiffness.
+    pub fn shaped(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+    ) -> Self {
+        Self::with(envelope, unloading, shape, end, StoredBy::Force)
+    }
+
+    /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
+    /// line of the unloading stiffness from the envelope's end.
+    ///
+    /// A recorded force swings, and what a structure has stored does not swing with it.
+    /// Therefore the storable energy is taken from the mean force `work/δ`, scaled to that
+    /// energy at the end, and only bounded by `cδF`.
+    pub fn recorded(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+    ) -> Self {
+        let unloading = match unloading {
+            Unloading::Elastic => unloading,
+            Unloading::Memory { stiffness_n_per_m } => {
+                let (top, end_m) = (envelope.force_at(envelope.end_m()), envelope.end_m());
+                let mean = envelope.work() / end_m;
+                let scale = (mean / top).powi(2);
+                let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
+                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m * scale }
+            }
+        };
+        Self::with(envelope, unloading, shape, end, StoredBy::MeanForce)
+    }
+
+    fn with(
+        envelope: Envelope,
+        unloading: Unloading,
+        shape: UnloadingShape,
+        end: EnvelopeEnd,
+        stored_by: StoredBy,
+    ) -> Self {
+        let envelope = envelope.pushing();
+        let (d, f, work_j) = (envelope.deflection_m(), envelope.force_n(), envelope.work_j());
+        let n = d.len();
+        let mut slope_n_per_m: Vec<f64> =
+            (1..n).map(|i| (f[i] - f[i - 1]) / (d[i] - d[i - 1])).collect();
+        slope_n_per_m.push(match end {
+            EnvelopeEnd::Slope => slope_n_per_m[n - 2].max(0.0),
+            EnvelopeEnd::Hold | EnvelopeEnd::Error => 0.0,
+        });
+        let mut sum_jm = vec![0.0; n];
+        for i in 1..n {
+            let step = d[i] - d[i - 1];
+            let along = work_j[i - 1] + (f[i - 1] / 3.0 + f[i] / 6.0) * step;
+            sum_jm[i] = sum_jm[i - 1] + along * step;
+        }
+        let memory = match unloading {
+            Unloading::Elastic => None,
+            Unloading::Memory { stiffness_n_per_m } => {
+                let points = (0..n).map(|i| OnEnvelope {
+                    piece: i,
+                    deflection_m: d[i],
+                    force_n: f[i],
+                    work_j: work_j[i],
+                });
+                let (steepest, share) = (envelope.max_slope(), shape.share().min(0.5));
+                Some(Memory::new(stiffness_n_per_m, steepest, share, stored_by, points))
+            }
+        };
+        Self { envelope, shape, end, slope_n_per_m, sum_jm, memory }
+    }
+
+    /// Whether the largest deflection changes the force.
+    pub(super) fn has_memory(&self) -> bool {
+        self.memory.is_some()
+    }
+
+    /// Whether the run may not go to this deflection.
+    pub(super) fn is_beyond_end(&self, deflection_m: f64) -> bool {
+        self.end == EnvelopeEnd::Error && deflection_m > self.envelope.end_m()
+    }
+
+    /// Deflection at which the envelope's table ends, in m.
+    pub(super) fn end_m(&self) -> f64 {
+        self.envelope.end_m()
+    }
+
+    /// Largest stiffness that an integrator meets, in N/m.
+    pub(super) fn max_stiffness_n_per_m(&self) -> f64 {
+        match &self.memory {
+            None => self.slope_n_per_m.iter().map(|s| s.abs()).fold(0.0, f64::max),
+            // Line of stiffness k: slope k. Shape: k × 2 share × its steepest fall.
+            Some(memory) => {
+                let line = 2.0 * self.shape.share() * self.shape.steepest();
+                memory.steepest_n_per_m() * line.max(1.0)
+            }
+        }
+    }
+
+    /// Force on the loading branch, in N, at `deflection_m` of 0 or more.
+    pub(super) fn envelope_n(&self, deflection_m: f64) -> f64 {
+        self.on_envelope(self.piece_index(0, deflection_m), deflection_m).force_n
+    }
+
+    /// Force in N at `deflection_m` after the deflection has once been `largest_m`
+    /// (`largest_m ≥ deflection_m`, `largest_m ≥ 0`).
+    pub fn force_n(&self, deflection_m: f64, largest_m: f64) -> f64 {
+        if deflection_m <= 0.0 {
+            return 0.0;
+        }
+        if !self.has_memory() || deflection_m >= largest_m {
+            return self.envelope_n(deflection_m);
+        }
+        let branch = self.branch(self.piece_index(0, largest_m), largest_m);
+        let piece = self.branch_piece(&branch, deflection_m);
+        (piece.at_zero_n + piece.slope_n_per_m * deflection_m).max(0.0)
+    }
+
+    /// Stored and dissipated energy in J at `deflection_m` after the deflection has once been
+    /// `largest_m`. Their sum is the work done so far.
+    pub fn energies_j(&self, deflection_m: f64, largest_m: f64) -> (f64, f64) {
+        if largest_m <= 0.0 {
+            return (0.0, 0.0); // never in contact
+        }
+        if !self.has_memory() {
+            let d = deflection_m.max(0.0);
+            return (self.on_envelope(self.piece_index(0, d), d).work_j, 0.0);
+        }
+        let branch = self.branch(self.piece_index(0, largest_m), largest_m);
+        (self.stored_on_j(&branch, deflection_m), branch.dissipated_j)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(unloading: Unloading) -> ForceLaw {
+        let envelope = Envelope::new(vec![0.0, 0.1, 0.5], vec![0.0, 1e6, 0.6e6]).unwrap();
+        ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold)
+    }
+
+    #[test]
+    fn unloads_and_reloads_on_one_line() {
+        let law = law(Unloading::Memory { stiffness_n_per_m: 40e6 });
+        let top = law.force_n(0.3, 0.3);
+        assert_eq!(top, 0.8e6);
+        assert!((law.force_n(0.29, 0.3) - 0.4e6).abs() < 1e-6);
+        assert!(law.force_n(0.28, 0.3) < 1e-6, "residual crush is 0.28 m");
+        assert_eq!(law.force_n(0.1, 0.3), 0.0);
+        assert_eq!(law.force_n(-0.1, 0.3), 0.0);
+    }
+
+    #[test]
+    fn stored_and_dissipated_add_up_to_the_work_done() {
+        let law = law(Unloading::Memory { stiffness_n_per_m: 40e6 });
+        let (stored, dissipated) = law.energies_j(0.3, 0.3);
+        assert!((stored + dissipated - (0.05e6 + 0.18e6)).abs() < 1e-6);
+        assert!((stored - 0.8e6 * 0.8e6 / 80e6).abs() < 1e-6);
+        let (stored, same) = law.energies_j(0.2, 0.3);
+        assert_eq!((stored, same), (0.0, dissipated));
+    }
+
+    /// Softer than the spike's flank: the rebound at the end follows the stiffness asked
+    /// for, and on the way there no step of the deflection gives energy back.
+    #[test]
+    fn soft_unloading_never_creates_energy() {
+        let envelope =
+            || Envelope::new(vec![0.0, 0.01, 0.02, 0.5], vec![0.0, 3e6, 1e6, 2e6]).unwrap();
+        let with = |stiffness_n_per_m| {
+            let unloading = Unloading::Memory { stiffness_n_per_m };
+            ForceLaw::new(envelope(), unloading, EnvelopeEnd::Hold)
+        };
+        let soft = with(40e6);
+        assert_eq!(soft.max_stiffness_n_per_m(), 300e6);
+        let (stored, _) = soft.energies_j(0.4, 0.4);
+        let top = soft.force_n(0.4, 0.4);
+        assert!((stored - top * top / 80e6).abs() < 1e-6, "on its own line at the end");
+        let mut before = 0.0;
+        for i in 1..=600 {
+            let largest = 1e-3 * f64::from(i);
+            let (stored, dissipated) = soft.energies_j(largest, largest);
+            assert!(dissipated >= before - 1e-9, "at {largest} m");
+            let line = with(300e6).energies_j(largest, largest);
+            assert!(stored >= line.0 - 1e-9 && dissipated <= line.1 + 1e-9);
+            before = dissipated;
+            // What is stored comes back on the way to zero deflection, all of it.
+            let steps = 20_000;
+            let at = |k: i32| largest * f64::from(k) / f64::from(steps);
+            let force = |k: i32| soft.force_n(at(k).max(1e-15), largest);
+            let work: f64 =
+                (0..steps).map(|k| 0.5 * (force(k) + force(k + 1)) * (at(k + 1) - at(k))).sum();
+            assert!((work - stored).abs() < 1e-3 * stored, "{work} of {stored} at {largest} m");
+        }
+    }
+
+    #[test]
+    fn ends_of_the_envelope() {
+        let envelope = || Envelope::new(vec![0.0, 1.0], vec![0.0, 1.0]).unwrap();
+        let hold = ForceLaw::new(envelope(), Unloading::Elastic, EnvelopeEnd::Hold);
+        assert_eq!(hold.force_n(3.0, 3.0), 1.0);
+        let slope = ForceLaw::new(envelope(), Unloading::Elastic, EnvelopeEnd::Slope);
+        assert_eq!(slope.force_n(3.0, 3.0), 3.0);
+        assert_eq!(slope.energies_j(3.0, 3.0).0, 4.5);
+        let error = ForceLaw::new(envelope(), Unloading::Elastic, EnvelopeEnd::Error);
+        assert!(error.is_beyond_end(1.1) && !error.is_beyond_end(1.0));
+    }
+}

@@ -1,0 +1,229 @@
+//! Recorder of events: extremes of interfaces and contacts of bodies between the outputs.
+
+mod extremes;
+mod mean;
+mod spans;
+
+use super::chain::Chain;
+use super::rows::{LANES, Layout, Row, Rows, Slot, each, larger};
+use super::run::{Record, Run};
+use extremes::Extremes;
+use mean::moving_mean;
+use spans::{LEAST_N, Look, Phase, Spans};
+pub(super) use spans::{LOOK_S, Moment};
+
+/// What happens in a run between its outputs.
+pub(super) struct EventRecorder {
+    layout: Layout,
+    interfaces: Vec<Extremes>,
+    bodies: Vec<BodyEvents>,
+    present: Present,
+}
+
+/// What looks and outputs ask of all bodies.
+struct Present {
+    /// 1 for bodies that no force acts on, else 0.
+    is_free: Rows,
+    /// Accelerations between these tell nothing new: see [`Phase::nothing_new_between`].
+    least: Rows,
+    most: Rows,
+    /// Accelerations by contacts at the last look, and its time.
+    seen_a: Rows,
+    seen_s: f64,
+    /// Speed before the contact.
+    free_speed: Rows,
+    /// Speeds at the last output, and its time.
+    v: Rows,
+    time_s: f64,
+}
+
+/// Contact forces on one body.
+#[derive(Clone, Debug)]
+struct BodyEvents {
+    /// Magnitude up to which an acceleration does not count.
+    least_a: f64,
+    phase: Phase,
+    spans: Spans,
+}
+
+impl EventRecorder {
+    pub fn new(chain: &Chain, layout: &Layout) -> Self {
+        let bodies = chain.bodies();
+        let of = |value: &dyn Fn(usize) -> f64| Rows::of(layout, bodies.len(), value);
+        let none = || of(&|_| 0.0);
+        let events: Vec<BodyEvents> = (bodies.iter())
+            .map(|body| BodyEvents {
+                least_a: LEAST_N / body.mass_kg,
+                phase: Phase::Free,
+                spans: Spans::default(),
+            })
+            .collect();
+        let present = Present {
+            is_free: of(&|_| 1.0),
+            least: of(&|i| -events[i].least_a),
+            most: of(&|i| events[i].least_a),
+            seen_a: none(),
+            seen_s: 0.0,
+            free_speed: of(&|i| bodies[i].speed_m_per_s),
+            v: none(),
+            time_s: 0.0,
+        };
+        Self {
+            layout: layout.clone(),
+            interfaces: vec![Extremes::default(); chain.interfaces().len()],
+            bodies: events,
+            present,
+        }
+    }
+
+    /// Contact began at interface `k` with this closing speed.
+    pub fn contact_began(&mut self, k: usize, closing_m_per_s: f64) {
+        self.interfaces[k].contact_began(closing_m_per_s);
+    }
+
+    /// The force of interface `k` has fallen to zero while it opened with this speed.
+    pub fn released(&mut self, k: usize, separation_m_per_s: f64) {
+        self.interfaces[k].released(separation_m_per_s);
+    }
+
+    /// The deflection of interface `k` was largest.
+    pub fn turned(&mut self, k: usize, largest_m: f64, time_s: f64) {
+        self.interfaces[k].turned(largest_m, time_s);
+    }
+
+    /// Interface `k` has this deflection.
+    pub fn deflected(&mut self, k: usize, deflection_m: f64, time_s: f64) {
+        self.interfaces[k].deflected(deflection_m, time_s);
+    }
+
+    /// Interface `k` presses with this force.
+    pub fn pressed(&mut self, k: usize, force_n: f64) {
+        self.interfaces[k].pressed(force_n);
+    }
+
+    /// Interface `k` pulls with this force.
+    pub fn pulled(&mut self, k: usize, tension_n: f64) {
+        self.interfaces[k].pulled(tension_n);
+    }
+
+    /// Interface `k` is pulled apart by this length.
+    pub fn extended(&mut self, k: usize, extension_m: f64) {
+        self.interfaces[k].extended(extension_m);
+    }
+
+    /// Contact forces act on body `i` from `at_s` on.
+    pub fn touched(&mut self, i: usize, at_s: f64) {
+        if self.bodies[i].phase == Phase::Free {
+            let slot = self.layout.of(i);
+            let begin = Moment { time_s: at_s, v_m_per_s: self.present.free_speed[slot] };
+            self.enter(i, slot, Phase::Announced { begin });
+        }
+    }
+
+    /// No contact force acts on body `i` any more.
+    pub fn left_alone(&mut self, i: usize, at: Moment) {
+        let body = &mut self.bodies[i];
+        if let Some(span) = body.phase.closed_at(at) {
+            body.spans.close(span);
+            let slot = self.layout.of(i);
+            self.present.free_speed[slot] = at.v_m_per_s;
+            self.enter(i, slot, Phase::Free);
+        }
+    }
+
+    fn enter(&mut self, i: usize, slot: Slot, phase: Phase) {
+        let body = &mut self.bodies[i];
+        body.phase = phase;
+        let (least, most) = phase.nothing_new_between(body.least_a);
+        (self.present.least[slot], self.present.most[slot]) = (least, most);
+        self.present.is_free[slot] = if phase == Phase::Free { 1.0 } else { 0.0 };
+    }
+
+    /// Whether the accelerations by contact forces are news to [`Self::look`].
+    #[inline(always)]
+    pub fn is_news<const N: usize>(&self, a: &Rows) -> bool {
+        let n = self.layout.known::<N>();
+        let (least, most) = (self.present.least.values(n), self.present.most.values(n));
+        let mut outside: Row = [0.0; LANES];
+        for (c, a) in a.values(n).iter().enumerate() {
+            let below = each(|j| least[c][j] - a[j]);
+            outside = larger(outside, larger(below, each(|j| a[j] - most[c][j])));
+        }
+        outside.iter().any(|&o| o > 0.0)
+    }
+
+    /// Looks at body `i` with this acceleration by contact forces: its span ends if the net force
+    /// has ended or changed its sign since the last look, and one begins that nothing has
+    /// announced.
+    pub fn look(&mut self, i: usize, now: Moment, a: f64) {
+        let slot = self.layout.of(i);
+        let present = &self.present;
+        if a >= present.least[slot] && a <= present.most[slot] {
+            return;
+        }
+        let body = &mut self.bodies[i];
+        let look = Look {
+            before_s: present.seen_s,
+            before_a: present.seen_a[slot],
+            now,
+            a,
+            least_a: body.least_a,
+            free_speed: present.free_speed[slot],
+        };
+        let (phase, ended) = body.phase.after(&look);
+        if let Some(span) = ended {
+            body.spans.close(span);
+        }
+        if phase == Phase::Free {
+            self.present.free_speed[slot] = now.v_m_per_s;
+        }
+        self.enter(i, slot, phase);
+    }
+
+    /// Ends a look at all bodies, with their accelerations by contact forces.
+    #[inline(always)]
+    pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
+        let n = self.layout.known::<N>();
+        self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
+        self.present.seen_s = at_s;
+    }
+
+    /// Takes the speeds of all bodies at an output.
+    #[inline(always)]
+    pub fn output_bodies<const N: usize>(&mut self, v: &Rows, time_s: f64) {
+        let n = self.layout.known::<N>();
+        let vs = v.values(n);
+        let Present { is_free, free_speed, .. } = &mut self.present;
+        let (is_free, free_speed) = (is_free.values(n), free_speed.values_mut(n));
+        for c in 0..n {
+            let v = vs[c];
+            free_speed[c] = each(|j| if is_free[c][j] > 0.0 { v[j] } else { free_speed[c][j] });
+        }
+        self.present.v.values_mut(n).copy_from_slice(vs);
+        self.present.time_s = time_s;
+    }
+
+    /// Fills in the summary; `interval_s` lies between the outputs.
+    pub fn close(self, run: &mut Run, record: Record, interval_s: f64) {
+        for (history, extremes) in run.interfaces.iter_mut().zip(self.interfaces) {
+            extremes.close(history);
+        }
+        for (i, (history, body)) in run.bodies.iter_mut().zip(self.bodies).enumerate() {
+            let BodyEvents { phase, mut spans, .. } = body;
+            let final_v_m_per_s = self.present.v[self.layout.of(i)];
+            let end = Moment { time_s: self.present.time_s, v_m_per_s: final_v_m_per_s };
+            if let Some(span) = phase.at_end_of_run(end) {
+                spans.close(span);
+            }
+            history.final_v_m_per_s = final_v_m_per_s;
+            history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
+            if record == Record::Summary {
+                history.v_m_per_s = Vec::new();
+            }
+            if let Some(contact) = spans.first() {
+                history.mean_deceleration_m_per_s2 = contact.mean_deceleration();
+                history.is_loaded_at_end = contact.is_cut;
+            }
+        }
+    }
+}

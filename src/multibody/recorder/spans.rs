@@ -1,0 +1,277 @@
+//! Spans: the times in which the net contact force on a body has one sign.
+//!
+//! The recorder looks at a body every quarter of a millisecond; between two looks the force is
+//! taken as a straight line. Contacts that open and close within a step announce themselves.
+
+/// A span counts while its net force exceeds this, in N, as in finding the contact of an FE run,
+/// if it changes the body's speed by [`LEAST_SHARE`] of the largest change. Without it rounding
+/// would decide: where vehicles touch without closing, what runs ahead of a shock grows from it,
+/// and where neighbours come to press equally, the force dies away without an end. What is back
+/// at the next look has not ended.
+pub(super) const LEAST_N: f64 = 1e3;
+const LEAST_SHARE: f64 = 0.005;
+/// Spans that counted when they ended. The first that counts at the end of the run is among them.
+const MOST_SPANS: usize = 64;
+/// Time between looks in s, if steps are not longer.
+pub(in super::super) const LOOK_S: f64 = 0.25e-3;
+
+/// A time and the speed of a body at it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in super::super) struct Moment {
+    pub time_s: f64,
+    pub v_m_per_s: f64,
+}
+
+/// Direction of the net contact force on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Push {
+    Forwards,
+    Backwards,
+}
+
+/// What the net contact force on a body does, as far as looks have shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Phase {
+    /// No force that counts.
+    #[default]
+    Free,
+    /// A contact has begun; no look has yet seen its force.
+    Announced { begin: Moment },
+    /// A force that counts has acted since `begin`.
+    Pressed { begin: Moment, push: Push },
+    /// The force has been too small to count since `end`. It may come back.
+    Fading { begin: Moment, push: Push, end: Moment },
+}
+
+/// A closed span of time in which the net contact force had one sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Span {
+    begin: Moment,
+    end: Moment,
+    /// The run ended before the force did.
+    pub is_cut: bool,
+}
+
+/// What a look at a body shows: accelerations by contact forces at the last look and now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    pub before_s: f64,
+    pub before_a: f64,
+    pub now: Moment,
+    pub a: f64,
+    /// Magnitude up to which an acceleration does not count.
+    pub least_a: f64,
+    /// Speed of the body before the force.
+    pub free_speed: f64,
+}
+
+impl Look {
+    /// Direction of the force; `None` if it is too small to count.
+    fn push(&self) -> Option<Push> {
+        match self.a {
+            a if a.abs() <= self.least_a => None,
+            a if a > 0.0 => Some(Push::Forwards),
+            _ => Some(Push::Backwards),
+        }
+    }
+
+    /// Begin of a force that nothing has announced, as if it had grown evenly.
+    fn grown_from(&self) -> Moment {
+        let since_s = 2.0 * (self.now.v_m_per_s - self.free_speed) / self.a;
+        let time_s = self.now.time_s - since_s.clamp(0.0, self.now.time_s - self.before_s);
+        Moment { time_s, v_m_per_s: self.free_speed }
+    }
+
+    /// End of a force that is gone now: somewhere since the last look.
+    fn gone_at(&self) -> Moment {
+        Moment { time_s: 0.5 * (self.before_s + self.now.time_s), ..self.now }
+    }
+
+    /// Where the straight line between the two accelerations crosses zero.
+    fn crossed_zero_at(&self) -> Moment {
+        let Moment { time_s, v_m_per_s } = self.now;
+        let share = (self.a / (self.a - self.before_a)).clamp(0.0, 1.0);
+        let left_s = (time_s - self.before_s) * share;
+        Moment { time_s: time_s - left_s, v_m_per_s: v_m_per_s - 0.5 * self.a * left_s }
+    }
+}
+
+impl Phase {
+    /// The phase after a look, and the span that has ended by it.
+    pub fn after(self, look: &Look) -> (Self, Option<Span>) {
+        let ended = |begin, end| Some(Span { begin, end, is_cut: false });
+        match (self, look.push()) {
+            (Self::Free, None) => (Self::Free, None),
+            (Self::Free, Some(push)) => (Self::Pressed { begin: look.grown_from(), push }, None),
+            // What was announced has no force that counts.
+            (Self::Announced { .. }, None) => (Self::Free, None),
+            (Self::Announced { begin }, Some(push)) => (Self::Pressed { begin, push }, None),
+            (Self::Pressed { begin, .. } | Self::Fading { begin, .. }, None) if look.a == 0.0 => {
+                (Self::Free, ended(begin, look.gone_at()))
+            }
+            (Self::Pressed { begin, push }, None) => {
+                (Self::Fading { begin, push, end: look.gone_at() }, None)
+            }
+            (Self::Fading { end, .. }, None) if look.now.time_s - end.time_s < LOOK_S => {
+                (self, None)
+            }
+            (Self::Fading { begin, end, .. }, None) => (Self::Free, ended(begin, end)),
+            (Self::Pressed { begin, push } | Self::Fading { begin, push, .. }, Some(now))
+                if now == push =>
+            {
+                (Self::Pressed { begin, push }, None)
+            }
+            (Self::Fading { begin, end, .. }, Some(push)) => {
+                (Self::Pressed { begin: end, push }, ended(begin, end))
+            }
+            (Self::Pressed { begin, .. }, Some(push)) => {
+                let crossing = look.crossed_zero_at();
+                (Self::Pressed { begin: crossing, push }, ended(begin, crossing))
+            }
+        }
+    }
+
+    /// The span up to `end`, where contacts have ended; `None` for a body that was free.
+    pub fn closed_at(self, end: Moment) -> Option<Span> {
+        match self {
+            Self::Free => None,
+            Self::Announced { begin }
+            | Self::Pressed { begin, .. }
+            | Self::Fading { begin, .. } => Some(Span { begin, end, is_cut: false }),
+        }
+    }
+
+    /// The span up to the end of the run.
+    pub fn at_end_of_run(self, run_end: Moment) -> Option<Span> {
+        match self {
+            // A force that was never looked at does not count as one that still acts.
+            Self::Free | Self::Announced { .. } => self.closed_at(run_end),
+            Self::Pressed { begin, .. } => Some(Span { begin, end: run_end, is_cut: true }),
+            Self::Fading { end, .. } => self.closed_at(end),
+        }
+    }
+
+    /// Accelerations between these tell nothing new: those too small to count of a free body, all
+    /// of one sign while a force of that sign acts. Everything is new in the other phases.
+    pub fn nothing_new_between(self, least_a: f64) -> (f64, f64) {
+        match self {
+            Self::Free => (-least_a, least_a),
+            Self::Announced { .. } | Self::Fading { .. } => (f64::INFINITY, f64::NEG_INFINITY),
+            Self::Pressed { push: Push::Forwards, .. } => (least_a, f64::INFINITY),
+            Self::Pressed { push: Push::Backwards, .. } => (f64::NEG_INFINITY, -least_a),
+        }
+    }
+}
+
+impl Span {
+    /// Magnitude of the change of speed.
+    fn change(&self) -> f64 {
+        (self.begin.v_m_per_s - self.end.v_m_per_s).abs()
+    }
+
+    pub fn mean_deceleration(&self) -> f64 {
+        (self.begin.v_m_per_s - self.end.v_m_per_s) / (self.end.time_s - self.begin.time_s)
+    }
+}
+
+/// Spans of a body that may count.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Spans {
+    closed: Vec<Span>,
+    /// Largest change of speed so far.
+    largest_change: f64,
+}
+
+impl Spans {
+    /// Keeps a span that may count: before it there may be many that do not.
+    pub fn close(&mut self, span: Span) {
+        self.largest_change = self.largest_change.max(span.change());
+        if self.counts(&span) && self.closed.len() < MOST_SPANS {
+            self.closed.push(span);
+        }
+    }
+
+    /// Whether a span counts beside the largest so far.
+    fn counts(&self, span: &Span) -> bool {
+        span.change() >= LEAST_SHARE * self.largest_change && span.end.time_s > span.begin.time_s
+    }
+
+    /// The first span that counts.
+    pub fn first(&self) -> Option<&Span> {
+        self.closed.iter().find(|span| self.counts(span))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEGIN: Moment = Moment { time_s: 0.001, v_m_per_s: 10.0 };
+
+    fn look(before_a: f64, a: f64) -> Look {
+        let now = Moment { time_s: 0.010, v_m_per_s: 8.0 };
+        Look { before_s: 0.00975, before_a, now, a, least_a: 0.1, free_speed: 10.0 }
+    }
+
+    fn pressed(begin: Moment, push: Push) -> Phase {
+        Phase::Pressed { begin, push }
+    }
+
+    #[test]
+    fn a_force_that_is_announced_begins_where_it_was() {
+        let announced = Phase::Announced { begin: BEGIN };
+        let (phase, ended) = announced.after(&look(0.0, -50.0));
+        assert_eq!((phase, ended), (pressed(BEGIN, Push::Backwards), None));
+        assert_eq!(announced.after(&look(0.0, 0.05)), (Phase::Free, None));
+    }
+
+    #[test]
+    fn a_force_that_changes_its_sign_ends_where_its_line_crosses_zero() {
+        let (phase, ended) = pressed(BEGIN, Push::Backwards).after(&look(-30.0, 10.0));
+        let span = ended.unwrap();
+        assert!((span.end.time_s - (0.010 - 0.25 * 0.25e-3)).abs() < 1e-15);
+        assert_eq!(phase, pressed(span.end, Push::Forwards));
+    }
+
+    #[test]
+    fn a_force_that_fades_ends_unless_it_comes_back() {
+        let before = pressed(BEGIN, Push::Backwards);
+        let (fading, ended) = before.after(&look(-30.0, -0.05));
+        assert!(matches!(fading, Phase::Fading { .. }) && ended.is_none());
+        assert_eq!(fading.after(&look(-0.05, -40.0)), (before, None));
+        let later = |a| {
+            let now = Moment { time_s: 0.0102, v_m_per_s: 8.0 };
+            Look { now, before_s: 0.010, ..look(-0.05, a) }
+        };
+        let (phase, ended) = fading.after(&later(-0.05));
+        assert!(phase == Phase::Free && ended.is_some());
+        let (phase, _) = fading.after(&later(40.0));
+        let Phase::Fading { end, .. } = fading else { panic!("{fading:?}") };
+        assert_eq!(phase, pressed(end, Push::Forwards));
+    }
+
+    #[test]
+    fn only_a_force_that_acts_is_cut_by_the_end_of_the_run() {
+        let end = Moment { time_s: 0.3, v_m_per_s: 2.0 };
+        let is_cut = |phase: Phase| phase.at_end_of_run(end).map(|span| span.is_cut);
+        assert_eq!(is_cut(Phase::Free), None);
+        assert_eq!(is_cut(Phase::Announced { begin: BEGIN }), Some(false));
+        assert_eq!(is_cut(pressed(BEGIN, Push::Forwards)), Some(true));
+        let fading = Phase::Fading { begin: BEGIN, push: Push::Forwards, end };
+        assert_eq!(is_cut(fading), Some(false));
+    }
+
+    #[test]
+    fn spans_of_small_changes_do_not_count() {
+        let span = |from: f64, to: f64| Span {
+            begin: Moment { time_s: from, v_m_per_s: 10.0 },
+            end: Moment { time_s: from + 0.01, v_m_per_s: to },
+            is_cut: false,
+        };
+        let mut spans = Spans::default();
+        spans.close(span(0.0, 9.99));
+        assert_eq!(spans.first(), Some(&span(0.0, 9.99)));
+        spans.close(span(0.1, 5.0));
+        assert_eq!(spans.first(), Some(&span(0.1, 5.0)));
+    }
+}

@@ -1,0 +1,222 @@
+//! Reference integrator: extrapolation with adaptive order and step, independent of the
+//! engine's pieces.
+//!
+//! Memory advances on accepted steps only; inside a step the force takes the larger of memory and
+//! deflection. That force is smooth where a deflection turns, so the error does not show a step
+//! over the turn, which would leave the memory short of the top: steps end at turns.
+
+mod extrapolation;
+mod motion;
+
+use super::chain::Chain;
+use super::ledger::{Account, Balance};
+use super::recorder::{EventRecorder, Moment};
+use super::rows::{Layout, Rows};
+use super::run::{Grid, Record, Run, RunSettings, SimulationError};
+use motion::{Contact, Motion};
+
+/// A shorter step, in s, says that the force is no function of the state.
+const SHORTEST_S: f64 = 1e-15;
+/// A closing speed as small a share of the fastest body's is none: the deflection then is within
+/// `(1e-8)²` of its top.
+const TURNED: f64 = 1e-8;
+
+/// Runs the chain and fills in `run`; extremes are those of its steps, contacts those of the
+/// outputs, and there is no restitution.
+pub(super) fn run(
+    chain: &Chain,
+    settings: &RunSettings,
+    grid: &Grid,
+    run: &mut Run,
+) -> Result<(), SimulationError> {
+    let mut reference = Reference::new(chain, settings);
+    let mut interfaces_j = reference.output(0.0, run);
+    for output in 1..=grid.outputs {
+        reference.go_on(grid.output_s(output - 1), grid.output_s(output))?;
+        interfaces_j = reference.output(grid.output_s(output), run);
+    }
+    reference.events.close(run, settings.record, settings.output_interval_s);
+    run.ledger = reference.account.close(interfaces_j.0, interfaces_j.1);
+    Ok(())
+}
+
+/// A run by extrapolation.
+struct Reference<'a> {
+    motion: Motion<'a>,
+    record: Record,
+    longest_s: f64,
+    fastest_m_per_s: f64,
+    /// What the error of each value of the state is measured by.
+    scale: Vec<f64>,
+    layout: Layout,
+    y: Vec<f64>,
+    /// The step to try next.
+    h: f64,
+    events: EventRecorder,
+    account: Account,
+}
+
+impl<'a> Reference<'a> {
+    /// The chain at its first contact.
+    fn new(chain: &'a Chain, settings: &RunSettings) -> Self {
+        let bodies = chain.bodies();
+        let n = bodies.len();
+        let fastest = bodies.iter().map(|b| b.speed_m_per_s.abs()).fold(1e-3, f64::max);
+        let heaviest = bodies.iter().map(|b| b.mass_kg).fold(0.0, f64::max);
+        let momentum = fastest * heaviest;
+        let scale = (0..2 * n + 3)
+            .map(|i| match i {
+                _ if i < n => fastest * 0.1,
+                _ if i < 2 * n => fastest,
+                _ if i == 2 * n => momentum,
+                _ => momentum * fastest,
+            })
+            .collect();
+        let mut y = chain.first_contact();
+        y.extend(bodies.iter().map(|body| body.speed_m_per_s));
+        y.extend([0.0; 3]);
+        let layout = Layout::new(n);
+        Self {
+            motion: Motion::new(chain),
+            record: settings.record,
+            longest_s: settings.output_interval_s,
+            fastest_m_per_s: fastest,
+            scale,
+            y,
+            h: settings.step_s.min(settings.output_interval_s) / 64.0,
+            events: EventRecorder::new(chain, &layout),
+            layout,
+            account: Account::open(chain),
+        }
+    }
+
+    /// Steps from one output to the next.
+    fn go_on(&mut self, from_s: f64, to_s: f64) -> Result<(), SimulationError> {
+        let mut time_s = from_s;
+        while time_s < to_s {
+            let left = to_s - time_s;
+            let is_last = self.h >= left;
+            let step = if is_last { left } else { self.h };
+            let (next, error) = self.motion.step(&self.y, step, &self.scale);
+            let is_exact = error <= 1.0;
+            let slow = TURNED * self.fastest_m_per_s;
+            let turn = if is_exact { self.motion.turn(&self.y, &next, slow) } else { None };
+            if let Some(share) = turn {
+                // The secant's step; it is taken anew until it ends at the turn.
+                self.h = share * step;
+            } else if is_exact {
+                self.y = next;
+                time_s = if is_last { to_s } else { time_s + step };
+                self.accept(time_s)?;
+                if !is_last || error < 0.01 {
+                    self.h = (1.5 * self.h).min(self.longest_s);
+                }
+            } else {
+                self.h = 0.3 * step;
+            }
+            self.check(time_s)?;
+        }
+        Ok(())
+    }
+
+    /// Fails where the motion cannot be followed.
+    fn check(&self, time_s: f64) -> Result<(), SimulationError> {
+        if !self.y.iter().all(|y| y.is_finite()) {
+            let bodies = self.motion.chain.bodies();
+            let speeds = &self.y[bodies.len()..];
+            let i = (0..bodies.len()).find(|&i| !speeds[i].is_finite()).unwrap_or(0);
+            return Err(SimulationError::Diverged { body: bodies[i].name.clone(), time_s });
+        }
+        if self.h < SHORTEST_S {
+            return Err(SimulationError::Stuck { step_s: SHORTEST_S, time_s });
+        }
+        Ok(())
+    }
+
+    /// Memory and events of an accepted step.
+    fn accept(&mut self, time_s: f64) -> Result<(), SimulationError> {
+        let n = self.motion.chain.bodies().len();
+        let a = self.motion.by_contacts(&self.y);
+        for (i, &a) in a.iter().enumerate() {
+            self.events.look(i, Moment { time_s, v_m_per_s: self.y[n + i] }, a);
+        }
+        self.events.looked::<0>(&Rows::of(&self.layout, n, |i| a[i]), time_s);
+        for (k, interface) in self.motion.chain.interfaces().iter().enumerate() {
+            let contact = self.motion.contact(&self.y, k);
+            if interface.law.is_beyond_end(contact.deflection_m) {
+                return Err(SimulationError::CurveEnd {
+                    interface: interface.name.clone(),
+                    what: "crushed",
+                    deflection_m: contact.deflection_m,
+                    time_s,
+                    end_m: interface.law.end_m(),
+                });
+            }
+            self.record_contact(k, &contact, time_s);
+            self.events.pulled(k, -contact.force_n());
+            self.events.extended(k, contact.extension_m);
+            self.motion.remember(k, &contact);
+        }
+        Ok(())
+    }
+
+    fn record_contact(&mut self, k: usize, contact: &Contact, time_s: f64) {
+        self.events.pressed(k, contact.force_n());
+        self.events.deflected(k, contact.deflection_m, time_s);
+    }
+
+    /// Records the state; gives what the interfaces have stored and dissipated, in J.
+    fn output(&mut self, time_s: f64, run: &mut Run) -> (f64, f64) {
+        let bodies = self.motion.chain.bodies();
+        let n = bodies.len();
+        let (stored_j, dissipated_j) = self.output_interfaces(time_s, run);
+        let rates = self.motion.rates(&self.y);
+        let (x, rest) = self.y.split_at(n);
+        let (v, [impulse, damped_j, resisted_j]) =
+            (&rest[..n], [rest[n], rest[n + 1], rest[n + 2]]);
+        let (mut kinetic_j, mut momentum) = (0.0, 0.0);
+        for (i, history) in run.bodies.iter_mut().enumerate() {
+            let mass_kg = bodies[i].mass_kg;
+            kinetic_j += 0.5 * mass_kg * v[i] * v[i];
+            momentum += mass_kg * v[i];
+            history.v_m_per_s.push(v[i]);
+            if self.record == Record::Histories {
+                history.x_m.push(x[i]);
+                history.a_m_per_s2.push(rates[n + i]);
+            }
+        }
+        self.events.output_bodies::<0>(&Rows::of(&self.layout, n, |i| v[i]), time_s);
+        if self.record == Record::Histories {
+            run.time_s.push(time_s);
+        }
+        self.account.audit(&Balance {
+            kinetic_j,
+            interfaces_j: stored_j + dissipated_j,
+            damped_j,
+            resisted_j,
+            momentum,
+            impulse,
+        });
+        (stored_j, dissipated_j)
+    }
+
+    /// The part of [`Self::output`] of the interfaces.
+    fn output_interfaces(&mut self, time_s: f64, run: &mut Run) -> (f64, f64) {
+        let (mut all_stored_j, mut all_dissipated_j) = (0.0, 0.0);
+        for (k, history) in run.interfaces.iter_mut().enumerate() {
+            let contact = self.motion.contact(&self.y, k);
+            let (stored_j, dissipated_j) = self.motion.energies_j(k, &contact);
+            all_stored_j += stored_j;
+            all_dissipated_j += dissipated_j;
+            self.record_contact(k, &contact, time_s);
+            if self.record == Record::Histories {
+                history.deflection_m.push(contact.deflection_m);
+                history.force_n.push(contact.force_n());
+                history.largest_deflection_m.push(self.motion.pushed_m[k]);
+                history.stored_j.push(stored_j);
+                history.dissipated_j.push(dissipated_j);
+            }
+        }
+        (all_stored_j, all_dissipated_j)
+    }
+}
