@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, shared,
+};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {
@@ -204,8 +206,9 @@ fn energy_audits_of_all_groups() {
 
 /// The full runs give the curves of the thinned ones, bit for bit.
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn full_runs_and_bundled_runs_agree() {
-    let Some(full) = crate::common::shared("fe") else { return };
+    let full = shared("fe");
     let folder = tempfile::tempdir().unwrap();
     for group in [WALL, "lead-car-pair", "vehicle-pair"] {
         build_fixture(folder.path(), group);
@@ -646,9 +649,8 @@ fn energy_rule_takes_up_the_kinetic_energy() {
 
 #[test]
 fn simulate_writes_the_promised_columns_and_ledger() {
-    let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["demo", "-o", "demo"]);
-    let scenario = folder.path().join("demo/scenario.toml");
+    let folder = demo_folder();
+    let scenario = folder.path().join("scenario.toml");
     let scenario = scenario.to_str().unwrap();
     crumple_ok(folder.path(), &["simulate", scenario, "-o", "result.csv"]);
     let csv = std::fs::read_to_string(folder.path().join("result.csv")).unwrap();
@@ -797,9 +799,8 @@ fn every_command_has_help_with_examples() {
 /// One JSON document from every command that can print one without further input.
 #[test]
 fn json_is_one_document() {
-    let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["demo"]);
-    let here = folder.path().join("crumple-demo");
+    let folder = demo_folder();
+    let here = folder.path();
     for line in [
         "inspect fe/lead-car-wall/36kmh/nodout",
         "histories fe/lead-car-wall/36kmh/rwforc",
@@ -824,7 +825,7 @@ fn json_is_one_document() {
     ] {
         let mut arguments: Vec<&str> = line.split(' ').collect();
         arguments.push("--json");
-        let text = crumple_ok(&here, &arguments);
+        let text = crumple_ok(here, &arguments);
         assert!(serde_json::from_str::<Value>(&text).is_ok_and(|v| v.is_object()), "{line}");
     }
 }

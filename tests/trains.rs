@@ -1,25 +1,11 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
-use std::path::Path;
-use std::sync::OnceLock;
-
-use crate::common::{crumple_fails, crumple_ok, root};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, root};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
-}
-
-/// The demo's folder, made once.
-fn demo() -> &'static Path {
-    static DEMO: OnceLock<tempfile::TempDir> = OnceLock::new();
-    DEMO.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        crumple_ok(folder.path(), &["demo", "-o", ".", "-q"]);
-        folder
-    })
-    .path()
 }
 
 /// Runs a scenario text in a folder of its own.
@@ -53,10 +39,12 @@ fn scenario(curves: &str, first: &str, rest: &str) -> String {
 /// Every shipped scenario runs; energy and momentum balance.
 #[test]
 fn shipped_scenarios_run() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let mut run = 0;
     for entry in root().join("examples/trains").read_dir().unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
-        let result = json(&crumple_ok(demo(), &["simulate", &name, "--json", "-q"]));
+        let result = json(&crumple_ok(demo, &["simulate", &name, "--json", "-q"]));
         let ledger = &result["ledger"];
         assert!(ledger["max_energy_error"].as_f64().unwrap() < 1e-3, "{name}: {ledger}");
         assert!(ledger["max_momentum_error"].as_f64().unwrap() < 1e-10, "{name}: {ledger}");
@@ -77,10 +65,12 @@ fn shipped_scenarios_run() {
 /// trains' speed if that is asked for.
 #[test]
 fn interfaces_have_their_own_speeds() {
-    let text = std::fs::read_to_string(demo().join("eight-on-eight.toml")).unwrap();
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = std::fs::read_to_string(demo.join("eight-on-eight.toml")).unwrap();
     let speeds = |text: &str| -> Vec<f64> {
-        std::fs::write(demo().join("local.toml"), text).unwrap();
-        let result = json(&crumple_ok(demo(), &["simulate", "local.toml", "--json", "-q"]));
+        std::fs::write(demo.join("local.toml"), text).unwrap();
+        let result = json(&crumple_ok(demo, &["simulate", "local.toml", "--json", "-q"]));
         let interfaces = result["summary"]["interfaces"].as_array().unwrap().clone();
         interfaces.iter().map(|i| i["curve_speed_m_per_s"].as_f64().unwrap()).collect()
     };
@@ -207,6 +197,8 @@ fn resistance_is_in_the_ledger() {
 /// What the curve's kind may not drive is refused, and the reason says what to do.
 #[test]
 fn the_force_must_suit_the_vehicles() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let text = |vehicle: &str| {
         format!(
             "[run]\nduration = \"100ms\"\n[curves]\nnose = {{ model = \"lead.model\", force = \"body\" }}\n\
@@ -215,20 +207,20 @@ fn the_force_must_suit_the_vehicles() {
         )
     };
     let split = "{ name = \"A1\", mass = \"24t\", front = { mass = \"2t\", curve = \"link\" } }";
-    std::fs::write(demo().join("force.toml"), text(split)).unwrap();
-    let error = crumple_fails(demo(), 1, &["simulate", "force.toml"]);
+    std::fs::write(demo.join("force.toml"), text(split)).unwrap();
+    let error = crumple_fails(demo, 1, &["simulate", "force.toml"]);
     assert!(
         error.contains("curve \"nose\": interface A1|wall has a vehicle with a crush zone"),
         "{error}"
     );
     let free = text(split).replace(", force = \"body\"", "");
-    std::fs::write(demo().join("force.toml"), &free).unwrap();
-    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    std::fs::write(demo.join("force.toml"), &free).unwrap();
+    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
     let force = |r: &Value, k: usize| r["summary"]["interfaces"][k]["curve_force"].clone();
     assert_eq!(force(&result, 1), "contact", "the split vehicle takes the contact force");
     let one = free.replace(", front = { mass = \"2t\", curve = \"link\" }", "");
-    std::fs::write(demo().join("force.toml"), one).unwrap();
-    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    std::fs::write(demo.join("force.toml"), one).unwrap();
+    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
     assert_eq!(force(&result, 0), "body", "one mass takes the body force");
 }
 
@@ -273,8 +265,10 @@ fn wrong_trains_are_explained() {
 /// Velocities of every vehicle against FE's run of the train, by every method.
 #[test]
 fn the_train_set_is_compared_with_fe() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let text = crumple_ok(
-        demo(),
+        demo,
         &["compare", "--train", "train-set.toml", "--nsdm-seeds", "1", "--json", "-q"],
     );
     let result = json(&text);
@@ -292,7 +286,7 @@ fn the_train_set_is_compared_with_fe() {
     assert!(speed(&rows[5], "A2|A3") < 4.0);
     // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
-    let error = crumple_fails(demo(), 1, &["compare", "--train", "scenario.toml"]);
+    let error = crumple_fails(demo, 1, &["compare", "--train", "scenario.toml"]);
     assert!(error.contains("the scenario has no [reference]"), "{error}");
 }
 
@@ -300,8 +294,10 @@ fn the_train_set_is_compared_with_fe() {
 /// contact force has ended or changed its sign.
 #[test]
 fn mean_decelerations_are_those_of_the_histories() {
+    let demo = demo_folder();
+    let demo = demo.path();
     for name in ["scenario.toml", "two-sets.toml", "en15227-wagon.toml"] {
-        let result = json(&crumple_ok(demo(), &["simulate", name, "--json", "-q"]));
+        let result = json(&crumple_ok(demo, &["simulate", name, "--json", "-q"]));
         let times = column(&result, "time_s");
         for body in result["summary"]["bodies"].as_array().unwrap() {
             let vehicle = body["name"].as_str().unwrap();
@@ -322,7 +318,7 @@ fn mean_decelerations_are_those_of_the_histories() {
             assert!(summary.abs() > 0.9 * mean.abs(), "{name} {vehicle}: {summary} for {mean}");
         }
     }
-    let wall = json(&crumple_ok(demo(), &["simulate", "scenario.toml", "--json", "-q"]));
+    let wall = json(&crumple_ok(demo, &["simulate", "scenario.toml", "--json", "-q"]));
     let g = wall["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
     assert!((g - 10.7).abs() < 0.5, "{g} g from 50 km/h");
 }
@@ -363,17 +359,19 @@ fn a_run_that_ends_while_loading_is_said() {
 /// No command writes over what its scenario reads.
 #[test]
 fn inputs_of_a_scenario_are_kept() {
-    let before = std::fs::read(demo().join("pair.model")).unwrap();
+    let demo = demo_folder();
+    let demo = demo.path();
+    let before = std::fs::read(demo.join("pair.model")).unwrap();
     for command in [
         ["simulate", "two-sets.toml", "-o", "pair.model"],
         ["simulate", "train-set.toml", "-o", "curves.h5"],
         ["sweep", "scenario.toml", "-o", "lead.model"],
     ] {
-        let error = crumple_fails(demo(), 2, &command);
+        let error = crumple_fails(demo, 2, &command);
         assert!(error.contains("names the input itself"), "{error}");
     }
-    assert_eq!(std::fs::read(demo().join("pair.model")).unwrap(), before);
-    let error = crumple_fails(demo(), 2, &["simulate", "two-sets.toml", "-o", "out.h5"]);
+    assert_eq!(std::fs::read(demo.join("pair.model")).unwrap(), before);
+    let error = crumple_fails(demo, 2, &["simulate", "two-sets.toml", "-o", "out.h5"]);
     assert!(error.contains("a run is written as CSV"), "{error}");
 }
 
