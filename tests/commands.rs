@@ -320,7 +320,8 @@ fn pair_and_wall_agree_by_symmetry() {
         rows.iter().find(|r| r["name"] == name).unwrap()["max_deflection_m"].as_f64().unwrap()
     };
     let ratio = crush("lead-car-pair", "72kmh") / (2.0 * crush(WALL, "36kmh"));
-    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    // 1.033: the noses also slide along each other, which a wall does not let them.
+    assert!((ratio - 1.0).abs() < 0.035, "{ratio}");
 }
 
 /// `mass × acceleration` instead of the wall's force: another curve, the same energy.
@@ -440,7 +441,6 @@ fn training_is_bitwise_repeatable_on_any_number_of_threads() {
         };
         let first = train("1", "a.model");
         assert_eq!(first, train("2", "b.model"));
-        assert_eq!(first, train("2", "c.model"));
     }
 }
 
@@ -482,9 +482,7 @@ fn a_saved_model_predicts_the_same_bits() {
 
 #[test]
 fn prediction_has_the_promised_keys_and_starts_at_zero() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     let curve = json(&crumple_ok(
         folder.path(),
         &[
@@ -559,9 +557,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
 
 #[test]
 fn lsdyna_export_in_the_decks_units() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     crumple_ok(folder.path(), &["predict", "lead.model", "--speed", "50km/h", "-o", "a.json"]);
     let deck = |units: &str| -> Vec<(f64, f64)> {
         let text = crumple_ok(
@@ -584,9 +580,7 @@ fn lsdyna_export_in_the_decks_units() {
 
 #[test]
 fn warnings_stand_in_text_and_json() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     let codes = |speed: &str| -> Vec<String> {
         let curve = json(&crumple_ok(
             folder.path(),
@@ -621,9 +615,7 @@ fn warnings_stand_in_text_and_json() {
 
 #[test]
 fn energy_rule_takes_up_the_kinetic_energy() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     for (mass, expected) in [("24t", 24e3), ("20t", 20e3)] {
         let curve = json(&crumple_ok(
             folder.path(),
@@ -809,12 +801,12 @@ fn json_is_one_document() {
         "db ls curves.h5",
         "db show curves.h5",
         "db check curves.h5",
-        "train curves.h5 --group lead-car-wall -o lead.model",
+        "train curves.h5 --group lead-car-wall --model rate -o lead.model",
         "predict lead.model --speed 50km/h -o b.csv",
         "simulate scenario.toml",
         "sweep scenario.toml -o sweep.csv",
         "sweep scenario.toml --dry-run",
-        "compare curves.h5 --group lead-car-wall --speed 48km/h",
+        "compare curves.h5 --group lead-car-pair --speed 48km/h --nsdm-seeds 0",
         "rate fe/lead-car-wall/36kmh/nodout fe/lead-car-wall/48kmh/nodout --component x_velocity",
         "export lead50.json --to csv",
         "export lead50.json --to csv -o c.csv",

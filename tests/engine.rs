@@ -160,10 +160,11 @@ fn spread(errors: &[Error]) -> [f64; 3] {
     [sorted[sorted.len() / 2], sorted[sorted.len() * 9 / 10], sorted[sorted.len() - 1]]
 }
 
-fn assert_within(what: &str, errors: &[Error], limits: [f64; 3]) {
+/// `limits` may stop before the largest error.
+fn assert_within(what: &str, errors: &[Error], limits: &[f64]) {
     let found = spread(errors);
     println!("{what}: median, 9 of 10, all within {found:?} m/s");
-    for (found, limit) in found.into_iter().zip(limits) {
+    for (found, limit) in found.into_iter().zip(limits.iter().copied()) {
         assert!(found < limit, "{what}: {found:e} m/s, expected less than {limit:e}");
     }
 }
@@ -193,8 +194,8 @@ const EVERYWHERE: Kind = Kind { everywhere: true, ..ABOVE };
 fn verlet_moves_random_chains_as_the_reference_does() {
     for (name, kind) in [("plain", PLAIN), ("coupled", COUPLED)] {
         let (long, short) = errors(kind, 60, Method::Verlet, 0.25);
-        assert_within(name, &long, [3e-5, 2e-4, 5e-4]);
-        assert_within(name, &short, [2e-6, 1.5e-5, 3e-5]);
+        assert_within(name, &long, &[3e-5, 2e-4, 5e-4]);
+        assert_within(name, &short, &[2e-6, 1.5e-5, 3e-5]);
         let order = order(&long, &short);
         println!("order {order:.2}");
         // A kink costs a chance part of a step, which scatters the single chain's order.
@@ -208,24 +209,25 @@ fn verlet_moves_random_chains_as_the_reference_does() {
 fn the_fourth_order_moves_random_chains_as_the_reference_does() {
     for (name, kind) in [("plain", PLAIN), ("coupled", COUPLED)] {
         let (long, short) = errors(kind, 60, Method::FourthOrder, 0.125);
-        assert_within(name, &long, [3e-5, 4e-4, 1e-3]);
-        assert_within(name, &short, [2e-7, 2e-6, 1e-5]);
+        assert_within(name, &long, &[3e-5, 4e-4, 1e-3]);
+        assert_within(name, &short, &[2e-7, 2e-6, 1e-5]);
         let order = order(&long, &short);
         println!("order {order:.2}");
         assert!(order > 3.2, "{name}: order {order}");
     }
 }
 
-/// Where curves begin above 0, bodies bounce; a bounce in less than a step is not resolved,
-/// and a few chains hang on it.
+/// Where curves begin above 0, bodies bounce. A bounce in less than a step is not resolved, so the largest
+/// error of 60 chains is that of one bounce and proves nothing at the default step (0.01 m/s, and
+/// 0.4 m/s with the fourth order); at short steps it does. Limits are 1.5 times what is found.
 #[test]
 fn curves_that_begin_above_zero_are_followed() {
     let (long, short) = errors(ABOVE, 60, Method::Verlet, 0.25);
-    assert_within("Verlet", &long, [5e-5, 1e-3, 1.0]);
-    assert_within("Verlet, short", &short, [5e-6, 1e-4, 1e-2]);
+    assert_within("Verlet", &long, &[2e-5, 2.4e-4]);
+    assert_within("Verlet, short", &short, &[1.2e-6, 1.2e-5, 1.2e-3]);
     let (long, short) = errors(ABOVE, 60, Method::FourthOrder, 0.0625);
-    assert_within("fourth order", &long, [2e-3, 5e-2, 2.0]);
-    assert_within("fourth order, short", &short, [5e-5, 1e-3, 5e-2]);
+    assert_within("fourth order", &long, &[6.5e-4, 1.1e-2]);
+    assert_within("fourth order, short", &short, &[6.5e-6, 1.1e-4, 1.4e-2]);
 }
 
 /// Bodies that are pressed together behind a curve that begins above 0 turn within nanometres, on

@@ -8,12 +8,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::common::{fixture, shared};
+use crate::common::{fixture, is_thorough, shared};
 use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read_from, read_sections};
 
 /// Bytes appended at once: no divisor of any line's or record's length.
 const APPENDED: usize = 137;
-const READS: usize = 1_000;
 /// What an unfinished end may be called.
 const AT_THE_END: [ProblemCode; 4] = [
     ProblemCode::IncompleteState,
@@ -67,13 +66,14 @@ fn is_beginning(read: &SolverFile, whole: &SolverFile) {
     }
 }
 
-/// Reads a growing file a thousand times.
+/// Reads a growing file many times.
 fn grow(format: &str, name: &str, bytes: &[u8]) {
     let whole = read_from(format, &[Box::new(bytes.to_vec())], &Selection::all()).unwrap();
     assert!(whole.iter().any(|section| section.time.len() > 10), "{format}");
     let folder = tempfile::tempdir().unwrap();
     let current = Mutex::new(PathBuf::new());
     let stop = AtomicBool::new(false);
+    let wanted = if is_thorough() { 1_000 } else { 200 };
     let (mut reads, mut with_states, mut cut) = (0, 0, 0);
     std::thread::scope(|scope| {
         scope.spawn(|| write(bytes, folder.path(), name, &current, &stop));
@@ -85,7 +85,7 @@ fn grow(format: &str, name: &str, bytes: &[u8]) {
             }
         }
         let _end = End(&stop);
-        while reads < READS {
+        while reads < wanted {
             let path = current.lock().unwrap().clone();
             if !path.is_file() {
                 continue;
@@ -105,7 +105,7 @@ fn grow(format: &str, name: &str, bytes: &[u8]) {
             cut += usize::from(sections.iter().any(|s| !s.problems.is_empty()));
         }
     });
-    assert!(with_states > READS / 2 && cut > READS / 10, "{with_states} with states, {cut} cut");
+    assert!(with_states > wanted / 2 && cut > wanted / 10, "{with_states} with states, {cut} cut");
 }
 
 fn grow_file(format: &str, path: &Path) {

@@ -132,7 +132,8 @@ fn couplings_pull() {
         let last = |name: &str| *column(run, name).last().unwrap();
         last("x_m[A1]") - last("x_m[A2]")
     };
-    assert!(apart(&coupled) < apart(&free) || apart(&coupled).abs() < apart(&free).abs());
+    let (coupled_m, free_m) = (apart(&coupled), apart(&free));
+    assert!(coupled_m.abs() < free_m.abs(), "{coupled_m} m coupled, {free_m} m free");
     assert!(coupled["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
 }
 
@@ -283,7 +284,9 @@ fn the_train_set_is_compared_with_fe() {
     }
     let speed = |row: &Value, name: &str| row["interface_speeds_m_per_s"][name].as_f64().unwrap();
     assert!((speed(&rows[4], "A2|A3") - 5.0).abs() < 1e-9);
-    assert!(speed(&rows[5], "A2|A3") < 4.0);
+    // The closing speeds that the interfaces have reached, in km/h.
+    assert!((speed(&rows[5], "A2|A3") * 3.6 - 8.21).abs() < 0.01);
+    assert!((speed(&rows[5], "A1|A2") * 3.6 - 10.11).abs() < 0.01);
     // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
     let error = crumple_fails(demo, 1, &["compare", "--train", "scenario.toml"]);
@@ -312,15 +315,19 @@ fn mean_decelerations_are_those_of_the_histories() {
             let begin = first.saturating_sub(1);
             let mean = (v[begin] - v[end]) / (times[end] - times[begin]);
             let summary = body["mean_deceleration_m_per_s2"].as_f64().unwrap();
-            // Ends fall between two outputs; contacts that end and begin again make the mean of the
-            // histories longer.
-            assert!(summary != 0.0 && summary.signum() == mean.signum(), "{name} {vehicle}");
-            assert!(summary.abs() > 0.9 * mean.abs(), "{name} {vehicle}: {summary} for {mean}");
+            let ratio = summary / mean;
+            if ["A4", "B4", "W1"].contains(&vehicle) {
+                // The contact ends and begins again, which makes the mean of the histories longer.
+                assert!((1.13..1.64).contains(&ratio), "{name} {vehicle}: {summary} for {mean}");
+            } else {
+                // Ends fall between two outputs: 1.1 % at most.
+                assert!((ratio - 1.0).abs() < 0.012, "{name} {vehicle}: {summary} for {mean}");
+            }
         }
     }
     let wall = json(&crumple_ok(demo, &["simulate", "scenario.toml", "--json", "-q"]));
     let g = wall["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
-    assert!((g - 10.7).abs() < 0.5, "{g} g from 50 km/h");
+    assert!((g - 10.54).abs() < 0.01, "{g} g from 50 km/h");
 }
 
 /// A run that is too short for its mean deceleration says so, by every method.
