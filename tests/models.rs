@@ -108,7 +108,7 @@ fn curve(model: &Model, v: f64) -> PredictedCurve {
     predict(model, &Query { extrapolate: true, ..Query::at(v) }).unwrap()
 }
 
-/// The choice on the bundled FE runs, with the real candidates. The README's table, which a test
+/// The choice on the bundled FE runs, with the real candidates. The table of docs/results.md, which a test
 /// holds against the program, has the numbers.
 #[test]
 fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
@@ -879,9 +879,10 @@ fn contact_and_body_force_rebound_alike() {
         let (contact, body) =
             (rebound(curve.envelope().unwrap()), rebound(curve.driving_envelope().unwrap()));
         let measured = curve.rebound.unwrap().speed_m_per_s;
-        assert!((body / measured - 1.0).abs() < 0.03, "{body} of {measured}");
-        println!("REBOUND {} {contact} {body} {measured}", case.name);
-        assert!((contact / measured - 1.0).abs() < 0.25, "{contact} of {measured}");
+        // The stiffness is chosen so that the body force gives the measured speed: 3e-5 are left.
+        assert!((body / measured - 1.0).abs() < 1e-4, "{body} of {measured}");
+        // The contact curve stops the body a little off its end: 2.5 % are left.
+        assert!((contact / measured - 1.0).abs() < 0.03, "{contact} of {measured}");
     }
 }
 

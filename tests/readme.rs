@@ -154,11 +154,3 @@ fn the_readme_has_at_most_900_words() {
     let words = text.split_whitespace().filter(|w| w.contains(char::is_alphanumeric)).count();
     assert!(words <= 900, "{words} words; the rest belongs into docs/");
 }
-
-/// CI runs the two commands of a fresh clone.
-#[test]
-fn ci_runs_the_two_commands() {
-    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
-    assert!(ci.contains("cargo run --locked --release -- demo"));
-    assert!(ci.lines().any(|l| l == "tests/run"));
-}
