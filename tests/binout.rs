@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, samples, shared};
+use crate::common::{
+    crumple_fails, crumple_in, crumple_ok, fixture, python, run_python, samples, shared,
+};
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read, read_sections};
 
@@ -32,8 +34,9 @@ fn agrees(text: &SolverFile, binary: &SolverFile, digits: i32) -> usize {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn text_and_binary_of_one_run_agree() {
-    let Some(folder) = shared("samples/lsdyna") else { return };
+    let folder = shared("samples/lsdyna");
     for run in ["run0001", "run0010_5"] {
         let text = folder.join(format!("nodout/rowan_r14.1.1_smp_d_{run}"));
         let text = read(&text, None, &Selection::all()).unwrap();
@@ -61,9 +64,21 @@ fn text_and_binary_of_one_run_agree() {
     assert_eq!(agrees(&text, &binary, 7), 88 * 4);
 }
 
+/// Every value of every section that lasso-python reads, of every sample.
 #[test]
+#[ignore = "needs ../shared and the Python clients"]
+fn lasso_reads_the_same() {
+    let files = samples("binout");
+    let files = files.iter().map(|path| path.to_str().unwrap());
+    let files = files.filter(|path| !path.contains("not_binout"));
+    let arguments: Vec<&str> = [env!("CARGO_BIN_EXE_crumple")].into_iter().chain(files).collect();
+    assert_eq!(run_python(python(), "binout.py", &arguments), 136_791, "values compared");
+}
+
+#[test]
+#[ignore = "needs ../shared (the real files)"]
 fn sections_states_and_ids_of_every_sample() {
-    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let folder = shared("samples/lsdyna/binout");
     let states = |name: &str| -> Vec<(String, usize)> {
         let sections = read_sections(&folder.join(name), None, &Selection::nothing()).unwrap();
         sections.into_iter().map(|s| (s.section, s.time.len())).collect()
@@ -99,8 +114,9 @@ fn sections_states_and_ids_of_every_sample() {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn histories_needs_a_section_and_selects() {
-    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let folder = shared("samples/lsdyna/binout");
     let path = folder.join("rowan_r14.1.1_smp_d_run0001");
     let path = path.to_str().unwrap();
     let here = Path::new(".");
@@ -501,14 +517,8 @@ fn continuations_and_cuts() {
     }
 }
 
-/// Samples with flipped bits, zeroed ranges and cuts: a result or an error, never a panic.
-#[test]
-fn damaged_containers_never_panic() {
-    let mut seeds = vec![binout_of(&fixture("fe/lead-car-wall/25kmh"))[..20_000].to_vec()];
-    for path in samples("binout").into_iter().flatten() {
-        let bytes = fs::read(path).unwrap();
-        seeds.push(bytes[..bytes.len().min(60_000)].to_vec());
-    }
+/// Flipped bits, zeroed ranges and cuts: a result or an error, never a panic.
+fn damage(seed: &[u8]) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("binout");
     let mut state = 7u64;
@@ -517,25 +527,37 @@ fn damaged_containers_never_panic() {
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % n
     };
-    for seed in &seeds {
-        for _ in 0..300 {
-            let mut bytes = seed.clone();
-            for _ in 0..3 {
-                let at = random(bytes.len());
-                bytes[at] ^= 1 << random(8);
-            }
-            let from = random(bytes.len());
-            let to = (from + random(64)).min(bytes.len());
-            bytes[from..to].fill(0);
-            bytes.truncate(random(bytes.len()) + 1);
-            fs::write(&path, &bytes).unwrap();
-            for selection in [Selection::all(), Selection::nothing()] {
-                for file in read_sections(&path, Some("binout"), &selection).into_iter().flatten() {
-                    assert!(file.histories.iter().all(|h| h.values.len() == file.time.len()));
-                }
+    for _ in 0..300 {
+        let mut bytes = seed.to_vec();
+        for _ in 0..3 {
+            let at = random(bytes.len());
+            bytes[at] ^= 1 << random(8);
+        }
+        let from = random(bytes.len());
+        let to = (from + random(64)).min(bytes.len());
+        bytes[from..to].fill(0);
+        bytes.truncate(random(bytes.len()) + 1);
+        fs::write(&path, &bytes).unwrap();
+        for selection in [Selection::all(), Selection::nothing()] {
+            for file in read_sections(&path, Some("binout"), &selection).into_iter().flatten() {
+                assert!(file.histories.iter().all(|h| h.values.len() == file.time.len()));
             }
         }
     }
     let output = crumple_in(folder.path(), &["inspect", "binout"]);
     assert!(output.status.code().is_some_and(|c| c < 4));
+}
+
+#[test]
+fn damaged_containers_never_panic() {
+    damage(&binout_of(&fixture("fe/lead-car-wall/25kmh"))[..20_000]);
+}
+
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn damaged_samples_never_panic() {
+    for path in samples("binout") {
+        let bytes = fs::read(path).unwrap();
+        damage(&bytes[..bytes.len().min(60_000)]);
+    }
 }

@@ -7,9 +7,10 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
 
-use crate::common::{build_fixture, crumple_ok, fixture, python, python_of, root};
+use crate::common::{
+    build_fixture, crumple_ok, demo_folder, fixture, is_thorough, python, python_of,
+};
 use crumple::curve::Envelope;
 use crumple::database::Database;
 use crumple::dataset::{TableKind, TrainingSet};
@@ -23,51 +24,29 @@ use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2, Axis};
 use serde_json::Value;
 
-/// Runs a script of tests/python and parses what it prints.
-fn run_python(script: &str, arguments: &[&str]) -> Option<Value> {
-    run_python_of(python()?, script, arguments)
-}
-
-fn run_python_of(mut command: Command, script: &str, arguments: &[&str]) -> Option<Value> {
-    let output =
-        command.arg(root().join("tests/python").join(script)).args(arguments).output().unwrap();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{script}: {error}");
-    Some(serde_json::from_slice(&output.stdout).unwrap())
-}
-
-/// Every value of every section that lasso-python reads, of every binout sample.
-#[test]
-fn lasso_reads_the_same_binout() {
-    let Some(files) = crate::common::samples("binout") else { return };
-    let files: Vec<&str> = files
-        .iter()
-        .filter(|path| !path.display().to_string().contains("not_binout"))
-        .map(|path| path.to_str().unwrap())
-        .collect();
-    let arguments: Vec<&str> = [env!("CARGO_BIN_EXE_crumple")].into_iter().chain(files).collect();
-    let Some(compared) = run_python("binout.py", &arguments) else { return };
-    assert_eq!(compared, 136_791, "values compared");
+/// Runs a script of tests/python with the clients.
+fn run_python(script: &str, arguments: &[&str]) -> Value {
+    crate::common::run_python(python(), script, arguments)
 }
 
 /// The default export of the default model, in every format and in each of its units, drives one mass as FE's went:
 /// velocity within 1 %, rebound within 10 %. What the obstacle feels does not.
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn exported_curves_move_one_mass_as_fe_did() {
     let groups = [
-        ("lead-car-wall", "900001", "0.001", &["36", "48", "60"][..]),
-        ("lead-car-pair", "900001-900002", "0.001", &["36", "48", "60"]),
-        ("vehicle-pair", "900001", "0.002", &["36", "48", "60"]),
+        ("lead-car-wall", "lead.model", "900001", "0.001"),
+        ("lead-car-pair", "pair.model", "900001-900002", "0.001"),
+        ("vehicle-pair", "vehicle.model", "900001", "0.002"),
     ];
-    let folder = tempfile::tempdir().unwrap();
+    // The demo has trained the default model of every group.
+    let folder = demo_folder();
     let here = folder.path();
-    for (group, node, scale, speeds) in groups {
-        build_fixture(here, group);
-        crumple_ok(here, &["train", "curves.h5", "--group", group, "-o", "m.model"]);
-        for speed in speeds {
+    for (group, model, node, scale) in groups {
+        for speed in ["36", "48", "60"] {
             let asked = format!("{speed}km/h");
             let outputs = ["-o", "curve.json", "-o", "predicted.csv", "-o", "predicted.k"];
-            let predict = ["predict", "m.model", "--speed", &asked];
+            let predict = ["predict", model, "--speed", &asked];
             crumple_ok(here, &[&predict[..], &outputs[..]].concat());
             let export = |output: &str, more: &[&str]| {
                 crumple_ok(here, &[&["export", "curve.json", "-o", output][..], more].concat());
@@ -95,7 +74,7 @@ fn exported_curves_move_one_mass_as_fe_did() {
                 files.iter().map(|f| here.join(f).display().to_string()).collect();
             let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
             let arguments = [&[nodout.to_str().unwrap(), node, scale][..], &paths].concat();
-            let Some(found) = run_python("one_mass.py", &arguments) else { return };
+            let found = run_python("one_mass.py", &arguments);
             for (file, numbers) in found.as_object().unwrap() {
                 let velocity = numbers[0].as_f64().unwrap();
                 let rebound = numbers[1].as_f64().unwrap();
@@ -112,16 +91,13 @@ fn exported_curves_move_one_mass_as_fe_did() {
 }
 
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn h5py_reads_what_db_show_prints() {
     let folder = tempfile::tempdir().unwrap();
     for group in ["lead-car-wall", "lead-car-pair", "vehicle-pair"] {
         build_fixture(folder.path(), group);
     }
-    let Some(read) =
-        run_python("read_database.py", &[folder.path().join("curves.h5").to_str().unwrap()])
-    else {
-        return;
-    };
+    let read = run_python("read_database.py", &[folder.path().join("curves.h5").to_str().unwrap()]);
     let shown = crumple_ok(folder.path(), &["db", "show", "curves.h5", "--json"]);
     let shown: Value = serde_json::from_str(&shown).unwrap();
     let cases = read["cases"].as_array().unwrap();
@@ -150,16 +126,14 @@ fn h5py_reads_what_db_show_prints() {
 }
 
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn h5py_reads_histories() {
     let folder = tempfile::tempdir().unwrap();
     let source = fixture("fe/lead-car-pair/36kmh/nodout");
     let source = source.to_str().unwrap();
     crumple_ok(folder.path(), &["histories", source, "-o", "nodout.h5"]);
-    let Some(read) =
-        run_python("read_histories.py", &[folder.path().join("nodout.h5").to_str().unwrap()])
-    else {
-        return;
-    };
+    let read =
+        run_python("read_histories.py", &[folder.path().join("nodout.h5").to_str().unwrap()]);
     let json = crumple_ok(folder.path(), &["histories", source, "--json"]);
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(read["time"], json["time"]);
@@ -239,7 +213,7 @@ fn agrees_with_scikit_learn(name: &str, records: &Array2<f64>, targets: &Array1<
     let path = folder.path().join("table.csv");
     write_csv(&path, records, targets);
     let arguments = [path.to_str().unwrap(), &SEEDS.to_string(), &SPLITS.to_string()];
-    let Some(theirs) = run_python("forest.py", &arguments) else { return };
+    let theirs = run_python("forest.py", &arguments);
     for (ours, theirs) in
         our_importance(records, targets).iter().zip(theirs["importance"].as_array().unwrap())
     {
@@ -258,6 +232,7 @@ fn agrees_with_scikit_learn(name: &str, records: &Array2<f64>, targets: &Array1<
 }
 
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), "lead-car-wall");
@@ -265,11 +240,15 @@ fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
     let set = TrainingSet::new("lead-car-wall", database.cases("lead-car-wall")).unwrap();
     let table = set.table(TableKind::Samples);
     agrees_with_scikit_learn("FE table, states", table.records(), table.targets());
-    let table = set.table(TableKind::Grid);
-    agrees_with_scikit_learn("FE table, grid", table.records(), table.targets());
+    // The same with more rows, which takes scikit-learn minutes.
+    if is_thorough() {
+        let table = set.table(TableKind::Grid);
+        agrees_with_scikit_learn("FE table, grid", table.records(), table.targets());
+    }
 }
 
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn forest_is_as_accurate_as_scikit_learn_on_a_smooth_function() {
     // Quasi-random points (generalised golden ratio) in the unit square.
     let point = |i: usize, step: f64| (0.5 + step * i as f64).fract();
@@ -305,6 +284,7 @@ fn records_at_thresholds(model: &Value) -> Array2<f64> {
 
 /// A float has 24 bits: the rounded output is off by half of the last.
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn onnx_runtime_predicts_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -318,7 +298,7 @@ fn onnx_runtime_predicts_the_same() {
         let bytes: Vec<u8> = records.iter().flat_map(|v| v.to_le_bytes()).collect();
         std::fs::write(here.join("records"), bytes).unwrap();
         let paths = ["m.onnx", "records"].map(|name| here.join(name).display().to_string());
-        let Some(theirs) = run_python("onnx_model.py", &[&paths[0], &paths[1]]) else { return };
+        let theirs = run_python("onnx_model.py", &[&paths[0], &paths[1]]);
         assert_eq!(theirs["metadata"]["features"], "speed_m_per_s,deflection_m");
         assert_eq!(theirs["metadata"]["target"], "force_N");
         assert_eq!(theirs["producer"], concat!("crumple ", env!("CARGO_PKG_VERSION")));
@@ -362,6 +342,7 @@ type Wave<'a> = &'a dyn Fn(f64, usize) -> f64;
 /// correlate equally at every shift, so that rounding chooses (0.1 i against 0.2 i + 0.3: one
 /// sample); and references of zeros (NaN).
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn objective_rating_metrics_and_numpy_rate_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -421,7 +402,7 @@ fn objective_rating_metrics_and_numpy_rate_the_same() {
         })
         .collect();
     let asked = Value::from(places).to_string();
-    let Some(theirs) = run_python("rating.py", &[&asked]) else { return };
+    let theirs = run_python("rating.py", &[&asked]);
     for ((a, b, column, from, to, class), theirs) in pairs.iter().zip(theirs.as_array().unwrap()) {
         let mut arguments = vec!["rate", a, b, "--column", column, "--json"];
         let from = from.map(|t| format!("--from={t}s"));
@@ -443,31 +424,25 @@ fn objective_rating_metrics_and_numpy_rate_the_same() {
 /// Its times stop one sample before ours where the common time is a multiple of 0.1 ms, as they
 /// come from a half-open range; with the histories thinned to their own 10 kHz both take all.
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn pyisomme_rates_the_same() {
-    let Some(command) = python_of("CRUMPLE_PYTHON_ISOMME") else { return };
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    for group in ["lead-car-wall", "lead-car-pair"] {
-        for speed in ["36", "48", "72"] {
-            let nodout = fixture(&format!("fe/{group}/{speed}kmh/nodout"));
-            let output = format!("{group}-{speed}.csv");
-            crumple_ok(here, &["histories", nodout.to_str().unwrap(), "-o", &output]);
-        }
+    for speed in ["36", "48", "72"] {
+        let nodout = fixture(&format!("fe/lead-car-wall/{speed}kmh/nodout"));
+        let output = format!("{speed}.csv");
+        crumple_ok(here, &["histories", nodout.to_str().unwrap(), "-o", &output]);
     }
-    let file = |group: &str, speed: &str| format!("{group}-{speed}.csv");
-    let mut pairs = Vec::new();
-    for group in ["lead-car-wall", "lead-car-pair"] {
-        for (a, b) in [("36", "48"), ("48", "36"), ("36", "72")] {
-            pairs.push((file(group, a), file(group, b)));
-        }
-    }
+    let file = |speed: &str| format!("{speed}.csv");
+    let pairs = [("36", "48"), ("48", "36"), ("36", "72")].map(|(a, b)| (file(a), file(b)));
     let column = "x_velocity[900001]";
     let asked: Vec<Value> = pairs
         .iter()
         .map(|(a, b)| serde_json::json!([here.join(a), here.join(b), column]))
         .collect();
     let asked = Value::from(asked).to_string();
-    let theirs = run_python_of(command, "isomme_rating.py", &[&asked]).unwrap();
+    let python = python_of("CRUMPLE_PYTHON_ISOMME");
+    let theirs = crate::common::run_python(python, "isomme_rating.py", &[&asked]);
     let theirs = theirs.as_array().unwrap();
     assert_eq!(theirs.len(), pairs.len());
     for ((a, b), theirs) in pairs.iter().zip(theirs) {
@@ -482,8 +457,8 @@ fn pyisomme_rates_the_same() {
 /// the noses, 20.24 t behind, one law without memory everywhere, so that only the motion is
 /// compared. Exudyn takes steps of fourth order over the kinks of the same tables.
 #[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
 fn exudyn_moves_eight_cars_against_eight_alike() {
-    let Some(_) = python() else { return };
     let mass = |i: usize| if i == 7 || i == 8 { 24.0e3 } else { 20.24e3 };
     let speed = |i: usize| if i < 8 { 10.0 } else { 0.0 };
     let nose = (vec![0.0, 0.05, 0.12, 0.4, 2.0], vec![0.0, 3.1e6, 1.4e6, 1.9e6, 2.6e6]);
@@ -515,7 +490,7 @@ fn exudyn_moves_eight_cars_against_eight_alike() {
             "outputs": outputs,
         });
         std::fs::write(&file, asked.to_string()).unwrap();
-        let Some(theirs) = run_python("exudyn_chain.py", &[file.to_str().unwrap()]) else { return };
+        let theirs = run_python("exudyn_chain.py", &[file.to_str().unwrap()]);
         let theirs: Vec<Vec<f64>> = serde_json::from_value(theirs).unwrap();
         for (method, step_s) in [(Method::Verlet, 1e-6), (Method::FourthOrder, 1.5e-5)] {
             let settings = RunSettings::new(f64::from(outputs) * 0.75e-3, 0.75e-3);

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, shared,
+};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {
@@ -204,8 +206,9 @@ fn energy_audits_of_all_groups() {
 
 /// The full runs give the curves of the thinned ones, bit for bit.
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn full_runs_and_bundled_runs_agree() {
-    let Some(full) = crate::common::shared("fe") else { return };
+    let full = shared("fe");
     let folder = tempfile::tempdir().unwrap();
     for group in [WALL, "lead-car-pair", "vehicle-pair"] {
         build_fixture(folder.path(), group);
@@ -317,7 +320,8 @@ fn pair_and_wall_agree_by_symmetry() {
         rows.iter().find(|r| r["name"] == name).unwrap()["max_deflection_m"].as_f64().unwrap()
     };
     let ratio = crush("lead-car-pair", "72kmh") / (2.0 * crush(WALL, "36kmh"));
-    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    // 1.033: the noses also slide along each other, which a wall does not let them.
+    assert!((ratio - 1.0).abs() < 0.035, "{ratio}");
 }
 
 /// `mass × acceleration` instead of the wall's force: another curve, the same energy.
@@ -437,7 +441,6 @@ fn training_is_bitwise_repeatable_on_any_number_of_threads() {
         };
         let first = train("1", "a.model");
         assert_eq!(first, train("2", "b.model"));
-        assert_eq!(first, train("2", "c.model"));
     }
 }
 
@@ -478,9 +481,7 @@ fn a_saved_model_predicts_the_same_bits() {
 
 #[test]
 fn prediction_has_the_promised_keys_and_starts_at_zero() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     let curve = json(&crumple_ok(
         folder.path(),
         &[
@@ -555,9 +556,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
 
 #[test]
 fn lsdyna_export_in_the_decks_units() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     crumple_ok(folder.path(), &["predict", "lead.model", "--speed", "50km/h", "-o", "a.json"]);
     let deck = |units: &str| -> Vec<(f64, f64)> {
         let text = crumple_ok(
@@ -580,9 +579,7 @@ fn lsdyna_export_in_the_decks_units() {
 
 #[test]
 fn warnings_stand_in_text_and_json() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     let codes = |speed: &str| -> Vec<String> {
         let curve = json(&crumple_ok(
             folder.path(),
@@ -617,9 +614,7 @@ fn warnings_stand_in_text_and_json() {
 
 #[test]
 fn energy_rule_takes_up_the_kinetic_energy() {
-    let folder = tempfile::tempdir().unwrap();
-    build_fixture(folder.path(), WALL);
-    crumple_ok(folder.path(), &["train", "curves.h5", "--group", WALL, "-o", "lead.model"]);
+    let folder = demo_folder();
     for (mass, expected) in [("24t", 24e3), ("20t", 20e3)] {
         let curve = json(&crumple_ok(
             folder.path(),
@@ -645,9 +640,8 @@ fn energy_rule_takes_up_the_kinetic_energy() {
 
 #[test]
 fn simulate_writes_the_promised_columns_and_ledger() {
-    let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["demo", "-o", "demo"]);
-    let scenario = folder.path().join("demo/scenario.toml");
+    let folder = demo_folder();
+    let scenario = folder.path().join("scenario.toml");
     let scenario = scenario.to_str().unwrap();
     crumple_ok(folder.path(), &["simulate", scenario, "-o", "result.csv"]);
     let csv = std::fs::read_to_string(folder.path().join("result.csv")).unwrap();
@@ -796,9 +790,8 @@ fn every_command_has_help_with_examples() {
 /// One JSON document from every command that can print one without further input.
 #[test]
 fn json_is_one_document() {
-    let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["demo"]);
-    let here = folder.path().join("crumple-demo");
+    let folder = demo_folder();
+    let here = folder.path();
     for line in [
         "inspect fe/lead-car-wall/36kmh/nodout",
         "histories fe/lead-car-wall/36kmh/rwforc",
@@ -807,12 +800,12 @@ fn json_is_one_document() {
         "db ls curves.h5",
         "db show curves.h5",
         "db check curves.h5",
-        "train curves.h5 --group lead-car-wall -o lead.model",
+        "train curves.h5 --group lead-car-wall --model rate -o lead.model",
         "predict lead.model --speed 50km/h -o b.csv",
         "simulate scenario.toml",
         "sweep scenario.toml -o sweep.csv",
         "sweep scenario.toml --dry-run",
-        "compare curves.h5 --group lead-car-wall --speed 48km/h",
+        "compare curves.h5 --group lead-car-pair --speed 48km/h --nsdm-seeds 0",
         "rate fe/lead-car-wall/36kmh/nodout fe/lead-car-wall/48kmh/nodout --component x_velocity",
         "export lead50.json --to csv",
         "export lead50.json --to csv -o c.csv",
@@ -823,7 +816,7 @@ fn json_is_one_document() {
     ] {
         let mut arguments: Vec<&str> = line.split(' ').collect();
         arguments.push("--json");
-        let text = crumple_ok(&here, &arguments);
+        let text = crumple_ok(here, &arguments);
         assert!(serde_json::from_str::<Value>(&text).is_ok_and(|v| v.is_object()), "{line}");
     }
 }

@@ -222,6 +222,20 @@ fn every_source_file_says_first_what_it_is_for() {
     }
 }
 
+/// Where the real files are absent, `tests/run` finds the tests that need the clients by name.
+#[test]
+fn tests_that_need_clients_are_found_by_name() {
+    for path in files(&root().join("tests"), "rs") {
+        let module = path.file_stem().unwrap().to_str().unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        for behind in text.split("#[ignore = \"needs the Python clients").skip(1) {
+            let name = behind.split("fn ").nth(1).unwrap().split('(').next().unwrap();
+            let is_found = ["clients", "documents"].contains(&module) || name.contains("h5py");
+            assert!(is_found, "{module}::{name} needs h5py in its name");
+        }
+    }
+}
+
 #[test]
 fn dependencies_have_fixed_minor_versions() {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();

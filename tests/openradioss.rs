@@ -31,8 +31,9 @@ fn agrees(text: &SolverFile, binary: &SolverFile, digits: f64) -> usize {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn t01_and_text_of_every_run_agree() {
-    let Some(folder) = shared("fe") else { return };
+    let folder = shared("fe");
     let mut runs = 0;
     for group in ["lead-car-wall", "lead-car-pair", "vehicle-pair", "train-set"] {
         for run in folder.join(group).read_dir().unwrap() {
@@ -60,8 +61,9 @@ fn t01_and_text_of_every_run_agree() {
 
 /// Nodes that stand on a wall for one state are no damage.
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn every_t01_of_the_fe_runs_is_clean() {
-    let Some(folder) = shared("fe") else { return };
+    let folder = shared("fe");
     let mut files = 0;
     for group in folder.read_dir().unwrap().map(|entry| entry.unwrap().path()) {
         for run in group.read_dir().into_iter().flatten().map(|entry| entry.unwrap().path()) {
@@ -77,8 +79,9 @@ fn every_t01_of_the_fe_runs_is_clean() {
 
 /// A range of zeros names what it took.
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn overwritten_values_are_named_with_entity_and_component() {
-    let Some(full) = shared("fe") else { return };
+    let full = shared("fe");
     let mut bytes = fs::read(full.join("lead-car-wall/25kmh/crashT01")).unwrap();
     // A state has records of 4, 88, 24, 24, 432 (12 nodes with 9 values each) and 36 bytes.
     let at = bytes.len() - 200 * (608 + 6 * 8) + (4 + 88 + 24 + 24 + 4 * 8) + 4;
@@ -98,8 +101,9 @@ fn overwritten_values_are_named_with_entity_and_component() {
 
 /// A study whose folders hold nothing but T01 gives the curves of the text.
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn a_study_of_t01_alone() {
-    let Some(full) = shared("fe") else { return };
+    let full = shared("fe");
     let folder = tempfile::tempdir().unwrap();
     let manifest = fs::read_to_string(full.join("lead-car-pair/study.toml")).unwrap();
     fs::write(folder.path().join("study.toml"), manifest).unwrap();
@@ -127,8 +131,9 @@ fn a_study_of_t01_alone() {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn cut_anywhere_gives_the_whole_states() {
-    let Some(full) = shared("fe") else { return };
+    let full = shared("fe");
     let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("runT01");
@@ -154,8 +159,9 @@ fn cut_anywhere_gives_the_whole_states() {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn damaged_files_never_panic() {
-    let Some(full) = shared("fe") else { return };
+    let full = shared("fe");
     let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
     let bytes = &bytes[..8_000];
     let folder = tempfile::tempdir().unwrap();

@@ -4,13 +4,17 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use crate::common::{fixture, shared};
+use crate::common::{fixture, is_thorough, shared};
 use crumple::solver::{ProblemCode, Selection, SolverFile, read_from};
 
 /// Bytes of a sample that are used: the damage of a state shows on few states.
 const SIZE: usize = 60_000;
-const CUTS: usize = 1_000;
-const RANGES: usize = 100;
+
+/// Places at which a file is cut, and ranges that are overwritten.
+fn cuts_and_ranges() -> (usize, usize) {
+    if is_thorough() { (1_000, 100) } else { (200, 40) }
+}
+
 /// Bytes overwritten: at least some values, at most several states.
 const SHORTEST: usize = 32;
 const LONGEST: usize = 4_096;
@@ -117,14 +121,15 @@ fn damage_text(format: &str, path: &Path) {
     assert!(!whole.time.is_empty(), "{name} has no state");
     let never = |_: &str, _: usize| false;
     let mut random = Random(text.len() as u64);
-    for step in 0..CUTS {
-        let cut = text.len() * step / CUTS + random.below(text.len() / CUTS + 1);
+    let (cuts, ranges) = cuts_and_ranges();
+    for step in 0..cuts {
+        let cut = text.len() * step / cuts + random.below(text.len() / cuts + 1);
         let cut = cut.min(text.len());
         let file = read(format, &text[..cut]).remove(0);
         check(&format!("{name} cut at {cut}"), &whole, &file, never);
         assert!(is_cut_between(&file, &whole), "{name} cut at {cut}: a state before is lost");
     }
-    for _ in 0..RANGES {
+    for _ in 0..ranges {
         let from = random.below(text.len());
         let to = (from + SHORTEST + random.below(LONGEST - SHORTEST)).min(text.len());
         for byte in [0, b'*'] {
@@ -186,8 +191,9 @@ macro_rules! text_samples {
     ($($name:ident: $format:literal, $path:literal;)*) => {
         $(
             #[test]
+            #[ignore = "needs ../shared (the real files)"]
             fn $name() {
-                let Some(folder) = shared("samples/lsdyna") else { return };
+                let folder = shared("samples/lsdyna");
                 let path = folder.join($format).join($path);
                 damage_text($format, &path);
                 cut_the_last_state($format, &path);
@@ -238,8 +244,9 @@ fn damage_binary(format: &str, path: &Path, size: usize) {
                 })
         };
     let mut random = Random(bytes.len() as u64);
-    for step in 0..CUTS {
-        let cut = bytes.len() * step / CUTS;
+    let (cuts, ranges) = cuts_and_ranges();
+    for step in 0..cuts {
+        let cut = bytes.len() * step / cuts;
         let Ok(files) = read_from(format, &[Box::new(bytes[..cut].to_vec())], &Selection::all())
         else {
             continue;
@@ -254,7 +261,7 @@ fn damage_binary(format: &str, path: &Path, size: usize) {
             check(&what, file, &damaged, |_, _| false);
         }
     }
-    for _ in 0..RANGES {
+    for _ in 0..ranges {
         let from = random.below(bytes.len());
         let to = (from + SHORTEST + random.below(LONGEST - SHORTEST)).min(bytes.len());
         let mut copy = bytes.to_vec();
@@ -276,19 +283,22 @@ fn damage_binary(format: &str, path: &Path, size: usize) {
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn binout_of_many_nodes() {
-    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let folder = shared("samples/lsdyna/binout");
     damage_binary("binout", &folder.join("rowan_r14.1.1_smp_d_run0001"), 200_000);
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn binout_of_few_nodes() {
-    let Some(folder) = shared("samples/lsdyna/binout") else { return };
+    let folder = shared("samples/lsdyna/binout");
     damage_binary("binout", &folder.join("dynareadout_r11.1_mpp_s_nodout_rcforc"), 100_000);
 }
 
 #[test]
+#[ignore = "needs ../shared (the real files)"]
 fn openradioss_t01() {
-    let Some(folder) = shared("fe/lead-car-pair/36kmh") else { return };
+    let folder = shared("fe/lead-car-pair/36kmh");
     damage_binary("t01", &folder.join("crashT01"), 60_000);
 }

@@ -1,104 +1,156 @@
-//! The README's commands do what it says, and its numbers are the program's.
+//! The commands of README.md and docs/ do what the text says, and the tables there are what they
+//! print, byte for byte.
+//!
+//! A fenced block `sh` holds commands; a block `console` holds commands behind `$ ` and all that each
+//! prints on standard output. A document's commands run one after the other in the demo's folder.
+//! To write the outputs into the documents again (and look at the difference before it is committed):
+//! CRUMPLE_WRITE_DOCS=1 cargo test --locked --release --test all readme
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::Command;
 
-use crate::common::{crumple_ok, root};
+use crate::common::{demo, root};
 
-fn readme() -> String {
-    std::fs::read_to_string(root().join("README.md")).unwrap()
+/// Every document with commands: a test for each, so that they run side by side.
+macro_rules! documents {
+    ($($name:ident: $path:literal;)*) => {
+        const DOCUMENTS: &[&str] = &[$($path),*];
+        $(
+            #[test]
+            fn $name() {
+                holds($path);
+            }
+        )*
+    };
 }
 
-/// Lines of the fenced blocks of one language.
-fn blocks(language: &str) -> Vec<String> {
-    let text = readme();
-    let fence = format!("```{language}\n");
-    let inside = text.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap());
-    inside.flat_map(str::lines).map(str::to_string).collect()
+documents! {
+    the_readme_holds: "README.md";
+    results_hold: "docs/results.md";
+    multi_body_holds: "docs/multi-body.md";
+    formats_and_damage_hold: "docs/formats-and-damage.md";
+    forest_holds: "docs/forest.md";
+    sweeps_hold: "docs/sweeps.md";
+}
+
+/// Runs all commands of a document and holds it against what they print.
+fn holds(name: &str) {
+    let path = root().join(name);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path().join("crumple-demo");
+    demo().copy_to(&here);
+    let printed = with_outputs(&text, &here);
+    if std::env::var_os("CRUMPLE_WRITE_DOCS").is_some() {
+        std::fs::write(&path, &printed).unwrap();
+        return;
+    }
+    for (number, (said, expected)) in text.lines().zip(printed.lines()).enumerate() {
+        assert_eq!(
+            said,
+            expected,
+            "{name}, line {}: the command prints something else",
+            number + 1
+        );
+    }
+    assert!(text == printed, "{name} is longer or shorter than what its commands print");
+}
+
+/// The text with what its commands really print.
+fn with_outputs(text: &str, here: &Path) -> String {
+    let mut out = String::new();
+    let mut block = None;
+    for line in text.split_inclusive('\n') {
+        match (block, line.trim_end()) {
+            (None, fence) if fence.starts_with("```") => block = Some(&fence[3..]),
+            (Some(_), "```") => block = None,
+            (Some("sh"), command) => {
+                run(command, here);
+            }
+            (Some("console"), command) => {
+                // What stands there as output is replaced by what is printed.
+                let Some(command) = command.strip_prefix("$ ") else { continue };
+                out += line;
+                out += &run(command, here);
+                continue;
+            }
+            _ => {}
+        }
+        out += line;
+    }
+    out
+}
+
+/// Standard output of one line of a document.
+fn run(line: &str, here: &Path) -> String {
+    match line.split_whitespace().next() {
+        None | Some("#") => return String::new(),
+        Some("crumple") => {}
+        // CI runs the two commands of a fresh clone; what the demo writes is already here.
+        _ if ["cargo run --release -- demo", "tests/run", "cd crumple-demo"].contains(&line) => {
+            return String::new();
+        }
+        _ => panic!("nothing runs this line: {line}"),
+    }
+    if line == "crumple demo" {
+        return demo().printed.clone();
+    }
+    let program = Path::new(env!("CARGO_BIN_EXE_crumple")).parent().unwrap();
+    let mut path = vec![program.to_path_buf()];
+    path.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap()));
+    let output = Command::new("bash")
+        .args(["-o", "pipefail", "-c", line])
+        .env("PATH", std::env::join_paths(path).unwrap())
+        .current_dir(here)
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{line}\n{error}");
+    String::from_utf8(output.stdout).unwrap()
 }
 
 #[test]
-fn commands_of_the_readme_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut here: PathBuf = folder.path().into();
-    let mut run = 0;
-    for line in blocks("sh") {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            ["cd", to] => here = here.join(to),
-            ["crumple", ref arguments @ ..] => {
-                let output = Command::new(env!("CARGO_BIN_EXE_crumple"))
-                    .args(arguments)
-                    .current_dir(&here)
-                    .output()
-                    .unwrap();
-                let error = String::from_utf8_lossy(&output.stderr);
-                assert!(output.status.success(), "{line}\n{error}");
-                run += 1;
+fn every_document_is_held() {
+    for name in crate::common::entries(&root().join("docs")) {
+        let name = format!("docs/{name}");
+        assert!(DOCUMENTS.contains(&name.as_str()), "{name} is not in the list of this file");
+    }
+}
+
+/// Files and headings that the documents link to are there.
+#[test]
+fn links_lead_somewhere() {
+    let others = ["CONTRIBUTING.md", "ARCHITECTURE.md"];
+    for name in DOCUMENTS.iter().chain(&others) {
+        let path = root().join(name);
+        let text = std::fs::read_to_string(&path).unwrap();
+        for link in text.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()) {
+            if link.starts_with("http") {
+                continue;
             }
-            [] | ["#", ..] => {}
-            // The two commands of a fresh clone: CI runs them.
-            ["cargo", "run", "--release", "--", "demo"] | ["tests/run"] => {}
-            _ => panic!("nothing runs this line of the README: {line}"),
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target =
+                if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            assert!(target.exists(), "{name} links to {link}");
+            if !heading.is_empty() {
+                let text = std::fs::read_to_string(&target).unwrap();
+                let is_there =
+                    text.lines().filter(|l| l.starts_with('#')).any(|l| anchor(l) == heading);
+                assert!(is_there, "{name} links to {link}");
+            }
         }
     }
-    assert!(run >= 12, "{run} commands");
 }
 
-/// CI runs the two commands of a fresh clone.
-#[test]
-fn ci_runs_the_two_commands() {
-    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
-    assert!(ci.contains("cargo run --locked --release -- demo"));
-    assert!(ci.lines().any(|l| l == "tests/run"));
+/// A heading's anchor: small letters, hyphens for spaces, no other signs.
+fn anchor(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase().replace(' ', "-");
+    text.chars().filter(|c| c.is_alphanumeric() || *c == '-').collect()
 }
 
 #[test]
-fn table_of_the_readme_is_the_demos() {
-    let folder = tempfile::tempdir().unwrap();
-    let demo = crumple_ok(folder.path(), &["demo"]);
-    let table = blocks("text");
-    assert_eq!(table.iter().filter(|l| l.contains("FE's own, body")).count(), 3, "three groups");
-    for line in table {
-        assert!(demo.lines().any(|l| l == line), "the demo does not print: {line}\n{demo}");
-    }
-}
-
-/// The tables of the methods are those that the commands print.
-#[test]
-fn tables_of_the_methods_are_those_of_compare() {
-    let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["demo", "-o", ".", "-q"]);
-    let group = crumple_ok(folder.path(), &["compare", "curves.h5", "--group", "lead-car-wall"]);
-    let train = crumple_ok(folder.path(), &["compare", "--train", "train-set.toml", "-q"]);
-    let tables = blocks("txt");
-    assert_eq!(tables.iter().filter(|l| l.starts_with("nsdm")).count(), 2, "two tables");
-    for line in tables {
-        let printed = group.lines().chain(train.lines()).any(|l| l == line);
-        assert!(printed, "compare does not print: {line}\n{group}\n{train}");
-    }
-}
-
-/// The errors of *auto*, chosen anew without each left-out speed, are those that validate prints.
-#[test]
-fn nested_errors_of_the_readme_are_those_of_validate() {
-    let folder = tempfile::tempdir().unwrap();
-    for group in ["lead-car-pair", "lead-car-wall", "vehicle-pair"] {
-        crate::common::build_fixture(folder.path(), group);
-    }
-    let printed = crumple_ok(folder.path(), &["validate", "curves.h5", "--nested"]);
-    // The rows of means have no speed behind the name.
-    let means: Vec<Vec<&str>> = printed
-        .lines()
-        .map(|line| line.split_whitespace().collect::<Vec<_>>())
-        .filter(|words| words.first() == Some(&"auto") && words[2] == "%")
-        .collect();
-    let column = |at: usize| -> Vec<&str> { means.iter().map(|words| words[at]).collect() };
-    let (force, velocity) = (column(1), column(8));
-    let sentence = format!(
-        "force errors of {}, {} and {} % and velocity errors of {}, {} and {} %",
-        force[0], force[1], force[2], velocity[0], velocity[1], velocity[2]
-    );
-    let text = readme().split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(text.contains(&sentence), "the README does not say: {sentence}\n{printed}");
+fn the_readme_has_at_most_900_words() {
+    let text = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let words = text.split_whitespace().filter(|w| w.contains(char::is_alphanumeric)).count();
+    assert!(words <= 900, "{words} words; the rest belongs into docs/");
 }

@@ -1,25 +1,11 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
-use std::path::Path;
-use std::sync::OnceLock;
-
-use crate::common::{crumple_fails, crumple_ok, root};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, root};
 use serde_json::Value;
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
-}
-
-/// The demo's folder, made once.
-fn demo() -> &'static Path {
-    static DEMO: OnceLock<tempfile::TempDir> = OnceLock::new();
-    DEMO.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        crumple_ok(folder.path(), &["demo", "-o", ".", "-q"]);
-        folder
-    })
-    .path()
 }
 
 /// Runs a scenario text in a folder of its own.
@@ -53,10 +39,12 @@ fn scenario(curves: &str, first: &str, rest: &str) -> String {
 /// Every shipped scenario runs; energy and momentum balance.
 #[test]
 fn shipped_scenarios_run() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let mut run = 0;
     for entry in root().join("examples/trains").read_dir().unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
-        let result = json(&crumple_ok(demo(), &["simulate", &name, "--json", "-q"]));
+        let result = json(&crumple_ok(demo, &["simulate", &name, "--json", "-q"]));
         let ledger = &result["ledger"];
         assert!(ledger["max_energy_error"].as_f64().unwrap() < 1e-3, "{name}: {ledger}");
         assert!(ledger["max_momentum_error"].as_f64().unwrap() < 1e-10, "{name}: {ledger}");
@@ -77,10 +65,12 @@ fn shipped_scenarios_run() {
 /// trains' speed if that is asked for.
 #[test]
 fn interfaces_have_their_own_speeds() {
-    let text = std::fs::read_to_string(demo().join("eight-on-eight.toml")).unwrap();
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = std::fs::read_to_string(demo.join("eight-on-eight.toml")).unwrap();
     let speeds = |text: &str| -> Vec<f64> {
-        std::fs::write(demo().join("local.toml"), text).unwrap();
-        let result = json(&crumple_ok(demo(), &["simulate", "local.toml", "--json", "-q"]));
+        std::fs::write(demo.join("local.toml"), text).unwrap();
+        let result = json(&crumple_ok(demo, &["simulate", "local.toml", "--json", "-q"]));
         let interfaces = result["summary"]["interfaces"].as_array().unwrap().clone();
         interfaces.iter().map(|i| i["curve_speed_m_per_s"].as_f64().unwrap()).collect()
     };
@@ -142,7 +132,8 @@ fn couplings_pull() {
         let last = |name: &str| *column(run, name).last().unwrap();
         last("x_m[A1]") - last("x_m[A2]")
     };
-    assert!(apart(&coupled) < apart(&free) || apart(&coupled).abs() < apart(&free).abs());
+    let (coupled_m, free_m) = (apart(&coupled), apart(&free));
+    assert!(coupled_m.abs() < free_m.abs(), "{coupled_m} m coupled, {free_m} m free");
     assert!(coupled["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
 }
 
@@ -207,6 +198,8 @@ fn resistance_is_in_the_ledger() {
 /// What the curve's kind may not drive is refused, and the reason says what to do.
 #[test]
 fn the_force_must_suit_the_vehicles() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let text = |vehicle: &str| {
         format!(
             "[run]\nduration = \"100ms\"\n[curves]\nnose = {{ model = \"lead.model\", force = \"body\" }}\n\
@@ -215,20 +208,20 @@ fn the_force_must_suit_the_vehicles() {
         )
     };
     let split = "{ name = \"A1\", mass = \"24t\", front = { mass = \"2t\", curve = \"link\" } }";
-    std::fs::write(demo().join("force.toml"), text(split)).unwrap();
-    let error = crumple_fails(demo(), 1, &["simulate", "force.toml"]);
+    std::fs::write(demo.join("force.toml"), text(split)).unwrap();
+    let error = crumple_fails(demo, 1, &["simulate", "force.toml"]);
     assert!(
         error.contains("curve \"nose\": interface A1|wall has a vehicle with a crush zone"),
         "{error}"
     );
     let free = text(split).replace(", force = \"body\"", "");
-    std::fs::write(demo().join("force.toml"), &free).unwrap();
-    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    std::fs::write(demo.join("force.toml"), &free).unwrap();
+    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
     let force = |r: &Value, k: usize| r["summary"]["interfaces"][k]["curve_force"].clone();
     assert_eq!(force(&result, 1), "contact", "the split vehicle takes the contact force");
     let one = free.replace(", front = { mass = \"2t\", curve = \"link\" }", "");
-    std::fs::write(demo().join("force.toml"), one).unwrap();
-    let result = json(&crumple_ok(demo(), &["simulate", "force.toml", "--json", "-q"]));
+    std::fs::write(demo.join("force.toml"), one).unwrap();
+    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
     assert_eq!(force(&result, 0), "body", "one mass takes the body force");
 }
 
@@ -273,8 +266,10 @@ fn wrong_trains_are_explained() {
 /// Velocities of every vehicle against FE's run of the train, by every method.
 #[test]
 fn the_train_set_is_compared_with_fe() {
+    let demo = demo_folder();
+    let demo = demo.path();
     let text = crumple_ok(
-        demo(),
+        demo,
         &["compare", "--train", "train-set.toml", "--nsdm-seeds", "1", "--json", "-q"],
     );
     let result = json(&text);
@@ -289,10 +284,12 @@ fn the_train_set_is_compared_with_fe() {
     }
     let speed = |row: &Value, name: &str| row["interface_speeds_m_per_s"][name].as_f64().unwrap();
     assert!((speed(&rows[4], "A2|A3") - 5.0).abs() < 1e-9);
-    assert!(speed(&rows[5], "A2|A3") < 4.0);
+    // The closing speeds that the interfaces have reached, in km/h.
+    assert!((speed(&rows[5], "A2|A3") * 3.6 - 8.21).abs() < 0.01);
+    assert!((speed(&rows[5], "A1|A2") * 3.6 - 10.11).abs() < 0.01);
     // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
-    let error = crumple_fails(demo(), 1, &["compare", "--train", "scenario.toml"]);
+    let error = crumple_fails(demo, 1, &["compare", "--train", "scenario.toml"]);
     assert!(error.contains("the scenario has no [reference]"), "{error}");
 }
 
@@ -300,8 +297,10 @@ fn the_train_set_is_compared_with_fe() {
 /// contact force has ended or changed its sign.
 #[test]
 fn mean_decelerations_are_those_of_the_histories() {
+    let demo = demo_folder();
+    let demo = demo.path();
     for name in ["scenario.toml", "two-sets.toml", "en15227-wagon.toml"] {
-        let result = json(&crumple_ok(demo(), &["simulate", name, "--json", "-q"]));
+        let result = json(&crumple_ok(demo, &["simulate", name, "--json", "-q"]));
         let times = column(&result, "time_s");
         for body in result["summary"]["bodies"].as_array().unwrap() {
             let vehicle = body["name"].as_str().unwrap();
@@ -316,15 +315,19 @@ fn mean_decelerations_are_those_of_the_histories() {
             let begin = first.saturating_sub(1);
             let mean = (v[begin] - v[end]) / (times[end] - times[begin]);
             let summary = body["mean_deceleration_m_per_s2"].as_f64().unwrap();
-            // Ends fall between two outputs; contacts that end and begin again make the mean of the
-            // histories longer.
-            assert!(summary != 0.0 && summary.signum() == mean.signum(), "{name} {vehicle}");
-            assert!(summary.abs() > 0.9 * mean.abs(), "{name} {vehicle}: {summary} for {mean}");
+            let ratio = summary / mean;
+            if ["A4", "B4", "W1"].contains(&vehicle) {
+                // The contact ends and begins again, which makes the mean of the histories longer.
+                assert!((1.13..1.64).contains(&ratio), "{name} {vehicle}: {summary} for {mean}");
+            } else {
+                // Ends fall between two outputs: 1.1 % at most.
+                assert!((ratio - 1.0).abs() < 0.012, "{name} {vehicle}: {summary} for {mean}");
+            }
         }
     }
-    let wall = json(&crumple_ok(demo(), &["simulate", "scenario.toml", "--json", "-q"]));
+    let wall = json(&crumple_ok(demo, &["simulate", "scenario.toml", "--json", "-q"]));
     let g = wall["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
-    assert!((g - 10.7).abs() < 0.5, "{g} g from 50 km/h");
+    assert!((g - 10.54).abs() < 0.01, "{g} g from 50 km/h");
 }
 
 /// A run that is too short for its mean deceleration says so, by every method.
@@ -363,17 +366,19 @@ fn a_run_that_ends_while_loading_is_said() {
 /// No command writes over what its scenario reads.
 #[test]
 fn inputs_of_a_scenario_are_kept() {
-    let before = std::fs::read(demo().join("pair.model")).unwrap();
+    let demo = demo_folder();
+    let demo = demo.path();
+    let before = std::fs::read(demo.join("pair.model")).unwrap();
     for command in [
         ["simulate", "two-sets.toml", "-o", "pair.model"],
         ["simulate", "train-set.toml", "-o", "curves.h5"],
         ["sweep", "scenario.toml", "-o", "lead.model"],
     ] {
-        let error = crumple_fails(demo(), 2, &command);
+        let error = crumple_fails(demo, 2, &command);
         assert!(error.contains("names the input itself"), "{error}");
     }
-    assert_eq!(std::fs::read(demo().join("pair.model")).unwrap(), before);
-    let error = crumple_fails(demo(), 2, &["simulate", "two-sets.toml", "-o", "out.h5"]);
+    assert_eq!(std::fs::read(demo.join("pair.model")).unwrap(), before);
+    let error = crumple_fails(demo, 2, &["simulate", "two-sets.toml", "-o", "out.h5"]);
     assert!(error.contains("a run is written as CSV"), "{error}");
 }
 

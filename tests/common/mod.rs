@@ -1,36 +1,53 @@
-//! What several tests share: where the real samples are, how the program is run.
+//! What several tests share: where the real files are, how programs are run, the demo's folder and
+//! the bundled databases, each made once.
+//!
+//! A test that needs more than a Rust toolchain bears `#[ignore = "needs …"]`. What it asks for here
+//! panics where it is absent, so that no such test can pass without having tested anything.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::{Mutex, OnceLock};
+
+use serde_json::Value;
 
 /// The repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A folder of real data kept beside the repository, or `None` (said) where it is absent.
-pub fn shared(folder: &str) -> Option<PathBuf> {
+/// A folder of real files kept beside the repository.
+pub fn shared(folder: &str) -> PathBuf {
     let path = root().join("../shared").join(folder);
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there; this test needs the shared real data", path.display());
-    None
+    assert!(path.is_dir(), "this test needs the real files of {}, which is absent", path.display());
+    path
 }
 
 /// The real LS-DYNA samples of one kind of file.
-pub fn samples(format: &str) -> Option<Vec<PathBuf>> {
-    let folder = shared(&format!("samples/lsdyna/{format}"))?;
-    let mut files: Vec<PathBuf> =
-        folder.read_dir().unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
+pub fn samples(format: &str) -> Vec<PathBuf> {
+    let folder = shared(&format!("samples/lsdyna/{format}"));
+    let files: Vec<PathBuf> = entries(&folder).into_iter().map(|name| folder.join(name)).collect();
     assert!(!files.is_empty(), "{} is empty", folder.display());
-    Some(files)
+    files
 }
 
 /// A file of the fixtures.
 pub fn fixture(path: &str) -> PathBuf {
     root().join("fixtures").join(path)
+}
+
+/// The sorted names of what is in a folder.
+pub fn entries(folder: &Path) -> Vec<String> {
+    let entries = folder.read_dir().unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Whether this run also repeats what only watches: `.ci/thorough` sets it.
+pub fn is_thorough() -> bool {
+    std::env::var_os("CRUMPLE_THOROUGH").is_some()
 }
 
 /// Runs the program in `folder`.
@@ -59,26 +76,100 @@ pub fn crumple_fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
     error
 }
 
-/// The Python with the client packages, or `None` (said) if the test command did not set it.
-pub fn python() -> Option<Command> {
+/// The Python with the client packages, which `tests/run` installs.
+pub fn python() -> Command {
     python_of("CRUMPLE_PYTHON")
 }
 
-/// The Python that a variable names, in the same way.
-pub fn python_of(variable: &str) -> Option<Command> {
-    match std::env::var_os(variable) {
-        Some(python) => Some(Command::new(python)),
-        None => {
-            eprintln!("skipped: {variable} is not set; tests/run installs the clients and sets it");
-            None
+/// The Python that an environment variable names.
+pub fn python_of(variable: &str) -> Command {
+    let python = std::env::var_os(variable);
+    Command::new(python.unwrap_or_else(|| {
+        panic!(
+            "this test needs Python clients: {variable} is not set; tests/run installs and sets it"
+        )
+    }))
+}
+
+/// Runs a script of `tests/python` and parses what it prints.
+pub fn run_python(mut python: Command, script: &str, arguments: &[&str]) -> Value {
+    let output =
+        python.arg(root().join("tests/python").join(script)).args(arguments).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{script}: {error}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Puts the bundled study of a group into `folder/curves.h5`. The first group of a folder is a copy
+/// of a database that was built once for all tests.
+pub fn build_fixture(folder: &Path, group: &str) -> PathBuf {
+    static BUILT: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let build = |database: &Path| {
+        let study = fixture(&format!("fe/{group}/study.toml"));
+        crumple_ok(folder, &["build", study.to_str().unwrap(), "-o", database.to_str().unwrap()]);
+    };
+    let database = folder.join("curves.h5");
+    if database.exists() {
+        build(&database);
+        return database;
+    }
+    let mut built = BUILT.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let bytes = built.entry(group.into()).or_insert_with(|| {
+        let elsewhere = tempfile::tempdir().unwrap();
+        let database = elsewhere.path().join("curves.h5");
+        build(&database);
+        std::fs::read(&database).unwrap()
+    });
+    std::fs::write(&database, bytes).unwrap();
+    database
+}
+
+/// What `crumple demo` printed and wrote, kept in memory, so that every test has its own copy.
+pub struct Demo {
+    /// Its standard output.
+    pub printed: String,
+    files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+/// The demo, run once for all tests.
+pub fn demo() -> &'static Demo {
+    static DEMO: OnceLock<Demo> = OnceLock::new();
+    DEMO.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let printed = crumple_ok(folder.path(), &["demo"]);
+        let mut files = Vec::new();
+        collect(&folder.path().join("crumple-demo"), Path::new(""), &mut files);
+        Demo { printed, files }
+    })
+}
+
+impl Demo {
+    /// Writes the demo's files into `folder`.
+    pub fn copy_to(&self, folder: &Path) {
+        for (path, bytes) in &self.files {
+            let path = folder.join(path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, bytes).unwrap();
         }
     }
 }
 
-/// Builds the bundled study of a group into `folder/curves.h5`.
-pub fn build_fixture(folder: &Path, group: &str) -> PathBuf {
-    let study = fixture(&format!("fe/{group}/study.toml"));
-    let database = folder.join("curves.h5");
-    crumple_ok(folder, &["build", study.to_str().unwrap(), "-o", database.to_str().unwrap()]);
-    database
+/// A temporary folder with the demo's files.
+pub fn demo_folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    demo().copy_to(folder.path());
+    folder
+}
+
+/// Adds the files below `folder/below` to `files`, with their paths in `folder`.
+fn collect(folder: &Path, below: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
+    for name in entries(&folder.join(below)) {
+        let path = below.join(name);
+        if folder.join(&path).is_dir() {
+            collect(folder, &path, files);
+        } else {
+            let bytes = std::fs::read(folder.join(&path)).unwrap();
+            files.push((path, bytes));
+        }
+    }
 }
