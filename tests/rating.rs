@@ -31,7 +31,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-const COLUMNS: [&str; 2] = ["--column-a=a_m_per_s2[A1]", "--column-b=a_m_per_s2[B1]"];
+const BOTH: [&str; 2] = ["a.csv:a_m_per_s2[A1]", "b.csv:a_m_per_s2[B1]"];
 
 fn rate(folder: &Path, arguments: &[&str]) -> Value {
     let all = [&["rate"], arguments, &["--json"]].concat();
@@ -47,7 +47,7 @@ fn assert_close(value: &Value, expected: f64, tolerance: f64) {
 #[test]
 fn signals_that_end_while_decelerated_are_said() {
     let folder = folder();
-    let both = [&["a.csv", "b.csv"][..], &COLUMNS].concat();
+    let both = BOTH;
     for (to, is_cut) in [("60ms", true), ("190ms", false)] {
         let of = rate(folder.path(), &[&both[..], &["--to", to]].concat());
         let warnings = of["warnings"].as_array().unwrap();
@@ -65,7 +65,7 @@ fn signals_that_end_while_decelerated_are_said() {
 #[test]
 fn a_scaled_acceleration_by_hand() {
     let folder = folder();
-    let of = rate(folder.path(), &[&["a.csv", "b.csv"][..], &COLUMNS].concat());
+    let of = rate(folder.path(), &BOTH);
     assert_eq!(of["quantity"], "acceleration");
     assert_eq!((&of["samples"], &of["interval_s"]), (&1991.into(), &1e-4.into()));
     assert_eq!(of["reference"]["name"], "a.csv: a_m_per_s2[A1]");
@@ -91,7 +91,7 @@ fn a_scaled_acceleration_by_hand() {
 #[test]
 fn the_table_shows_every_measure() {
     let folder = folder();
-    let text = crumple_ok(folder.path(), &[&["rate", "a.csv", "b.csv"][..], &COLUMNS].concat());
+    let text = crumple_ok(folder.path(), &[&["rate"], &BOTH[..]].concat());
     for line in [
         "interpolated at 1991 common times from 0 ms to 199 ms, 0.1 ms apart (10 kHz)",
         "l1_ratio              10.00 %  sum|p-r|/sum|r|",
@@ -117,17 +117,8 @@ fn a_solver_file_rates_as_its_csv() {
     let [a, b] = paths.each_ref().map(|path| path.to_str().unwrap());
     crumple_ok(here, &["histories", b, "-o", "b.csv"]);
     let direct = rate(here, &[a, b, "--id", "900001", "--component", "x_velocity"]);
-    let mixed = [
-        a,
-        "b.csv",
-        "--id",
-        "900001",
-        "--component",
-        "x_velocity",
-        "--column",
-        "x_velocity[900001]",
-    ];
-    let mixed = rate(here, &mixed);
+    let addressed = format!("{a}:900001:x_velocity");
+    let mixed = rate(here, &[&addressed, "b.csv:x_velocity[900001]"]);
     for key in ["l1_ratio", "iso18571", "cora", "peaks", "russell"] {
         assert_eq!(direct[key], mixed[key], "{key}");
     }
@@ -144,9 +135,9 @@ fn units_and_factors_are_those_of_the_arguments() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "ms.csv"]);
     assert_eq!(
         error,
-        "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: say --time-unit-b ms\n"
+        "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: write ms.csv,time=ms\n"
     );
-    let of = rate(here, &["a.csv", "ms.csv", "--time-unit-b", "ms", "--scale-b", "-1e-3"]);
+    let of = rate(here, &["a.csv", "ms.csv,scale=-1e-3,time=ms"]);
     assert!(of["l1_ratio"].as_f64().unwrap() < 1e-12, "{of}");
     assert_eq!(of["quantity"], "other", "only one name says acceleration");
     // Nothing in this header tells the unit.
@@ -154,9 +145,9 @@ fn units_and_factors_are_those_of_the_arguments() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
     assert_eq!(
         error,
-        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: say the units with --time-unit-a and --time-unit-b (s, ms or us)\n"
+        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: say the units behind the names, such as t.csv,time=ms\n"
     );
-    let said = ["a.csv", "t.csv", "--time-unit-a", "s", "--time-unit-b", "ms"];
+    let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
 }
 
@@ -197,14 +188,14 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "b.csv"],
         1,
-        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" with --column-b",
+        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" behind the file's name: b.csv:COLUMN",
     );
     t(
-        &["a.csv", "b.csv", "--column-a=w"],
+        &["a.csv:w", "b.csv"],
         1,
-        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" with --column-a",
+        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" behind the file's name: a.csv:COLUMN",
     );
-    t(&["a.csv", "b.csv", "--column-b=v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
+    t(&["a.csv", "b.csv:v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
     t(
         &["a.csv", "text.csv"],
         1,
@@ -229,8 +220,11 @@ fn wrong_input_says_where_and_what_to_do() {
         "what is asked for, from 0.5 s to 0.199 s, lies outside the common times",
     );
     t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
+    t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
+    t(&["a.csv,time=h", "a.csv"], 2, "invalid value 'a.csv,time=h' for '<A>': \"h\" is no unit of time");
+    t(&["a.csv,scale=0", "a.csv"], 2, "invalid value 'a.csv,scale=0' for '<A>': \"0\" is no factor");
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
-    assert!(error.contains("a CSV file has the ending .csv, or --column-b"), "{error}");
+    assert!(error.contains("a CSV file has the ending .csv, or its column behind its name: note:COLUMN"), "{error}");
     t(
         &["a.csv", "a.csv", "--cfc=1000"],
         1,
@@ -244,6 +238,8 @@ fn wrong_input_says_where_and_what_to_do() {
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let nodout = nodout.to_str().unwrap();
     t(&[nodout, nodout, "--id=1"], 1, &format!("{nodout}: nodout has no node 1"));
+    let address = format!("{nodout}:nodout:x:x_velocity");
+    t(&[&address, nodout], 2, "\"nodout:x:x_velocity\": \"x\" is no id");
     t(&[nodout, nodout], 1, &format!("{nodout}: 12 histories fit, from x_displacement[900001]"));
     t(
         &[nodout, nodout, "--component=x_velocity", "--column=x"],
