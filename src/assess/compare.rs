@@ -11,7 +11,7 @@ use super::row::RowBuilder;
 use super::train::TrainError;
 use super::validate::ValidateError;
 use crate::curve::{Case, EnvelopeError, ForceKind};
-use crate::dataset::{DatasetError, TrainingSet, is_same_speed, nearest};
+use crate::dataset::{DatasetError, TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::multibody::SimulationError;
 use crate::nsdm::{self, Identifiability, NsdmError, Start};
 use crate::rating::{Rating, SignalError};
@@ -206,17 +206,12 @@ pub fn compare(
     settings: &Settings,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
-    let no_case = |asked: f64, speeds: Vec<f64>| CompareError::NoCase {
-        group: group.into(),
-        asked: km_per_h(asked),
-        known: speeds.into_iter().map(km_per_h).collect::<Vec<_>>().join(", "),
-    };
     let near = |v: f64| is_same_speed(v, speed_m_per_s);
     let index = set
         .cases
         .iter()
         .position(|c| near(c.speed_m_per_s))
-        .ok_or_else(|| no_case(speed_m_per_s, set.speeds_m_per_s()))?;
+        .ok_or_else(|| no_case(group, speed_m_per_s, &set))?;
     if set.cases.len() < 3 {
         return Err(CompareError::TooFew { cases: set.cases.len() });
     }
@@ -231,17 +226,7 @@ pub fn compare(
         return Err(CompareError::TooFew { cases: set.cases.len() });
     }
     let speed = case.speed.m_per_s;
-    let fixed_at = settings.fixed_speed_m_per_s.unwrap_or_else(|| {
-        rest.cases[nearest(rest.cases.iter().map(|c| c.speed_m_per_s), speed)].speed_m_per_s
-    });
-    if near(fixed_at) {
-        return Err(CompareError::FixedIsLeftOut { asked: km_per_h(fixed_at) });
-    }
-    let fixed = rest
-        .cases
-        .iter()
-        .find(|c| is_same_speed(c.speed_m_per_s, fixed_at))
-        .ok_or_else(|| no_case(fixed_at, rest.speeds_m_per_s()))?;
+    let fixed = fixed_case(group, rest, speed, settings)?;
     let find = |name: &str| {
         cases.iter().find(|c| c.name == name).expect("a training set is made of the group's cases")
     };
@@ -281,6 +266,34 @@ pub fn compare(
         rows: compared,
         nsdm: report,
     })
+}
+
+fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> CompareError {
+    let known: Vec<String> = set.speeds_m_per_s().into_iter().map(km_per_h).collect();
+    CompareError::NoCase {
+        group: group.into(),
+        asked: km_per_h(asked_m_per_s),
+        known: known.join(", "),
+    }
+}
+
+/// The one case that FDRM and NSDM use: of the speed that was asked for, else the nearest to
+/// `left_out_m_per_s`.
+fn fixed_case<'a>(
+    group: &str,
+    rest: &'a TrainingSet,
+    left_out_m_per_s: f64,
+    settings: &Settings,
+) -> Result<&'a TrainingCase, CompareError> {
+    let Some(asked) = settings.fixed_speed_m_per_s else {
+        let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
+        return Ok(&rest.cases[nearest(speeds, left_out_m_per_s)]);
+    };
+    if is_same_speed(asked, left_out_m_per_s) {
+        return Err(CompareError::FixedIsLeftOut { asked: km_per_h(asked) });
+    }
+    let found = rest.cases.iter().find(|c| is_same_speed(c.speed_m_per_s, asked));
+    found.ok_or_else(|| no_case(group, asked, rest))
 }
 
 /// Errors of every seed's fit, at the speed it was fitted at and here.

@@ -276,23 +276,8 @@ fn methods<'a>(
 
     if settings.nsdm_seeds > 0 {
         let start = Instant::now();
-        let (mut changed, mut springs) = (scenario.clone(), sources.clone());
-        for (name, (case, _)) in &groups {
-            let fitted = fit_nsdm(case, settings)?;
-            let fit = fitted.best();
-            let Some(table) = changed.curves.get_mut(name) else { continue };
-            table.law = LawName::Elastic;
-            table.end = EndName::Slope;
-            table.damping = Some(DampingTable {
-                speed_m_per_s: fit.model.damping.nodes().to_vec(),
-                coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
-            });
-            springs.replace(
-                name,
-                Source::Curve(Box::new(DrivingCurve::of_body(fit.model.envelope()?))),
-            );
-        }
-        add("nsdm", "spring and damper", changed, springs, start.elapsed().as_secs_f64());
+        let (scenario, springs) = with_nsdm(scenario, sources, &groups, settings)?;
+        add("nsdm", "spring and damper", scenario, springs, start.elapsed().as_secs_f64());
     }
 
     let start = Instant::now();
@@ -322,6 +307,30 @@ fn methods<'a>(
         add(name, "body force", changed, best.clone(), fit_s);
     }
     Ok(methods)
+}
+
+/// The scenario and its curves with a spring and damper fitted to each case.
+fn with_nsdm(
+    scenario: &Scenario,
+    sources: &Sources,
+    groups: &BTreeMap<String, (Case, Vec<Case>)>,
+    settings: &Settings,
+) -> Result<(Scenario, Sources), CompareError> {
+    let (mut changed, mut springs) = (scenario.clone(), sources.clone());
+    for (name, (case, _)) in groups {
+        let fitted = fit_nsdm(case, settings)?;
+        let fit = fitted.best();
+        let Some(table) = changed.curves.get_mut(name) else { continue };
+        table.law = LawName::Elastic;
+        table.end = EndName::Slope;
+        table.damping = Some(DampingTable {
+            speed_m_per_s: fit.model.damping.nodes().to_vec(),
+            coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
+        });
+        let curve = DrivingCurve::of_body(fit.model.envelope()?);
+        springs.replace(name, Source::Curve(Box::new(curve)));
+    }
+    Ok((changed, springs))
 }
 
 fn row(

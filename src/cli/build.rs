@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::db::CaseRow;
 use super::output;
-use super::{CommandResult, Manners, Outcome, progress};
+use super::{CommandResult, GlobalOptions, Outcome, progress};
 
 /// Read all runs of a study, extract their curves and write the database
 #[derive(clap::Args)]
@@ -43,8 +43,8 @@ struct RunReport {
     case: Option<CaseRow>,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
-    let bar = progress::Bar::new(manners, "reading runs");
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let bar = progress::Bar::new(options, "reading runs");
     let done = AtomicUsize::new(0);
     let report = build::build(&args.study, &args.output, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -60,13 +60,13 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             outcome = Outcome::Partly;
         }
         for warning in run.case.iter().flat_map(|c| &c.warnings) {
-            manners.warn(&format!("{}: {warning}", run.name));
+            options.warn(&format!("{}: {warning}", run.name));
             if outcome == Outcome::Clean {
                 outcome = Outcome::Warned;
             }
         }
     }
-    if manners.json {
+    if options.json {
         output::print_json(&Document {
             database: args.output.display().to_string(),
             group: report.group,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::assess::compare::{self, Comparison, Settings};
+use crumple::assess::compare::{self, Comparison, NsdmReport, Settings};
 use crumple::assess::train::{TrainComparison, compare_train};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::arguments::{self, one_of};
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
 /// Compare FE with FDRM, NSDM, DDTCM and the best model, each in the same multi-body model
 #[derive(clap::Args)]
@@ -91,7 +91,7 @@ struct Mean {
     acceleration_iso18571: f64,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let settings = Settings {
         seed: args.seed,
         fixed_speed_m_per_s: args.fixed_speed,
@@ -99,7 +99,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         nsdm_start: args.nsdm_start,
     };
     if let Some(path) = &args.train {
-        return train(path, &settings, manners);
+        return train(path, &settings, options);
     }
     let Some(path) = &args.database else {
         return Err(Failure::Usage("name a database, or --train".into()));
@@ -110,7 +110,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         Some(speed) => vec![speed],
         None => compare::inner_speeds(group, cases)?,
     };
-    let bar = Bar::new(manners, "comparing");
+    let bar = Bar::new(options, "comparing");
     let mut comparisons = Vec::new();
     for speed in speeds {
         bar.step(&format!("comparing at {}", km_per_h(speed)));
@@ -119,17 +119,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     bar.end();
     let inner = comparisons.iter().all(|c| c.inner);
     if !inner {
-        manners.warn("the left-out speed is an end of the range: the models extrapolate");
+        options.warn("the left-out speed is an end of the range: the models extrapolate");
     }
     if let (Some(_), [comparison]) = (args.speed, &comparisons[..]) {
-        if manners.json {
+        if options.json {
             output::print_json(comparison)?;
         } else {
             output::print(|out| print(out, comparison))?;
         }
     } else {
         let document = Document { means: means(&comparisons), comparisons };
-        if manners.json {
+        if options.json {
             output::print_json(&document)?;
         } else {
             output::print(|out| {
@@ -206,7 +206,14 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         "with training",
     ];
     output::table(out, &heading, &rows)?;
-    let Some(nsdm) = &comparison.nsdm else { return Ok(()) };
+    match &comparison.nsdm {
+        Some(nsdm) => print_nsdm(out, nsdm),
+        None => Ok(()),
+    }
+}
+
+/// What the fits of the spring and damper are worth.
+fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
     let range = |of: fn(&compare::NsdmFit) -> f64| {
         let all = || nsdm.fits.iter().map(of);
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
@@ -299,19 +306,19 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
 }
 
 /// `compare --train`.
-fn train(path: &Path, settings: &Settings, manners: Manners) -> CommandResult {
+fn train(path: &Path, settings: &Settings, options: GlobalOptions) -> CommandResult {
     let scenario = scenario::read(path)?;
-    let bar = Bar::new(manners, "comparing in the train");
+    let bar = Bar::new(options, "comparing in the train");
     let comparison = compare_train(path, &scenario, settings)?;
     bar.end();
     let mut warned = false;
     for row in &comparison.rows {
         for warning in &row.warnings {
             warned = true;
-            manners.warn(&format!("{}: {warning}", row.method));
+            options.warn(&format!("{}: {warning}", row.method));
         }
     }
-    if manners.json {
+    if options.json {
         output::print_json(&comparison)?;
     } else {
         output::print(|out| print_train(out, &comparison))?;

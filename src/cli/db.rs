@@ -12,7 +12,7 @@ use crumple::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
 /// List, show and check the cases of a curve database
 #[derive(clap::Args)]
@@ -163,13 +163,13 @@ struct Columns<'a> {
     force_n: &'a [f64],
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match &args.command {
-        Command::Ls { database } => ls(&Database::read(database)?, manners),
+        Command::Ls { database } => ls(&Database::read(database)?, options),
         Command::Show { database: path, group, case } => {
             if let Some(name) = case {
                 let case = Database::read_case(path, group.as_deref(), name)?;
-                return show(&BTreeMap::from([(case.group.clone(), &[case][..])]), manners);
+                return show(&BTreeMap::from([(case.group.clone(), &[case][..])]), options);
             }
             let database = Database::read(path)?;
             let groups: Vec<&str> = match group {
@@ -177,9 +177,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
                 Some(group) => vec![database.group_or_only(path, Some(group))?.0],
             };
             let shown = groups.into_iter().map(|g| (g.to_string(), database.cases(g))).collect();
-            show(&shown, manners)
+            show(&shown, options)
         }
-        Command::Check { database } => check(database, manners),
+        Command::Check { database } => check(database, options),
     }
 }
 
@@ -191,15 +191,15 @@ struct Groups<T> {
     warnings: Vec<String>,
 }
 
-fn ls(database: &Database, manners: Manners) -> CommandResult {
+fn ls(database: &Database, options: GlobalOptions) -> CommandResult {
     let rows = |group: &str| database.cases(group).iter().map(CaseRow::of).collect::<Vec<_>>();
     let mixed = |g: &str| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
     let warnings: Vec<String> = database.groups().filter_map(mixed).collect();
     for warning in &warnings {
-        manners.warn(warning);
+        options.warn(warning);
     }
     let outcome = if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned };
-    if manners.json {
+    if options.json {
         let groups = database.groups().map(|g| (g.to_string(), rows(g))).collect();
         output::print_json(&Groups { groups, warnings })?;
     } else {
@@ -216,8 +216,8 @@ fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result
     writeln!(out)
 }
 
-fn show(shown: &BTreeMap<String, &[Case]>, manners: Manners) -> CommandResult {
-    if manners.json {
+fn show(shown: &BTreeMap<String, &[Case]>, options: GlobalOptions) -> CommandResult {
+    if options.json {
         let groups = shown
             .iter()
             .map(|(group, cases)| {
@@ -289,10 +289,10 @@ fn print_case(out: &mut dyn Write, group: &str, case: &Case) -> io::Result<()> {
     writeln!(out)
 }
 
-fn check(path: &Path, manners: Manners) -> CommandResult {
+fn check(path: &Path, options: GlobalOptions) -> CommandResult {
     let checked = check::check(path)?;
     let Checked { cases, findings } = &checked;
-    if manners.json {
+    if options.json {
         output::print_json(&checked)?;
     } else {
         output::print(|out| {

@@ -19,7 +19,7 @@ use include_dir::{Dir, include_dir};
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome, progress};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 
 /// Run the whole flow on bundled FE runs: database, forest, prediction, MB run, exports
 #[derive(clap::Args)]
@@ -92,11 +92,11 @@ struct Flow<'a> {
     files: Vec<PathBuf>,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
     let mut flow = Flow {
         folder: &args.output,
-        bar: progress::Bar::new(manners, "writing the FE runs"),
+        bar: progress::Bar::new(options, "writing the FE runs"),
         files: Vec::new(),
     };
     flow.unpack()?;
@@ -123,9 +123,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         seconds: start.elapsed().as_secs_f64(),
     };
     for warning in &curve.warnings {
-        manners.warn(&warning.to_string());
+        options.warn(&warning.to_string());
     }
-    if manners.json {
+    if options.json {
         output::print_json(&document)?;
     } else {
         output::print(|out| print(out, &document))?;

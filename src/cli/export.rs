@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::arguments::one_of;
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
 
 /// Write a predicted curve, or a forest model, for another tool
 #[derive(clap::Args)]
@@ -140,9 +140,9 @@ struct Document {
     output: String,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let Some(input) = args.input.as_ref().filter(|_| !args.list) else {
-        return list(manners);
+        return list(options);
     };
     let format = args.target.format(args.output.as_deref())?;
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
@@ -154,17 +154,17 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         false => args.target.encode(format, &formats::json::read(input)?)?,
     };
     match output {
-        None if manners.json && format.takes_model() => {
+        None if options.json && format.takes_model() => {
             return Err(Failure::Usage(format!("{} is binary: name a file with -o", format.name)));
         }
-        None if manners.json => {
+        None if options.json => {
             let text = String::from_utf8_lossy(&bytes).into_owned();
             output::print_json(&Text { format: format.name, text })?;
         }
         None => output::print_data(|out| out.write_all(&bytes))?,
         Some(path) => {
             write_whole(path, &bytes)?;
-            if manners.json {
+            if options.json {
                 output::print_json(&Document {
                     format: format.name,
                     bytes: bytes.len(),
@@ -178,8 +178,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     Ok(Outcome::Clean)
 }
 
-fn list(manners: Manners) -> CommandResult {
-    if manners.json {
+fn list(options: GlobalOptions) -> CommandResult {
+    if options.json {
         let listed = |f: &Format| Listed {
             name: f.name,
             extensions: f.extensions,

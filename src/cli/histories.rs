@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
 
 /// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units
 #[derive(clap::Args)]
@@ -44,7 +44,7 @@ pub struct Args {
     force: bool,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let some = |empty: bool| !empty;
     let selection = Selection {
         ids: some(args.ids.is_empty()).then(|| args.ids.clone()),
@@ -65,9 +65,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     }
     let target = output.map(Target::of).transpose()?;
     // JSON on standard output beside a file needs the values themselves.
-    let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !manners.json);
+    let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !options.json);
     let format = args.format.as_deref();
-    let bar = Bar::new(manners, "reading");
+    let bar = Bar::new(options, "reading");
     let read = match straight {
         Some(path) => crumple::history_hdf5::convert(&args.file, format, &selection, path)
             .map_err(Failure::from),
@@ -85,19 +85,19 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         )));
     }
     for problem in &file.problems {
-        manners.warn(&format!("{}: {problem}", args.file.display()));
+        options.warn(&format!("{}: {problem}", args.file.display()));
     }
     match output.zip(target).filter(|_| straight.is_none()) {
         Some((path, target)) => {
-            let bar = Bar::new(manners, "writing");
+            let bar = Bar::new(options, "writing");
             let written = write(path, target, &file);
             bar.end();
             written?;
         }
-        None if manners.json || straight.is_some() => {}
+        None if options.json || straight.is_some() => {}
         None => output::print_data(|out| write_csv(out, &file))?,
     }
-    if manners.json {
+    if options.json {
         output::print_json(&document(args, &file))?;
     }
     Ok(if file.problems.is_empty() { Outcome::Clean } else { Outcome::Warned })

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::deck_report::DeckReport;
 use super::output;
-use super::{CommandResult, Manners, Outcome};
+use super::{CommandResult, GlobalOptions, Outcome};
 
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
@@ -80,7 +80,7 @@ impl Read {
     }
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let mut read: Vec<(&PathBuf, Read)> = Vec::new();
     let mut outcome = Outcome::Clean;
     let access = if args.map { Access::Map } else { Access::Plain };
@@ -117,7 +117,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             Read::Deck(deck) => deck_report(path, deck),
         })
         .collect();
-    if manners.json {
+    if options.json {
         output::print_json(&Document { files })?;
     } else {
         output::print(|out| files.iter().try_for_each(|file| print(out, file)))?;

@@ -42,14 +42,14 @@ const DONE_WITH_WARNINGS: u8 = 3;
 #[command(name = "crumple", version, about, propagate_version = true)]
 struct Cli {
     #[command(flatten)]
-    manners: Manners,
+    options: GlobalOptions,
     #[command(subcommand)]
     command: Command,
 }
 
 /// Options that every command takes.
 #[derive(clap::Args, Clone, Copy)]
-pub struct Manners {
+pub struct GlobalOptions {
     /// Print one JSON document on standard output instead of text
     #[arg(long, global = true)]
     pub json: bool,
@@ -133,7 +133,7 @@ fn is_stdout(output: &Path) -> bool {
     output == Path::new("-")
 }
 
-impl Manners {
+impl GlobalOptions {
     /// A warning on standard error.
     pub fn warn(self, text: &str) {
         if !self.quiet {
@@ -156,27 +156,27 @@ fn survive_file_size_limit() {}
 pub fn main() -> ExitCode {
     survive_file_size_limit();
     let cli = Cli::parse();
-    let manners = cli.manners;
+    let options = cli.options;
     let result = match cli.command {
-        Command::Inspect(args) => inspect::run(&args, manners),
-        Command::Histories(args) => histories::run(&args, manners),
-        Command::Build(args) => build::run(&args, manners),
-        Command::Db(args) => db::run(&args, manners),
-        Command::Validate(args) => validate::run(&args, manners),
-        Command::Train(args) => train::run(&args, manners),
-        Command::Predict(args) => predict::run(&args, manners),
-        Command::Simulate(args) => simulate::run(&args, manners),
-        Command::Sweep(args) => sweep::run(&args, manners),
-        Command::Compare(args) => compare::run(&args, manners),
-        Command::Rate(args) => rate::run(&args, manners),
-        Command::Export(args) => export::run(&args, manners),
-        Command::Demo(args) => demo::run(&args, manners),
-        Command::Completions(args) => shell::completions(&args, manners),
-        Command::Man(args) => shell::man(&args, manners),
+        Command::Inspect(args) => inspect::run(&args, options),
+        Command::Histories(args) => histories::run(&args, options),
+        Command::Build(args) => build::run(&args, options),
+        Command::Db(args) => db::run(&args, options),
+        Command::Validate(args) => validate::run(&args, options),
+        Command::Train(args) => train::run(&args, options),
+        Command::Predict(args) => predict::run(&args, options),
+        Command::Simulate(args) => simulate::run(&args, options),
+        Command::Sweep(args) => sweep::run(&args, options),
+        Command::Compare(args) => compare::run(&args, options),
+        Command::Rate(args) => rate::run(&args, options),
+        Command::Export(args) => export::run(&args, options),
+        Command::Demo(args) => demo::run(&args, options),
+        Command::Completions(args) => shell::completions(&args, options),
+        Command::Man(args) => shell::man(&args, options),
     };
     ExitCode::from(match result {
         Ok(Outcome::Clean) => DONE,
-        Ok(Outcome::Warned) if manners.strict => DONE_WITH_WARNINGS,
+        Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
         Ok(Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
         Err(Failure::Usage(message)) => {

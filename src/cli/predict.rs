@@ -12,7 +12,7 @@ use crumple::unit::km_per_h;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
 
 /// Predict the force-deflection curve at a speed, with energy audit and warnings
 #[derive(clap::Args)]
@@ -51,7 +51,7 @@ pub struct Args {
     target: super::export::Target,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let rule = match args.paper {
         true => Some(MaxCrushRule::Spline),
         false => args.max_crush,
@@ -62,7 +62,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         .map(|path| args.target.format(Some(path.as_path()).filter(|path| !is_stdout(path))))
         .collect::<Result<Vec<_>, _>>()?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
-    if to_stdout > 1 || to_stdout == 1 && manners.json {
+    if to_stdout > 1 || to_stdout == 1 && options.json {
         return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
     }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
@@ -85,11 +85,11 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
     for warning in &curve.warnings {
-        manners.warn(&warning.to_string());
+        options.warn(&warning.to_string());
     }
     if let Some((_, bytes)) = printed.first() {
         output::print(|out| out.write_all(bytes))?;
-    } else if manners.json {
+    } else if options.json {
         output::print_json(&curve)?;
     } else {
         output::print(|out| {

@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Manners;
+use super::GlobalOptions;
 use super::output::plain;
 
 /// A spinner that names the step just done.
 pub struct Bar(Option<ProgressBar>);
 
 impl Bar {
-    pub fn new(manners: Manners, what: &'static str) -> Self {
-        let visible = !manners.quiet && std::io::stderr().is_terminal();
+    pub fn new(options: GlobalOptions, what: &'static str) -> Self {
+        let visible = !options.quiet && std::io::stderr().is_terminal();
         Self(visible.then(|| {
             let bar = ProgressBar::new_spinner().with_message(what);
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -38,8 +38,8 @@ impl Bar {
 pub struct Count(Option<ProgressBar>);
 
 impl Count {
-    pub fn new(manners: Manners, items: u64) -> Self {
-        let visible = !manners.quiet && std::io::stderr().is_terminal();
+    pub fn new(options: GlobalOptions, items: u64) -> Self {
+        let visible = !options.quiet && std::io::stderr().is_terminal();
         Self(visible.then(|| {
             let bar = ProgressBar::new(items);
             let template = "{wide_bar} {human_pos}/{human_len}, {per_sec}, {eta} left";

@@ -11,7 +11,7 @@ use crumple::solver::{self, ReadError, Selection, WantedId};
 use crumple::unit::TIME;
 
 use super::arguments::one_of;
-use super::{CommandResult, Failure, Manners, Outcome, output};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 
 /// Most bytes of a table that is rated: some million rows.
 const MAX_TABLE_BYTES: u64 = 256 << 20;
@@ -212,7 +212,7 @@ struct Read {
     problems: usize,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let both = &args.both;
     let wanted = |address| Wanted {
         address,
@@ -224,7 +224,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         format: both.format.as_deref(),
     };
     let (a, b) = (wanted(&args.reference), wanted(&args.prediction));
-    let (reference, prediction) = (a.read(manners)?, b.read(manners)?);
+    let (reference, prediction) = (a.read(options)?, b.read(options)?);
     used(args, [reference.is_table, prediction.is_table])?;
     same_unit_of_time(&a, &reference.signal, &b, &prediction.signal)?;
     let named = [&reference.column, &prediction.column].map(|name| Quantity::named(name));
@@ -236,9 +236,9 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let settings = Settings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
     let rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
     for warning in &rating.warnings {
-        manners.warn(warning);
+        options.warn(warning);
     }
-    if manners.json {
+    if options.json {
         output::print_json(&rating)?;
     } else {
         output::print(|out| print(out, &rating))?;
@@ -292,14 +292,14 @@ fn failed(message: String) -> Failure {
 }
 
 impl Wanted<'_> {
-    fn read(&self, manners: Manners) -> Result<Read, Failure> {
+    fn read(&self, options: GlobalOptions) -> Result<Read, Failure> {
         let is_table = self.path.extension().is_some_and(|extension| {
             ["csv", "tsv", "txt"].iter().any(|e| extension.eq_ignore_ascii_case(e))
         });
         if is_table && self.format.is_none() {
             return self.read_table();
         }
-        match self.read_solver_file(manners) {
+        match self.read_solver_file(options) {
             // Any other name may hold a table as well, if its columns are asked for.
             Err(Failure::Failed(error))
                 if self.column.is_some()
@@ -346,7 +346,7 @@ impl Wanted<'_> {
         Ok(Read { signal, column: columns.name, is_table: true, problems: 0 })
     }
 
-    fn read_solver_file(&self, manners: Manners) -> Result<Read, Failure> {
+    fn read_solver_file(&self, options: GlobalOptions) -> Result<Read, Failure> {
         let within = self.address.within.as_deref();
         let named = within.map(History::parse).transpose().map_err(Failure::Usage)?;
         let named = named.unwrap_or_default();
@@ -366,7 +366,7 @@ impl Wanted<'_> {
             )));
         }
         for problem in &file.problems {
-            manners.warn(&format!("{}: {problem}", self.path.display()));
+            options.warn(&format!("{}: {problem}", self.path.display()));
         }
         let path = self.path.display();
         let history = match &file.histories[..] {

@@ -4,7 +4,7 @@ use clap::CommandFactory;
 use serde::Serialize;
 
 use super::output;
-use super::{Cli, CommandResult, Manners, Outcome};
+use super::{Cli, CommandResult, GlobalOptions, Outcome};
 
 /// Print a completion script for a shell
 #[derive(clap::Args)]
@@ -23,16 +23,16 @@ pub struct Completions {
   crumple man | man -l -")]
 pub struct Man {}
 
-pub fn completions(args: &Completions, manners: Manners) -> CommandResult {
+pub fn completions(args: &Completions, options: GlobalOptions) -> CommandResult {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "crumple", &mut script);
-    print(&script, manners)
+    print(&script, options)
 }
 
-pub fn man(_: &Man, manners: Manners) -> CommandResult {
+pub fn man(_: &Man, options: GlobalOptions) -> CommandResult {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
-    print(&page, manners)
+    print(&page, options)
 }
 
 #[derive(Serialize)]
@@ -40,8 +40,8 @@ struct Text {
     text: String,
 }
 
-fn print(bytes: &[u8], manners: Manners) -> CommandResult {
-    if manners.json {
+fn print(bytes: &[u8], options: GlobalOptions) -> CommandResult {
+    if options.json {
         output::print_json(&Text { text: String::from_utf8_lossy(bytes).into_owned() })?;
     } else {
         output::print_data(|out| out.write_all(bytes))?;

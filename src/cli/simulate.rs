@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::output;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_inputs};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inputs};
 
 /// Run a scenario and write the histories of every body and interface
 #[derive(clap::Args)]
@@ -100,7 +100,7 @@ impl std::fmt::Display for InScenario {
 
 impl std::error::Error for InScenario {}
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = &args.output {
         keep_inputs(&args.scenario, output)?;
         let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));
@@ -117,7 +117,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let mut warnings = prepared.warnings.clone();
     warnings.extend(run.all_warnings());
     for warning in &warnings {
-        manners.warn(warning);
+        options.warn(warning);
     }
     let columns = columns(&prepared, &run);
     let to_stdout = args.output.as_deref().is_some_and(is_stdout);
@@ -127,7 +127,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         write_whole(path, &csv)?;
     }
     let summary = summary(&prepared, &run);
-    if manners.json {
+    if options.json {
         let mut columns = columns;
         columns.extend(further_columns(&prepared, &run));
         output::print_json(&document(&columns, &summary, &run.ledger, &warnings)?)?;

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::output;
 use super::progress::Count;
-use super::{CommandResult, Failure, Manners, Outcome, is_stdout, keep_input, keep_inputs};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input, keep_inputs};
 
 /// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each
 ///
@@ -85,9 +85,9 @@ fn shard(text: &str) -> Result<Shard, String> {
 /// Rows that a dry run shows.
 const SHOWN: u64 = 5;
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(Command::Merge { shards, output }) = &args.command {
-        return merge(shards, output, manners);
+        return merge(shards, output, options);
     }
     let Some(scenario) = &args.scenario else {
         return Err(Failure::Usage("name the scenario".into()));
@@ -104,7 +104,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
                 output.display()
             )));
         }
-        if is_stdout(output) && manners.json {
+        if is_stdout(output) && options.json {
             let message = "-o - and --json both write to standard output: give one of them";
             return Err(Failure::Usage(message.into()));
         }
@@ -112,15 +112,15 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let begun = Instant::now();
     let sweep = Sweep::load(scenario, args.plan.as_deref())?;
     for warning in sweep.warnings() {
-        manners.warn(warning);
+        options.warn(warning);
     }
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let output = match &args.output {
         Some(output) if !args.dry_run => output,
-        _ => return dry_run(&sweep, shard, manners),
+        _ => return dry_run(&sweep, shard, options),
     };
     let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
-    let report = write(&sweep, output, &options, manners)?;
+    let report = write(&sweep, output, &options, options)?;
     if !report.is_complete() {
         let message = format!(
             "stopped behind {} of {} rows; the same command goes on there",
@@ -129,7 +129,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         return Err(Failure::Failed(message.into()));
     }
     let document = Document::new(&report, begun, output);
-    say(&document, manners, is_stdout(output))
+    say(&document, options, is_stdout(output))
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -153,10 +153,10 @@ fn write(
     sweep: &Sweep,
     output: &Path,
     options: &WriteOptions,
-    manners: Manners,
+    options: GlobalOptions,
 ) -> Result<Report, Failure> {
     let items = options.shard.items(sweep.items());
-    let bar = Count::new(manners, items.end - items.start);
+    let bar = Count::new(options, items.end - items.start);
     let mut begun = false;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
     let mut step = |done: u64| match std::mem::replace(&mut begun, true) {
@@ -208,14 +208,14 @@ fn stop_flag() -> Arc<AtomicBool> {
     stop
 }
 
-fn merge(shards: &[PathBuf], output: &Path, manners: Manners) -> CommandResult {
+fn merge(shards: &[PathBuf], output: &Path, options: GlobalOptions) -> CommandResult {
     check_output(output)?;
     for input in shards {
         keep_input(input, output)?;
     }
     let begun = Instant::now();
     let report: Result<Report, SweepError> = sweep::merge(shards, output);
-    say(&Document::new(&report?, begun, output), manners, false)
+    say(&Document::new(&report?, begun, output), options, false)
 }
 
 /// What `--json` prints.
@@ -233,7 +233,7 @@ impl<'a> Document<'a> {
     }
 }
 
-fn say(document: &Document<'_>, manners: Manners, to_stdout: bool) -> CommandResult {
+fn say(document: &Document<'_>, options: GlobalOptions, to_stdout: bool) -> CommandResult {
     let Document { report, seconds, output } = document;
     if report.failed > 0 {
         let mut text =
@@ -241,15 +241,15 @@ fn say(document: &Document<'_>, manners: Manners, to_stdout: bool) -> CommandRes
         for (item, message) in &report.messages {
             text.push_str(&format!("\n  item {item}: {message}"));
         }
-        manners.warn(&text);
+        options.warn(&text);
     }
     if report.warned > 0 {
-        manners.warn(&format!(
+        options.warn(&format!(
             "{} of {} items have warnings in their rows",
             report.warned, report.rows
         ));
     }
-    if manners.json {
+    if options.json {
         output::print_json(document)?;
     } else if !to_stdout {
         output::print(|out| {
@@ -308,7 +308,7 @@ struct Preview {
     first: Vec<(u64, Vec<String>)>,
 }
 
-fn dry_run(sweep: &Sweep, shard: Shard, manners: Manners) -> CommandResult {
+fn dry_run(sweep: &Sweep, shard: Shard, options: GlobalOptions) -> CommandResult {
     let items = shard.items(sweep.items());
     let preview = Preview {
         items: sweep.items(),
@@ -319,7 +319,7 @@ fn dry_run(sweep: &Sweep, shard: Shard, manners: Manners) -> CommandResult {
         columns: sweep.columns(),
         first: items.clone().take(SHOWN as usize).map(|k| (k, sweep.values(k))).collect(),
     };
-    if manners.json {
+    if options.json {
         output::print_json(&preview)?;
         return Ok(Outcome::Clean);
     }

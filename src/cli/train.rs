@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::arguments::one_of;
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, Manners, Outcome, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
 
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
@@ -138,7 +138,7 @@ impl Args {
     }
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !(args.stop_threshold >= 0.0 && args.stop_threshold.is_finite()) {
         return Err(Failure::Usage(format!(
             "--stop-threshold {} must be 0 or more",
@@ -149,7 +149,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     keep_input(&args.database, &args.output)?;
     let database = Database::read(&args.database)?;
     let (group, cases) = database.group_or_only(&args.database, args.group.as_deref())?;
-    let bar = Bar::new(manners, "training");
+    let bar = Bar::new(options, "training");
     bar.step(&format!("training {group}, with every speed left out"));
     let model = validate::train(group, cases, choice)?;
     bar.end();
@@ -157,13 +157,13 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let truncated: Vec<&str> =
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
     if !truncated.is_empty() {
-        manners.warn(&format!(
+        options.warn(&format!(
             "runs that ended while loading are left out of the maximal crush: {}",
             truncated.join(", ")
         ));
     }
     if model.cases.len() < 3 {
-        manners.warn(&format!(
+        options.warn(&format!(
             "the group has {} curves: with fewer than 3 no speed can be left out to see how good the model is",
             model.cases.len()
         ));
@@ -171,7 +171,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
     let warned = !truncated.is_empty() || model.cases.len() < 3;
     let out_of_bag = model.forest().and_then(|forest| forest.forest().out_of_bag());
     let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
-    if manners.json {
+    if options.json {
         output::print_json(&Document {
             output: args.output.display().to_string(),
             group,

@@ -16,7 +16,7 @@ use crumple::unit::km_per_h;
 
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, Manners, Outcome};
+use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
 /// Leave every speed out in turn, predict it by every model, and compare with FE
 #[derive(clap::Args)]
@@ -49,7 +49,7 @@ pub struct Args {
     seed: u64,
 }
 
-pub fn run(args: &Args, manners: Manners) -> CommandResult {
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let groups: Vec<&str> = match &args.group {
         Some(group) => vec![group],
@@ -61,7 +61,7 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
             args.database.display()
         )));
     }
-    let bar = Bar::new(manners, "validating");
+    let bar = Bar::new(options, "validating");
     let mut report = Report { groups: Vec::new() };
     let mut outcome = Outcome::Clean;
     for &group in &groups {
@@ -83,19 +83,8 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         });
     }
     bar.end();
-    for group in &report.groups {
-        match group {
-            GroupReport::Validated { validation, .. } => {
-                for note in &validation.notes {
-                    manners.warn(&format!("{}: {note}", validation.group));
-                }
-            }
-            GroupReport::Failed { group, error } => {
-                output::say(&format!("error: {group}: {error}"))
-            }
-        }
-    }
-    if manners.json {
+    say_notes(&report, options);
+    if options.json {
         output::print_json(&report)?;
     } else {
         output::print(|out| {
@@ -111,6 +100,22 @@ pub fn run(args: &Args, manners: Manners) -> CommandResult {
         })?;
     }
     Ok(outcome)
+}
+
+/// Says what was left out of the tables, and which groups have none.
+fn say_notes(report: &Report, options: GlobalOptions) {
+    for group in &report.groups {
+        match group {
+            GroupReport::Validated { validation, .. } => {
+                for note in &validation.notes {
+                    options.warn(&format!("{}: {note}", validation.group));
+                }
+            }
+            GroupReport::Failed { group, error } => {
+                output::say(&format!("error: {group}: {error}"))
+            }
+        }
+    }
 }
 
 fn validated(

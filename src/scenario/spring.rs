@@ -5,8 +5,8 @@ use super::{CurveTable as Table, EndName, LawName, Source};
 use crate::curve::driving::NoDrivingCurve;
 use crate::curve::{DrivingCurve, ForceKind};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
-use crate::surrogate::Query;
 use crate::surrogate::predict::{PredictError, predict_driving};
+use crate::surrogate::{Model, PredictedCurve, Query, Warning};
 
 /// The curve at one interface, with what must be said of it.
 pub(super) struct Spring {
@@ -54,44 +54,21 @@ pub(super) fn spring(
             "band needs a model or a predicted curve (.json), which has one".into(),
         ));
     }
-    let mut warnings = Vec::new();
-    let said = |warnings: Vec<crate::surrogate::Warning>| {
-        warnings.iter().map(|w| w.to_string()).collect::<Vec<_>>()
-    };
-    let mut curve = match source {
-        Source::Model(model) => {
-            let query = Query {
-                mass_kg: Some(slot.mass_kg),
-                rule: table.max_crush,
-                parameters: table.parameters.clone(),
-                // Inside a train interfaces close far more slowly than any run by itself; that is
-                // warned of, but a train without their curves could not run at all.
-                extrapolate: true,
-                ..Query::at(speed_m_per_s)
-            };
-            let force = force.unwrap_or(model.force_kind);
-            let (curve, of_model) = predict_driving(model, &query, force, table.band)?;
-            warnings.extend(said(of_model));
-            curve.continued()?
-        }
-        Source::Predicted(curve) => {
-            warnings.extend(said(curve.warnings.clone()));
-            let force = force.unwrap_or(curve.provenance.force_kind);
-            curve.driving_member(force, table.band)?
-        }
-        Source::Curve(curve) => {
-            if curve.force.is_none() {
-                warnings.push(UNKNOWN_FORCE.into());
-            }
-            (**curve).clone()
-        }
+    let Spring { mut curve, mut warnings } = match source {
+        Source::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
+        Source::Predicted(curve) => of_predicted(curve, table, force)?,
+        Source::Curve(curve) => Spring {
+            warnings: curve.force.is_none().then(|| UNKNOWN_FORCE.into()).into_iter().collect(),
+            curve: (**curve).clone(),
+        },
         // A device between two bodies moves these, and no mass is stopped in it.
-        Source::Stages(envelope) => DrivingCurve::of_body(envelope.clone()),
+        Source::Stages(envelope) => {
+            Spring { curve: DrivingCurve::of_body(envelope.clone()), warnings: Vec::new() }
+        }
         Source::Case(case) => {
-            if case.is_truncated() {
-                warnings.push("the run ended while loading".into());
-            }
-            DrivingCurve::of_case(case, force.unwrap_or(case.force_kind))?
+            let truncated = case.is_truncated().then(|| "the run ended while loading".into());
+            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.force_kind))?;
+            Spring { curve, warnings: truncated.into_iter().collect() }
         }
     };
     let only_contact = force != Some(ForceKind::Body) && curve.force == Some(ForceKind::Contact);
@@ -107,6 +84,43 @@ pub(super) fn spring(
         curve = curve.scaled(factor).map_err(|e| SpringError::Message(e.to_string()))?;
     }
     Ok(Spring { curve, warnings })
+}
+
+/// The curve of a model, with what lies beyond its maximal crush.
+fn of_model(
+    model: &Model,
+    table: &Table,
+    slot: &Slot<'_>,
+    speed_m_per_s: f64,
+    force: Option<ForceKind>,
+) -> Result<Spring, SpringError> {
+    let query = Query {
+        mass_kg: Some(slot.mass_kg),
+        rule: table.max_crush,
+        parameters: table.parameters.clone(),
+        // Inside a train interfaces close far more slowly than any run by itself; that is warned
+        // of, but a train without their curves could not run at all.
+        extrapolate: true,
+        ..Query::at(speed_m_per_s)
+    };
+    let force = force.unwrap_or(model.force_kind);
+    let (curve, warnings) = predict_driving(model, &query, force, table.band)?;
+    Ok(Spring { curve: curve.continued()?, warnings: texts(&warnings) })
+}
+
+/// The curve of a predicted one that was read from a file.
+fn of_predicted(
+    curve: &PredictedCurve,
+    table: &Table,
+    force: Option<ForceKind>,
+) -> Result<Spring, SpringError> {
+    let force = force.unwrap_or(curve.provenance.force_kind);
+    let driving = curve.driving_member(force, table.band)?;
+    Ok(Spring { curve: driving, warnings: texts(&curve.warnings) })
+}
+
+fn texts(warnings: &[Warning]) -> Vec<String> {
+    warnings.iter().map(Warning::to_string).collect()
 }
 
 /// Said of a file without `# force_kind`.
