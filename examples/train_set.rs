@@ -36,7 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = folder.path().join("train-set.toml");
     fs::copy(root.join("examples/trains/train-set.toml"), &path)?;
     let settings = Settings { nsdm_seeds: 0, ..Settings::default() };
-    let comparison = compare_train(&path, &scenario::read(&path)?, &settings)?;
+    let scenario = scenario::read(&path)?;
+    let comparison = compare_train(&path, &scenario, &settings)?;
 
     let [left, top, width, height] = AREA;
     println!(
