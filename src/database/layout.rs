@@ -335,7 +335,7 @@ impl<'a> Opened<'a> {
 
     /// The values of one dataset of a case; why not, in words.
     pub fn values(&self, case: &Group, path: &str) -> Result<Vec<f64>, String> {
-        let place = Place { opened: self, name: String::new() };
+        let place = Location { opened: self, name: String::new() };
         numbers(case, path, &place).map_err(|e| match e {
             DatabaseError::Damaged { detail, .. } => detail,
             other => other.to_string(),
@@ -350,7 +350,7 @@ impl<'a> Opened<'a> {
 
     /// Reads one case from its group.
     pub fn case(&self, group: &str, name: &str, case: &Group) -> Result<FoundCase, DatabaseError> {
-        let place = Place { opened: self, name: format!("{group}/{name}") };
+        let place = Location { opened: self, name: format!("{group}/{name}") };
         decode_case(group, name, case, &place)
     }
 }
@@ -381,12 +381,12 @@ fn decode_opened(opened: &Opened<'_>) -> Result<Database, DatabaseError> {
 }
 
 /// Where in the file something is read, for messages.
-struct Place<'a> {
+struct Location<'a> {
     opened: &'a Opened<'a>,
     name: String,
 }
 
-impl Place<'_> {
+impl Location<'_> {
     fn damaged(&self, detail: impl Into<String>) -> DatabaseError {
         self.opened.damaged(&self.name, detail.into())
     }
@@ -399,7 +399,7 @@ impl Place<'_> {
 /// Attributes of one case.
 struct Attrs<'a> {
     map: HashMap<String, AttrValue>,
-    place: &'a Place<'a>,
+    place: &'a Location<'a>,
 }
 
 impl Attrs<'_> {
@@ -442,7 +442,7 @@ fn decode_case(
     group_name: &str,
     name: &str,
     group: &Group,
-    place: &Place<'_>,
+    place: &Location<'_>,
 ) -> Result<FoundCase, DatabaseError> {
     let attrs = Attrs { map: place.check(group.attrs())?, place };
     let kind = match attrs.text("speed_kind")? {
@@ -468,7 +468,8 @@ fn decode_case(
             place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1))
         );
     }
-    let original_place = Place { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
+    let original_place =
+        Location { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
     let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
     let sources: Vec<Source> = attrs.json("sources")?;
     let case = Case {
@@ -505,7 +506,7 @@ fn decode_case(
     Ok(FoundCase { case, attributes: attrs.map, hashes })
 }
 
-fn decode_curve(group: &Group, place: &Place<'_>) -> Result<Curve, DatabaseError> {
+fn decode_curve(group: &Group, place: &Location<'_>) -> Result<Curve, DatabaseError> {
     let time = numbers(group, "time_s", place)?;
     let deflection = numbers(group, "deflection_m", place)?;
     let force = numbers(group, "force_N", place)?;
@@ -513,7 +514,7 @@ fn decode_curve(group: &Group, place: &Place<'_>) -> Result<Curve, DatabaseError
         .map_err(|e| damaged_curve(place.opened.path, &place.name, e))
 }
 
-fn numbers(group: &Group, name: &str, place: &Place<'_>) -> Result<Vec<f64>, DatabaseError> {
+fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, DatabaseError> {
     let failed = |e: hdf5::Error| place.damaged(format!("{name}: {e}"));
     let dataset = group.dataset(name).map_err(failed)?;
     let bytes = declared_bytes(&dataset).map_err(failed)?;

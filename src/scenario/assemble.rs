@@ -177,7 +177,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn failed(&self, source: AssemblyError) -> ScenarioError {
-        ScenarioError::Assembly { path: self.path.into(), source }
+        ScenarioError::Assembly { path: self.path.into(), source: source.into() }
     }
 
     fn no_spring(&self, curve: &str, message: String) -> ScenarioError {

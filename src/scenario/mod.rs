@@ -65,7 +65,7 @@ pub enum ScenarioError {
         /// The scenario.
         path: PathBuf,
         /// What is wrong.
-        source: CheckError,
+        source: Box<CheckError>,
     },
     /// A curve's source is wrong.
     #[error("{path}: {message}")]
@@ -81,7 +81,7 @@ pub enum ScenarioError {
         /// The scenario.
         path: PathBuf,
         /// Which curve, and why not.
-        source: AssemblyError,
+        source: Box<AssemblyError>,
     },
     /// A model file cannot be used.
     #[error(transparent)]
@@ -138,7 +138,9 @@ pub fn check<'a>(
     path: &Path,
     scenario: &'a Scenario,
 ) -> Result<CheckedScenario<'a>, ScenarioError> {
-    scenario.check().map_err(|source| ScenarioError::Check { path: path.into(), source })
+    scenario
+        .check()
+        .map_err(|source| ScenarioError::Check { path: path.into(), source: source.into() })
 }
 
 /// Reads and checks a scenario; curves are not read.

@@ -178,7 +178,7 @@ fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepEr
     if is_hdf5(output) {
         return to_hdf5::complete(output, head, tally);
     }
-    let found = ShardFile::open(output)?;
+    let found = ShardFile::read_head(output)?;
     let found = found.ok_or_else(|| SweepError::Foreign { path: output.into() })?;
     if let Some(differs) = found.head.differs_from(head) {
         return Err(SweepError::Changed { path: output.into(), differs });

@@ -137,7 +137,7 @@ pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, SweepError> {
 const HDF5_SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 fn open(path: &Path) -> Result<ShardFile, SweepError> {
-    if let Some(file) = ShardFile::open(path)? {
+    if let Some(file) = ShardFile::read_head(path)? {
         return Ok(file);
     }
     let io = |source| SweepError::Read { path: path.into(), source };

@@ -91,7 +91,7 @@ pub enum SweepError {
         /// The file with the plan.
         path: PathBuf,
         /// Why.
-        source: BindError,
+        source: Box<BindError>,
     },
     /// A file cannot be read.
     #[error("{path}: {source}")]
@@ -193,7 +193,8 @@ impl Sweep {
             Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
             None => None,
         };
-        let invalid = |source| SweepError::Plan { path: plan_path.into(), source };
+        let invalid =
+            |source: BindError| SweepError::Plan { path: plan_path.into(), source: source.into() };
         let plan = of_file
             .or_else(|| scenario.sweep.clone())
             .ok_or_else(|| SweepError::NoPlan { path: plan_path.into() })?;

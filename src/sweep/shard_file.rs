@@ -15,7 +15,7 @@ pub(super) struct ShardFile {
 
 impl ShardFile {
     /// Reads the head of a file; `None` if it is none of ours.
-    pub fn open(path: &Path) -> Result<Option<Self>, SweepError> {
+    pub fn read_head(path: &Path) -> Result<Option<Self>, SweepError> {
         let io = |source| SweepError::Read { path: path.into(), source };
         let mut reader = BufReader::new(file::open(path).map_err(io)?);
         let head = Head::read(&mut reader).map_err(io)?;

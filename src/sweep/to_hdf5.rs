@@ -193,13 +193,13 @@ fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
 }
 
 /// A finished HDF5 file.
-struct ResultFile {
+struct FinishedTable {
     path: PathBuf,
     table: Table,
     head: Head,
 }
 
-impl ResultFile {
+impl FinishedTable {
     /// Opens a finished file.
     ///
     /// # Errors
@@ -328,7 +328,7 @@ fn head(table: &Table) -> Result<Option<Head>, TableError> {
 /// Checks an output that is there: this sweep's, with all its rows.
 pub(super) fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
     let foreign = |_| SweepError::Foreign { path: output.into() };
-    let file = ResultFile::open(output).map_err(foreign)?;
+    let file = FinishedTable::open(output).map_err(foreign)?;
     if let Some(differs) = file.head.differs_from(head) {
         return Err(SweepError::Changed { path: output.into(), differs });
     }
