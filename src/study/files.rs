@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::RunError;
+use crate::curve::recipe::ForceSource;
 use crate::file;
 use crate::solver::{self, ReadError, Selection};
 
@@ -18,6 +19,13 @@ pub(super) struct Located {
     pub twin: Option<(PathBuf, String)>,
     pub size_bytes: u64,
     pub blake3: String,
+}
+
+/// The file of a force, as the recipe names it.
+pub(super) fn force_file(force: &ForceSource) -> &str {
+    match force {
+        ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
+    }
 }
 
 /// Finds the file a recipe names: the text file of that name, or the section of a binout

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::files::{Located, hashed_family, locate_file, shown_name};
-use super::read::force_file;
+use super::files::{Located, force_file, hashed_family, locate_file, shown_name};
 use super::{RunEntry, RunError, Study};
 use crate::file;
 use crate::solver::decks::{self, Search};

@@ -1,6 +1,6 @@
 //! The histories of a run that its recipe names.
 
-use super::files::Located;
+use super::files::{Located, force_file};
 use super::locate::LocatedRun;
 use crate::curve::ForceKind;
 use crate::curve::extract::{Measured, MeasuredForce};
@@ -108,13 +108,6 @@ impl ReadFile<'_> {
             component: component.into(),
             known: self.file.components.join(", "),
         }
-    }
-}
-
-/// The file of a force, as the recipe names it.
-pub(super) fn force_file(force: &ForceSource) -> &str {
-    match force {
-        ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
     }
 }
 

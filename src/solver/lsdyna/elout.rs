@@ -71,7 +71,7 @@ struct Key {
     point: i64,
     surface: &'static str,
     /// "point" or "node" and its number, for details.
-    location: Option<(&'static str, i64)>,
+    location: Option<Location>,
     /// Names of the numbers behind the tensor; of a beam of all numbers.
     names: &'static [&'static str],
 }
@@ -309,8 +309,11 @@ impl Elout {
     }
 }
 
+/// Which point or node of its element a row is of, in files of details.
+type Location = (&'static str, i64);
+
 /// A row without the place of its point, with which rows of details end, and that place.
-fn location(text: &[u8]) -> Option<(&[u8], Option<(&'static str, i64)>)> {
+fn location(text: &[u8]) -> Option<(&[u8], Option<Location>)> {
     let found = [b"int. point".as_slice(), b"node "]
         .iter()
         .find_map(|word| memchr::memmem::rfind(text, word).map(|at| (at, word.len())));
