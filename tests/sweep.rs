@@ -247,7 +247,7 @@ fn band_members_are_between_the_edges() {
     }
     // What has no band says so.
     fs::write(here.join("s.toml"), scenario("low.csv", plan)).unwrap();
-    let error = crumple_fails(&here, 1, &["sweep", "s.toml", "-o", "no.csv"]);
+    let error = crumple_fails(here, 1, &["sweep", "s.toml", "-o", "no.csv"]);
     assert!(
         error.contains("s.toml: sweep.vary 1 (band): curve \"c\" has no band: only a model"),
         "{error}"
