@@ -877,8 +877,8 @@ fn scenarios_choose_the_force() {
         "database = \"curves.h5\", case = \"lead-car-wall/48kmh\"",
     ] {
         let with = |force: &str| crush(&format!("{source}, force = \"{force}\""));
-        let (declared, body) = (with("declared"), with("body"));
-        assert!(declared < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {declared} and {body}");
+        let (contact, body) = (with("contact"), with("body"));
+        assert!(contact < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {contact} and {body}");
         assert_eq!(crush(source), body, "{source}: a vehicle of one mass needs the body force");
     }
     // A CSV file says itself which force it holds and how it unloads.

@@ -65,7 +65,7 @@ const READING: [&str; 14] = [
     "predict FILE --speed 40km/h",
     "export FILE --to csv",
     "export FILE --to onnx",
-    "rate FILE:f FILE:f",
+    "rate FILE FILE --column f",
 ];
 
 const SCENARIO: &str = "[run]\nduration = \"60ms\"\noutput_interval = \"1ms\"\n\

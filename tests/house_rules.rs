@@ -24,7 +24,7 @@ const MAY_NAME: [(&str, &[&str]); 25] = [
     ("rating", &["curve", "signal", "history", "table"]),
     ("study", &["curve", "solver", "history", "manifest", "file", "unit"]),
     ("history_hdf5", &["solver", "history", "hdf5", "file"]),
-    ("database", &["curve", "history", "hdf5", "file", "unit"]),
+    ("database", &["curve", "signal", "history", "hdf5", "file", "unit"]),
     ("build", &["study", "database", "curve", "manifest", "file"]),
     ("dataset", &["curve", "unit"]),
     ("surrogate", &["dataset", "forest", "curve", "signal", "file", "unit"]),

@@ -119,6 +119,9 @@ fn a_solver_file_rates_as_its_csv() {
     let direct = rate(here, &[a, b, "--id", "900001", "--component", "x_velocity"]);
     let addressed = format!("{a}:900001:x_velocity");
     let mixed = rate(here, &[&addressed, "b.csv:x_velocity[900001]"]);
+    let by_id = format!("{a}:900001");
+    let shared = rate(here, &[&by_id, b, "--id", "900001", "--component", "x_velocity"]);
+    assert_eq!(direct["l1_ratio"], shared["l1_ratio"], "the address gives the id alone");
     for key in ["l1_ratio", "iso18571", "cora", "peaks", "russell"] {
         assert_eq!(direct[key], mixed[key], "{key}");
     }
@@ -137,6 +140,9 @@ fn units_and_factors_are_those_of_the_arguments() {
         error,
         "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: write ms.csv,time=ms\n"
     );
+    write(here, "us.csv", "Time [µS],a", 200, |t| format!("{:?},{:?}", t * 1e6, pulse(t)));
+    let error = crumple_fails(here, 1, &["rate", "a.csv", "us.csv"]);
+    assert!(error.contains("expected a time in s: write us.csv,time=us"), "{error}");
     let of = rate(here, &["a.csv", "ms.csv,scale=-1e-3,time=ms"]);
     assert!(of["l1_ratio"].as_f64().unwrap() < 1e-12, "{of}");
     assert_eq!(of["quantity"], "other", "only one name says acceleration");
@@ -145,7 +151,7 @@ fn units_and_factors_are_those_of_the_arguments() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
     assert_eq!(
         error,
-        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: say the units behind the names, such as t.csv,time=ms\n"
+        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each behind its name, such as a.csv,time=s and t.csv,time=ms\n"
     );
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
@@ -221,10 +227,22 @@ fn wrong_input_says_where_and_what_to_do() {
     );
     t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
     t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
-    t(&["a.csv,time=h", "a.csv"], 2, "invalid value 'a.csv,time=h' for '<A>': \"h\" is no unit of time");
-    t(&["a.csv,scale=0", "a.csv"], 2, "invalid value 'a.csv,scale=0' for '<A>': \"0\" is no factor");
+    t(
+        &["a.csv,time=h", "a.csv"],
+        2,
+        "invalid value 'a.csv,time=h' for '<A>': \"h\" is no unit of time",
+    );
+    t(
+        &["a.csv,scale=0", "a.csv"],
+        2,
+        "invalid value 'a.csv,scale=0' for '<A>': \"0\" is no factor",
+    );
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
-    assert!(error.contains("a CSV file has the ending .csv, or its column behind its name: note:COLUMN"), "{error}");
+    assert!(
+        error
+            .contains("a CSV file has the ending .csv, or its column behind its name: note:COLUMN"),
+        "{error}"
+    );
     t(
         &["a.csv", "a.csv", "--cfc=1000"],
         1,

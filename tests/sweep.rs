@@ -201,7 +201,7 @@ fn band_members_are_between_the_edges() {
     }
     let scenario = |file: &str, sweep: &str| {
         format!(
-            "[run]\nduration = \"150ms\"\nstep = \"0.1ms\"\n[curves]\nc = {{ file = \"{file}\", force = \"declared\" }}\n\
+            "[run]\nduration = \"150ms\"\nstep = \"0.1ms\"\n[curves]\nc = {{ file = \"{file}\", force = \"contact\" }}\n\
              [[train]]\nname = \"A\"\nspeed = \"12m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
              [wall]\n[contact]\ncurve = \"c\"\n{sweep}"
         )

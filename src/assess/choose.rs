@@ -36,8 +36,10 @@ pub fn choose(means: &[Means]) -> Option<(String, String)> {
     }
     let worst = |m: &Means| (m.force_l1 / force).max(m.velocity_l1 / velocity);
     let chosen = means.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
+    let compared: Vec<&str> = baselines().map(|m| m.model.as_str()).collect();
     let reason = format!(
-        "no model is at or below nearest, linear and forest in both force and velocity; this one comes nearest (force {:.2} %, velocity {:.2} %)",
+        "no model is at or below each of {} in both force and velocity; this one comes nearest (force {:.2} %, velocity {:.2} %)",
+        compared.join(", "),
         chosen.force_l1 * 100.0,
         chosen.velocity_l1 * 100.0
     );

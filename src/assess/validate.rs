@@ -346,7 +346,7 @@ fn best_rule(kind: &ModelKind, trials: &[&Trial]) -> Option<MaxCrushRule> {
         let errors = errors(rule, true);
         errors.iter().sum::<f64>() / errors.len().max(1) as f64
     };
-    // The spline is not monotone by construction: nobody gets it without asking.
+    // The spline is not monotone by construction: it is used only on request.
     let best = (!trials.is_empty()).then_some(MaxCrushRule::ALL).and_then(|all| {
         all.into_iter()
             .filter(|rule| *rule != MaxCrushRule::Spline)

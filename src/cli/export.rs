@@ -149,6 +149,12 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = output {
         keep_input(input, output)?;
     }
+    if format.takes_model() && (args.target.units.is_some() || args.target.force.is_some()) {
+        return Err(Failure::Usage(format!(
+            "{} holds a whole model in SI, of the recipe's force: remove --units and --force",
+            format.name
+        )));
+    }
     let bytes = match format.takes_model() {
         true => format.encode_model(&Model::read(input)?)?,
         false => args.target.encode(format, &formats::json::read(input)?)?,

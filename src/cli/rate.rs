@@ -121,8 +121,12 @@ struct History<'a> {
 }
 
 impl<'a> History<'a> {
-    /// `COMPONENT`, `ID:COMPONENT` or `SECTION:ID:COMPONENT`; an id may have a side, `3:surfa`.
+    /// `ID`, `COMPONENT`, `ID:COMPONENT` or `SECTION:ID:COMPONENT`; an id may have a side,
+    /// `3:surfa`.
     fn parse(text: &'a str) -> Result<Self, String> {
+        if let Ok(id) = text.parse() {
+            return Ok(Self { id: Some(id), ..Self::default() });
+        }
         let Some((before, component)) = text.rsplit_once(':') else {
             return Ok(Self { component: Some(text), ..Self::default() });
         };
@@ -174,7 +178,8 @@ impl TimeUnit {
     fn at_the_end_of(name: &str) -> Option<Self> {
         let name = name.trim_end_matches([')', ']', ' ']);
         let (_, unit) = name.rsplit_once(['_', '(', '[', ' ', '/'])?;
-        Self::named(unit)
+        // Both signs for micro.
+        Self::named(&unit.to_lowercase().replace(['µ', 'μ'], "u"))
     }
 }
 
@@ -267,7 +272,7 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Records that differ this much in length are in different units, or worth a word.
+/// Records that differ this much in length are probably in different units.
 const LENGTHS: f64 = 100.0;
 
 /// Units are not guessed: records of very different lengths must say theirs.
@@ -279,9 +284,10 @@ fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Re
         return Ok(());
     }
     Err(failed(format!(
-        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: say the units behind the names, such as {},time=ms",
+        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each behind its name, such as {},time=s and {},time=ms",
         a.path.display(),
         b.path.display(),
+        a.path.display(),
         b.path.display()
     )))
 }

@@ -85,9 +85,9 @@ fn shard(text: &str) -> Result<Shard, String> {
 /// Rows that a dry run shows.
 const SHOWN: u64 = 5;
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     if let Some(Command::Merge { shards, output }) = &args.command {
-        return merge(shards, output, options);
+        return merge(shards, output, global);
     }
     let Some(scenario) = &args.scenario else {
         return Err(Failure::Usage("name the scenario".into()));
@@ -104,7 +104,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 output.display()
             )));
         }
-        if is_stdout(output) && options.json {
+        if is_stdout(output) && global.json {
             let message = "-o - and --json both write to standard output: give one of them";
             return Err(Failure::Usage(message.into()));
         }
@@ -112,15 +112,15 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let begun = Instant::now();
     let sweep = Sweep::load(scenario, args.plan.as_deref())?;
     for warning in sweep.warnings() {
-        options.warn(warning);
+        global.warn(warning);
     }
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let output = match &args.output {
         Some(output) if !args.dry_run => output,
-        _ => return dry_run(&sweep, shard, options),
+        _ => return dry_run(&sweep, shard, global),
     };
     let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
-    let report = write(&sweep, output, &options, options)?;
+    let report = write(&sweep, output, &options, global)?;
     if !report.is_complete() {
         let message = format!(
             "stopped behind {} of {} rows; the same command goes on there",
@@ -129,7 +129,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         return Err(Failure::Failed(message.into()));
     }
     let document = Document::new(&report, begun, output);
-    say(&document, options, is_stdout(output))
+    say(&document, global, is_stdout(output))
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -153,10 +153,10 @@ fn write(
     sweep: &Sweep,
     output: &Path,
     options: &WriteOptions,
-    options: GlobalOptions,
+    global: GlobalOptions,
 ) -> Result<Report, Failure> {
     let items = options.shard.items(sweep.items());
-    let bar = Count::new(options, items.end - items.start);
+    let bar = Count::new(global, items.end - items.start);
     let mut begun = false;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
     let mut step = |done: u64| match std::mem::replace(&mut begun, true) {
@@ -208,14 +208,14 @@ fn stop_flag() -> Arc<AtomicBool> {
     stop
 }
 
-fn merge(shards: &[PathBuf], output: &Path, options: GlobalOptions) -> CommandResult {
+fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandResult {
     check_output(output)?;
     for input in shards {
         keep_input(input, output)?;
     }
     let begun = Instant::now();
     let report: Result<Report, SweepError> = sweep::merge(shards, output);
-    say(&Document::new(&report?, begun, output), options, false)
+    say(&Document::new(&report?, begun, output), global, false)
 }
 
 /// What `--json` prints.
@@ -233,7 +233,7 @@ impl<'a> Document<'a> {
     }
 }
 
-fn say(document: &Document<'_>, options: GlobalOptions, to_stdout: bool) -> CommandResult {
+fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> CommandResult {
     let Document { report, seconds, output } = document;
     if report.failed > 0 {
         let mut text =
@@ -241,15 +241,15 @@ fn say(document: &Document<'_>, options: GlobalOptions, to_stdout: bool) -> Comm
         for (item, message) in &report.messages {
             text.push_str(&format!("\n  item {item}: {message}"));
         }
-        options.warn(&text);
+        global.warn(&text);
     }
     if report.warned > 0 {
-        options.warn(&format!(
+        global.warn(&format!(
             "{} of {} items have warnings in their rows",
             report.warned, report.rows
         ));
     }
-    if options.json {
+    if global.json {
         output::print_json(document)?;
     } else if !to_stdout {
         output::print(|out| {
@@ -308,7 +308,7 @@ struct Preview {
     first: Vec<(u64, Vec<String>)>,
 }
 
-fn dry_run(sweep: &Sweep, shard: Shard, options: GlobalOptions) -> CommandResult {
+fn dry_run(sweep: &Sweep, shard: Shard, global: GlobalOptions) -> CommandResult {
     let items = shard.items(sweep.items());
     let preview = Preview {
         items: sweep.items(),
@@ -319,7 +319,7 @@ fn dry_run(sweep: &Sweep, shard: Shard, options: GlobalOptions) -> CommandResult
         columns: sweep.columns(),
         first: items.clone().take(SHOWN as usize).map(|k| (k, sweep.values(k))).collect(),
     };
-    if options.json {
+    if global.json {
         output::print_json(&preview)?;
         return Ok(Outcome::Clean);
     }

@@ -75,7 +75,8 @@ pub fn read(path: &Path) -> Result<DrivingCurve, CsvError> {
     let io = |source| CsvError::Io { path: path.into(), source };
     let malformed = |source| CsvError::Csv { path: path.into(), source };
     let bytes = file::read(path, MAX_CURVE_BYTES).map_err(io)?;
-    let facts = Facts::read(path, &bytes)?;
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
+    let facts = Facts::read(path, bytes)?;
     let mut table = CsvTable::open(&bytes[facts.bytes..], facts.lines).map_err(malformed)?;
     let (header, header_line) = (table.header().clone(), table.header_line());
     let unit = |field: usize, prefixes: &[&str], of: &Dimension, wanted, example| {
@@ -127,11 +128,14 @@ impl Facts {
         let nothing = Envelope::new(vec![0.0, 1.0], vec![0.0, 0.0]);
         let nothing = nothing.map_err(|source| CsvError::Envelope { path: path.into(), source })?;
         let mut facts = Self { curve: DrivingCurve::bare(nothing), lines: 0, bytes: 0 };
-        for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|l| l.starts_with(b"#")) {
+        for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|l| {
+            let l = l.trim_ascii();
+            l.is_empty() || l.starts_with(b"#")
+        }) {
             facts.lines += 1;
             facts.bytes += line.len();
             let line = String::from_utf8_lossy(line);
-            if let Some((key, value)) = line.trim_start_matches('#').split_once(':') {
+            if let Some((key, value)) = line.trim_start().trim_start_matches('#').split_once(':') {
                 facts.note(path, key.trim(), value.trim())?;
             }
         }

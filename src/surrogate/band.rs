@@ -166,7 +166,7 @@ impl Band {
         })
     }
 
-    /// The same band over another span; `None` if that is nothing to hold on to, or if the band is
+    /// The same band over another span; `None` if the scaled widths are no finite numbers, or if the band is
     /// of an earlier version, which does not say its own.
     pub fn over(self, span_m_per_s: f64) -> Option<Self> {
         let factor = (span_m_per_s / self.span_m_per_s?).powf(self.left_out.power());

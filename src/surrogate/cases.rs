@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CaseCurve;
-use super::kept::Kept;
+use super::cached::Cached;
 use crate::curve::{EnvelopeError, ForceKind};
 use crate::dataset::{TrainingCase, grid};
 
@@ -98,7 +98,7 @@ pub(super) struct Curves {
     pub declared: Vec<CaseCurve>,
     pub body: Vec<CaseCurve>,
     /// Of the curves of the declared force and of the body's, once it was asked for.
-    pub kinks: [Kept<Kink>; 2],
+    pub kinks: [Cached<Kink>; 2],
 }
 
 /// How far single points of the curves lie above or below both of their neighbours, in N.

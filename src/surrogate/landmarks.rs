@@ -31,7 +31,7 @@ struct Trail {
     is_peak: bool,
     /// Case and deflection, the fastest case first.
     positions: Vec<(usize, f64)>,
-    /// Not lacking in any case so far that goes as far.
+    /// Found in every case so far that is long enough to have it.
     alive: bool,
 }
 

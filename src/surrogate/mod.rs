@@ -1,11 +1,11 @@
 //! Surrogates: models of F(v, d) behind one trait, and the curve predicted from them.
 
 pub mod band;
+mod cached;
 mod cases;
 pub mod curves;
 mod extra;
 pub mod forest;
-mod kept;
 mod landmarks;
 pub mod leave_one_out;
 mod linear;

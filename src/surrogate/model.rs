@@ -18,7 +18,7 @@ use crate::file::WriteError;
 use crate::forest::ForestError;
 use crate::unit::{SpeedKind, UnitSystem};
 
-/// A nearest training speed further away than this share of the speed needs a word.
+/// A nearest training speed further away than this share of the speed causes a warning.
 const FAR: f64 = 0.25;
 
 /// A surrogate fitted to a group, for the declared force and for the body's.
@@ -246,7 +246,7 @@ impl Model {
     }
 
     /// The most by which a point of the training curves lies above both neighbours at
-    /// `step_m`, or below both, in N; `most` finds it in curves. Kept for the first step that is
+    /// `step_m`, or below both, in N; `most` finds it in curves. Cached for the first step that is
     /// asked for.
     pub(super) fn most_kink_n(
         &self,
@@ -258,7 +258,7 @@ impl Model {
         let of_body = of_body && !body.is_empty();
         let curves = if of_body { body } else { declared };
         let kept = self.curves.kinks[usize::from(of_body)]
-            .or_find(|| Kink { step_m, most_n: most(curves) });
+            .get_or_compute(|| Kink { step_m, most_n: most(curves) });
         if kept.step_m == step_m { kept.most_n } else { most(curves) }
     }
 

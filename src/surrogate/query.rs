@@ -57,7 +57,7 @@ pub(super) struct Asked<'a> {
     pub model: &'a Model,
     pub v: f64,
     pub masses: Masses,
-    /// That the motion follows.
+    /// Effective mass of the motion.
     pub mass_kg: f64,
     pub same_mass: bool,
     pub parameters: BTreeMap<String, Parameter>,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use super::cached::Cached;
 use super::curves::neighbours;
-use super::kept::Kept;
 use super::max_crush::MaxCrushRule;
 use super::models::{ModelEntry, loaded};
 use super::{At, CaseCurve, Surrogate};
@@ -33,15 +33,15 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// `m ḋ dḋ/dd = −F` brings R back. So crush and energy come out together, other masses and
 /// speeds that an interface sees inside a train need no other curve.
 ///
-/// Where a slower neighbour ends, its Q goes on as the next faster one's, at the level that
-/// it had against it, which fades: the blend has no step there.
+/// Beyond the end of a slower neighbour, its Q is that of the next faster curve times a ratio that
+/// begins at their ratio there and decays to 1, so that the blend has no step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
     #[serde(skip)]
-    levels: Kept<Levels>,
+    levels: Cached<Levels>,
 }
 
 /// Level of each curve at its end against the next faster one, 1 for the fastest.
@@ -76,7 +76,7 @@ impl Rate {
         let best = (0..=STEPS)
             .map(|k| (k, disagreement(cases, trial(k))))
             .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
-        Self { sensitivity: 0.5 * trial(best.0), levels: Kept::default() }
+        Self { sensitivity: 0.5 * trial(best.0), levels: Cached::default() }
     }
 
     fn factor(&self, closing_m_per_s: f64) -> f64 {
@@ -98,8 +98,9 @@ impl Rate {
     /// The levels, kept for the first curves that are asked for.
     fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
-        let kept =
-            self.levels.or_find(|| Levels { of: of().collect(), levels: self.find_levels(cases) });
+        let kept = self
+            .levels
+            .get_or_compute(|| Levels { of: of().collect(), levels: self.find_levels(cases) });
         match kept.of.iter().copied().eq(of()) {
             true => kept.levels.clone(),
             false => self.find_levels(cases),
@@ -221,7 +222,7 @@ mod tests {
         let cases: Vec<CaseCurve> = [8.0, 12.0, 20.0].map(|v| made(v, 0.06, 24e3)).to_vec();
         let fitted = Rate::fit(&cases);
         assert!((fitted.sensitivity - 0.03).abs() < 0.003, "{}", fitted.sensitivity);
-        let exact = Rate { sensitivity: 0.06, levels: Kept::default() };
+        let exact = Rate { sensitivity: 0.06, levels: Cached::default() };
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
         let at = At { speed_m_per_s: 15.0, features: &[], mass_kg: 24e3, closing_m_per_s: None };
@@ -242,7 +243,7 @@ mod tests {
     #[test]
     fn given_speeds_are_used() {
         let cases: Vec<CaseCurve> = [8.0, 20.0].map(|v| made(v, 0.0, 24e3)).to_vec();
-        let rate = Rate { sensitivity: 0.1, levels: Kept::default() };
+        let rate = Rate { sensitivity: 0.1, levels: Cached::default() };
         let at = |closing| At {
             speed_m_per_s: 8.0,
             features: &[],
