@@ -1,4 +1,9 @@
 //! Energy audit, and the refusal of runs whose energy or impulse cannot be.
+//!
+//! Refuses what no crash can be: work or impulse outside 0.67 to 1.5 of what mass and speed ask for, or a crush, speed or
+//! loading time of no vehicle. Units are told apart by trying the usual systems: energy, impulse, speed and the times must all
+//! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is held against the speed that it
+//! had reached.
 
 use super::loading::loading_end;
 use super::{Curve, EnergyAudit, Masses};

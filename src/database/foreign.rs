@@ -1,4 +1,7 @@
 //! What others have put into a database file: found, and kept when the database is written again.
+//!
+//! Where others have put something into a database, a copy of the file is edited and, after it was read back and nothing of theirs
+//! is missing, renamed into place. So their links, types and attributes stay as they were encoded.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;

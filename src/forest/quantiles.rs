@@ -1,5 +1,8 @@
 //! Quantiles of the target given a record (Meinshausen, "Quantile Regression Forests",
 //! JMLR 7, 2006): the training targets of the leaves it falls into, weighted.
+//!
+//! A sample counts as often as the tree drew it, so that the mean of the distribution is the prediction. The samples of the
+//! leaves come from a walk of the training records after the fit, so that trees grow the same with and without them.
 
 use linfa::Float;
 use ndarray::{Array2, ArrayView2, Axis};

@@ -1,4 +1,7 @@
 //! The 30 variables of a fit, each between 0 and 1, and the law that they stand for.
+//!
+//! Distances between nodes are bounded to ten times the previous one and its inverse, in logarithms: without a bound a segment
+//! could become narrower than a step.
 
 use super::law::{Nsdm, PiecewiseLinear};
 use super::motion::Laws;

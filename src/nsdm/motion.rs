@@ -1,4 +1,8 @@
 //! The motion of one mass on spring and damper, by Runge–Kutta steps.
+//!
+//! Nearly all time of a fit goes into motions. A step of Runge–Kutta is as long as the reference's interval; only one that
+//! passes a node of either law is taken again in eight parts, because between nodes the laws are smooth and one step is exact
+//! to far more digits than a fit. A test holds the errors of random laws against steps 64 times shorter.
 
 use super::law::Nsdm;
 use super::{NsdmError, check_times};

@@ -2,6 +2,10 @@
 //!
 //! The interfaces inside a train close far more slowly than the trains meet. What an interface
 //! closes at depends on the curves of all, so both are sought together, by iteration.
+//!
+//! Local speeds are a fixed point: curves for the present speeds; a run; each interface's largest closing speed up to the
+//! first peak of its force; and again, until none changes by 0.1 m/s. Models are asked beyond their largest crush here,
+//! because neighbours push on; the closing speed that rate effects follow is then zero.
 
 use std::path::Path;
 

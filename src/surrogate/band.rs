@@ -1,4 +1,17 @@
 //! Bands: how far FE curves lay from the model at speeds it had not seen.
+//!
+//! The half width is Student's t times the root mean square of the left-out residuals, in ratio to the local level of
+//! the force. With three curves that is wide, and the band says on how many curves it rests. (A pointwise quantile of two
+//! to five residuals would be their largest and promise more than they can.)
+//!
+//! A speed that is left out opens a gap about twice as wide as a query finds. So residuals are divided by the power 0.65
+//! of their gap, and the band is the result times the same power of the query's gap: the distance between the two
+//! training speeds around it; at a training speed, the wider of the two gaps beside it. A left-out speed lies in the
+//! middle of its gap, so it does not tell how fast errors fall towards the gap's ends.
+//!
+//! Outside the training speeds, the two ends that were left out tell, in proportion to the distance. Further outside than
+//! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
+//! interfaces close far more slowly than any run by itself.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

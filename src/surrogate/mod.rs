@@ -1,4 +1,8 @@
 //! Surrogates: models of F(v, d) behind one trait, and the curve predicted from them.
+//!
+//! Every model answers through one trait: force over speed, further features, mass and deflection. Models that answer from the
+//! training curves alone (`nearest`, `linear`, `registered`) hold nothing else; the curves stand once in the model file, over even
+//! deflections.
 
 pub mod band;
 mod cached;

@@ -72,7 +72,7 @@ where
 }
 
 /// Most trees of a forest that is fitted only to compare it with other models.
-const CANDIDATE_TREES: usize = 100;
+const CANDIDATE_TREES: usize = 50;
 
 /// Which model, with its options.
 #[derive(Clone, Copy)]
@@ -97,8 +97,8 @@ impl ModelKind {
         MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
     }
 
-    /// Every model as leaving speeds out compares it: with forests of at most 100 trees, since 500
-    /// take five times as long to fit for every left-out speed.
+    /// Every model as leaving speeds out compares it: with forests of at most 50 trees, as the
+    /// reference method has: 500 take ten times as long to fit for every left-out speed.
     pub fn candidates(seed: u64) -> Vec<Self> {
         let fewer = |f: ForestOptions| ForestOptions { trees: f.trees.min(CANDIDATE_TREES), ..f };
         Self::all(seed).into_iter().map(|kind| kind.with_forest(fewer)).collect()

@@ -1,4 +1,11 @@
 //! Extraction: from the histories of one run to its curve.
+//!
+//! Order of work: SI; common times of motion and force; cut; sign of the force; contact time; filter (force only, at its
+//! original rate); deflection from contact on; speed; bounds of energy and impulse; resampling; audit. Contact is found before
+//! filtering, because a filter without phase shift begins ahead of it.
+//!
+//! The sign of the deflection is the direction of motion at contact, not of the largest value: at low speeds the rebound
+//! travels further than the crush.
 
 mod error;
 mod from_contact;

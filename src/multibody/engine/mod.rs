@@ -4,6 +4,27 @@
 //! misses some of the impulse and of its moment. Both follow from the law's tables (`events.rs`):
 //! along the step's path the mean force is the work done over the change of deflection. Without
 //! it every knot, contact and opening would leave an error of the order h².
+//!
+//! Every interface is kept on one straight piece of its law (`bank`), so that a step is a few passes of multiply-adds
+//! over arrays, as wide as the machine's vectors (`multiversion`; no fused operations, so the bits are the same for any
+//! width). The chain is laid out in stretches, one per lane (`rows`): neighbours stand in the same lane of the next row,
+//! and no load waits for two stores. Only an interface that leaves its piece is looked at (`events`): its piece is found
+//! next to the old one, extremes and phases are noted, and the impulse of the step and its moment are corrected.
+//!
+//! The correction: along a step the mean force is the work over the change of deflection, and the tables know the work
+//! and its integral exactly; what the change of speed adds follows by parts. So knots, contacts and openings leave an error
+//! of nearly h⁴ instead of h²: orders of 3.4 to 3.6 are measured on random chains (`tests/engine.rs`). To add up single kinks,
+//! each along the step's parabola, is a little more exact and was dropped: where a curve begins above 0 a branch may be
+//! 10 nm short and as steep, and two such kinks cancel only if both are found at the right time. Where a step hardly moves,
+//! the difference of two works is their rounding, and the correction is skipped. Where a deflection turns, its top is the
+//! vertex of the parabola through the step's start; memory has no error of the step.
+//!
+//! Velocity Verlet is the default: it takes every law, and everyone knows it. The scheme of fourth order (Chin's 4A: two
+//! forces and a gradient, which a piecewise linear law gives at no cost) takes up to 35 times the step with errors of about
+//! 1e-6 m/s, for forces that do not depend on speeds.
+//!
+//! Known limit: vehicles that touch without closing, behind a curve that begins above 0, chatter, and every method needs
+//! short steps for them.
 
 mod events;
 mod forces;

@@ -1,4 +1,10 @@
 //! Force law of an interface: elastic, or elastic-plastic with memory.
+//!
+//! Unloading with memory: dissipation is kept from falling locally, so that an interface whose loading branch is steeper
+//! than its unloading line creates no energy. With a stiffness above the steepest rise this is the law of one stiffness.
+//!
+//! Bodies that touch and close at the start are on the envelope (F = F_e(0)), although an open interface has no force:
+//! otherwise a constant force would lose half a step.
 
 mod memory;
 mod pieces;

@@ -1,4 +1,14 @@
 //! Recorder of events: extremes of interfaces and contacts of bodies between the outputs.
+//!
+//! Mean decelerations need the instants at which a body's net contact force begins, ends and changes its sign. Contacts
+//! that close and open within a step give these instants. Everything else is seen at looks, a quarter of a millisecond apart
+//! at most, so that nothing depends on the interval of the outputs.
+//!
+//! - A net force up to 1 kN counts as none, as in finding the contact of FE runs. Vehicles that touch without closing are
+//!   reached by a precursor that grows from rounding, and where neighbours come to press equally, the force dies away
+//!   without an end.
+//! - The force may fall below that for less than a look.
+//! - A contact that changes the speed by less than 0.5 % of the largest change does not count.
 
 mod extremes;
 mod mean;

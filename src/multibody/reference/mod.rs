@@ -4,6 +4,8 @@
 //! Memory advances on accepted steps only; inside a step the force takes the larger of memory and
 //! deflection. That force is smooth where a deflection turns, so the error does not show a step
 //! over the turn, which would leave the memory short of the top: steps end at turns.
+//!
+//! Shares no code with the other methods but the law: tests and `cargo bench --bench trains` measure their errors against it.
 
 mod extrapolation;
 mod motion;

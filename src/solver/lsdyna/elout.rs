@@ -5,6 +5,9 @@
 //! elements are read as the source of LSTC's converter `l2a` writes them. Components are
 //! named as in a binout; those of a second integration point end with `_ip2`, and so on.
 //! Elements may erode: their values are then NaN.
+//!
+//! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
+//! that looks like erosion cannot fill the memory.
 
 use std::io;
 

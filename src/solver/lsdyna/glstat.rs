@@ -1,4 +1,7 @@
 //! `glstat`: energies and other quantities of the whole model, one labelled line each.
+//!
+//! A state is label → value, and labels may be absent. A cut removes them from the end, so a last state that ends
+//! early is not whole.
 
 use std::io;
 

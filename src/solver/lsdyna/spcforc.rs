@@ -1,4 +1,6 @@
 //! `spcforc`: forces and moments of single point constraints, and their resultant.
+//!
+//! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
 use std::collections::HashMap;
 use std::io;

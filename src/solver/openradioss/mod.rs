@@ -5,6 +5,9 @@
 //! seen in a file), global variables as `glstat`. T01 stores the *impulse* of walls, contacts
 //! and sections; the forces here are its central difference over time (one-sided at both
 //! ends), means over two output intervals.
+//!
+//! All states of a T01 have one length, so a damaged state is passed over and the next one is found. The file has no
+//! check sums.
 
 mod header;
 mod states;

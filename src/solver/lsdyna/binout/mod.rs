@@ -10,6 +10,11 @@
 //!
 //! Of a record that is there twice the later one counts: a restart wrote it again. Entities
 //! may differ between states (eroded elements): a state that lacks one has NaN there.
+//!
+//! A binout is walked record by record without its symbol tables, because a run that died has not written them. The
+//! walk only notes where records are, from 64 bytes each; then the wanted values are read. The ids of a section hold
+//! for the states written behind them, until others are written. The file has no check sums: flipped bits within a
+//! value cannot be seen.
 
 mod bytes;
 mod columns;
