@@ -7,7 +7,7 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-use crumple::assess::compare::Settings;
+use crumple::assess::Settings;
 use crumple::assess::train::compare_train;
 use crumple::build::build;
 use crumple::scenario;

@@ -4,45 +4,16 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::left_out::{LeftOutCase, NotLeftOut};
+use super::error::{CompareError, NotLeftOut};
+use super::left_out::LeftOutCase;
 use super::methods;
-use super::reference::{MotionError, Reference};
-use super::row::RowBuilder;
-use super::train::TrainError;
-use super::validate::ValidateError;
-use crate::curve::{Case, EnvelopeError, ForceKind};
-use crate::dataset::{DatasetError, TrainingCase, TrainingSet, is_same_speed, nearest};
-use crate::multibody::SimulationError;
-use crate::nsdm::{self, Identifiability, NsdmError, Start};
-use crate::rating::{Rating, SignalError};
-use crate::surrogate::ModelError;
-use crate::surrogate::predict::PredictError;
+use super::reference::Reference;
+use super::row::{Row, RowBuilder};
+use super::settings::Settings;
+use crate::curve::Case;
+use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
+use crate::nsdm::{self, Identifiability, Start};
 use crate::unit::{SpeedKind, km_per_h};
-
-/// How the methods are set up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Seed of the forests, and first seed of the genetic algorithm.
-    pub seed: u64,
-    /// The one speed whose FE run FDRM and NSDM use, in m/s; the nearest other one if absent.
-    pub fixed_speed_m_per_s: Option<f64>,
-    /// Fits of the spring and damper, each with its own seed; none leaves NSDM out.
-    pub nsdm_seeds: u64,
-    /// Start of the genetic algorithm.
-    pub nsdm_start: Start,
-}
-
-impl Settings {
-    pub(super) fn nsdm_seeds(&self) -> Vec<u64> {
-        (0..self.nsdm_seeds).map(|k| self.seed.wrapping_add(k)).collect()
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { seed: 0, fixed_speed_m_per_s: None, nsdm_seeds: 3, nsdm_start: Start::Random }
-    }
-}
 
 /// Errors of every method at one left-out speed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -68,44 +39,6 @@ pub struct Comparison {
     pub nsdm: Option<NsdmReport>,
 }
 
-/// One method.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Row {
-    /// `fe` (FE's own curve of the recipe's force: the floor of a one-mass model), `fe_body` (of the
-    /// body's motion, made from FE's speeds: a check of consistency), `fdrm`, `nsdm`, `ddtcm`,
-    /// `best` (the model that validation chooses).
-    pub method: String,
-    /// Which force drives the run; null for a spring and damper.
-    pub driven_by: Option<ForceKind>,
-    /// What its curve was made from.
-    pub curve: String,
-    pub velocity_l1: f64,
-    /// Accelerations filtered with CFC 60.
-    pub acceleration_l1: f64,
-    /// Accelerations as central differences, not filtered.
-    pub acceleration_unfiltered_l1: f64,
-    /// Force of the method's curve along FE's crush, of the same kind of force; null for a
-    /// spring and damper.
-    pub force_l1: Option<f64>,
-    #[serde(rename = "peak_force_N")]
-    pub peak_force_n: f64,
-    pub max_crush_m: f64,
-    /// Time to fit, from the training cases on.
-    pub fit_time_s: f64,
-    /// Time to predict the curve.
-    pub predict_time_s: f64,
-    /// Time of the multi-body run.
-    pub simulation_time_s: f64,
-    /// FE's time over that of prediction and run; null where FE's is not known.
-    pub speed_up: Option<f64>,
-    /// The same with the training runs and the fit counted.
-    pub speed_up_with_training: Option<f64>,
-    /// Every measure of the velocity.
-    pub velocity: Rating,
-    /// Every measure of the acceleration, CFC 60.
-    pub acceleration: Rating,
-}
-
 /// What the fits of the spring and damper are worth.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NsdmReport {
@@ -128,53 +61,6 @@ pub struct NsdmFit {
     pub velocity_l1: f64,
     pub acceleration_l1: f64,
     pub fit_time_s: f64,
-}
-
-/// Why there is no comparison.
-#[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    #[error("group \"{group}\" has no case at {asked}: it has {known}")]
-    NoCase { group: String, asked: String, known: String },
-    #[error("leaving out one of {cases} cases leaves too few: a comparison needs at least 3")]
-    TooFew { cases: usize },
-    #[error("case \"{case}\" ended while loading: it is no reference; compare at another speed")]
-    Truncated { case: String },
-    #[error("the fixed curve is that of {asked}, the speed that is left out: choose another one")]
-    FixedIsLeftOut { asked: String },
-    #[error(transparent)]
-    Validate(#[from] ValidateError),
-    #[error(transparent)]
-    Nsdm(#[from] NsdmError),
-    #[error(transparent)]
-    Signal(#[from] SignalError),
-    #[error(transparent)]
-    Train(#[from] TrainError),
-    #[error(transparent)]
-    NotLeftOut(#[from] NotLeftOut),
-}
-
-/// Causes that validation names as well.
-macro_rules! through_validate {
-    ($($error:ty),*) => {$(
-        impl From<$error> for CompareError {
-            fn from(error: $error) -> Self {
-                Self::Validate(error.into())
-            }
-        }
-    )*};
-}
-through_validate!(DatasetError, ModelError, PredictError, MotionError);
-
-impl From<EnvelopeError> for CompareError {
-    fn from(error: EnvelopeError) -> Self {
-        PredictError::from(error).into()
-    }
-}
-
-impl From<SimulationError> for CompareError {
-    fn from(error: SimulationError) -> Self {
-        MotionError::from(error).into()
-    }
 }
 
 /// The speeds of a group that lie between others, for a comparison at each, in m/s.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::error::{NotLeftOut, ValidateError};
 use super::reference::{MotionError, MotionErrors, Reference};
-use super::validate::ValidateError;
 use crate::curve::driving::DrivingCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
@@ -34,32 +34,6 @@ pub fn query_of(case: &Case, model: &Model) -> Query {
         extrapolate: true,
         ..Query::at(case.speed.m_per_s)
     }
-}
-
-/// Why a case cannot be left out.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NotLeftOut {
-    /// Its largest deflection is not known.
-    #[error("case \"{case}\" ended while loading: not left out")]
-    Truncated {
-        /// Its name.
-        case: String,
-    },
-    /// There is no motion to compare with.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    /// Ratios to its energy would divide by zero.
-    #[error("case \"{case}\" has no energy to compare with")]
-    NoEnergy {
-        /// Its name.
-        case: String,
-    },
-    /// Fewer than two speeds remain.
-    #[error("without case \"{case}\" fewer than 2 speeds remain")]
-    TooFew {
-        /// Its name.
-        case: String,
-    },
 }
 
 /// A case that is left out, and what is left.

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use super::compare::{CompareError, Settings};
+use super::error::CompareError;
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
-use super::row::Times;
+use super::settings::Settings;
 use super::validate::{Choice, train};
 use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
@@ -24,6 +24,23 @@ pub(super) struct Method {
     /// FE's force and the method's, of one kind of force.
     pub forces: (Envelope, Envelope),
     pub times: Times,
+}
+
+/// Times that a method took.
+#[derive(Clone, Copy)]
+pub(super) struct Times {
+    pub fit_s: f64,
+    pub predict_s: f64,
+    /// FE's time of the runs it needs, if not all.
+    pub training_s: Option<f64>,
+    /// Whether it saves an FE run at all.
+    pub training: bool,
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { fit_s: 0.0, predict_s: 0.0, training_s: None, training: true }
+    }
 }
 
 fn fe_at(speed_m_per_s: f64) -> String {

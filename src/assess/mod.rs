@@ -3,9 +3,14 @@
 
 pub mod choose;
 pub mod compare;
+pub mod error;
 pub mod left_out;
 mod methods;
 pub mod reference;
 mod row;
+pub mod settings;
 pub mod train;
 pub mod validate;
+
+pub use row::Row;
+pub use settings::Settings;

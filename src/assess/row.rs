@@ -2,12 +2,53 @@
 
 use std::time::Instant;
 
-use super::compare::{CompareError, Row};
-use super::methods::{FittedNsdm, Method};
+use super::error::CompareError;
+use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
 use crate::curve::ForceKind;
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::rating::{Quantity, Rating, Settings, Signal, rate};
 use crate::signal::l1_ratio;
+
+/// One method.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Row {
+    /// `fe` (FE's own curve of the recipe's force: the floor of a one-mass model), `fe_body` (of the
+    /// body's motion, made from FE's speeds: a check of consistency), `fdrm`, `nsdm`, `ddtcm`,
+    /// `best` (the model that validation chooses).
+    pub method: String,
+    /// Which force drives the run; null for a spring and damper.
+    pub driven_by: Option<ForceKind>,
+    /// What its curve was made from.
+    pub curve: String,
+    pub velocity_l1: f64,
+    /// Accelerations filtered with CFC 60.
+    pub acceleration_l1: f64,
+    /// Accelerations as central differences, not filtered.
+    pub acceleration_unfiltered_l1: f64,
+    /// Force of the method's curve along FE's crush, of the same kind of force; null for a
+    /// spring and damper.
+    pub force_l1: Option<f64>,
+    #[serde(rename = "peak_force_N")]
+    pub peak_force_n: f64,
+    pub max_crush_m: f64,
+    /// Time to fit, from the training cases on.
+    pub fit_time_s: f64,
+    /// Time to predict the curve.
+    pub predict_time_s: f64,
+    /// Time of the multi-body run.
+    pub simulation_time_s: f64,
+    /// FE's time over that of prediction and run; null where FE's is not known.
+    pub speed_up: Option<f64>,
+    /// The same with the training runs and the fit counted.
+    pub speed_up_with_training: Option<f64>,
+    /// Every measure of the velocity.
+    pub velocity: Rating,
+    /// Every measure of the acceleration, CFC 60.
+    pub acceleration: Rating,
+}
 
 /// What all rows of one comparison share.
 pub(super) struct RowBuilder<'a> {
@@ -15,23 +56,6 @@ pub(super) struct RowBuilder<'a> {
     pub fe_time_s: Option<f64>,
     /// Of all runs that curves are trained on.
     pub training_time_s: Option<f64>,
-}
-
-/// Times that a method took.
-#[derive(Clone, Copy)]
-pub(super) struct Times {
-    pub fit_s: f64,
-    pub predict_s: f64,
-    /// FE's time of the runs it needs, if not all.
-    pub training_s: Option<f64>,
-    /// Whether it saves an FE run at all.
-    pub training: bool,
-}
-
-impl Default for Times {
-    fn default() -> Self {
-        Self { fit_s: 0.0, predict_s: 0.0, training_s: None, training: true }
-    }
 }
 
 /// The motion that a method gives.

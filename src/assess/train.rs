@@ -1,29 +1,29 @@
 //! Trains: every method's curves in one scenario, against FE's run of the whole train.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::compare::{CompareError, Settings};
+use super::error::{CompareError, TrainError};
 use super::methods::{ddtcm_model, fit_nsdm};
+use super::settings::Settings;
 use super::validate::{self, Choice};
 use crate::curve::body::filtered;
 use crate::curve::{Case, DrivingCurve};
-use crate::database::{Database, DatabaseError};
+use crate::database::Database;
 use crate::dataset::TrainingSet;
 use crate::file;
 use crate::history::EntityId;
 use crate::multibody::simulate;
 use crate::scenario::{
-    self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, ScenarioError,
-    Source, Sources,
+    self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, Source, Sources,
 };
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
-use crate::solver::{self, ReadError, Selection, WantedId};
+use crate::solver::{self, Selection, WantedId};
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
@@ -126,47 +126,6 @@ pub struct VehicleErrors {
     pub velocity_l1: f64,
     /// CFC 60 on both sides.
     pub acceleration_l1: f64,
-}
-
-/// Why a train cannot be compared.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    #[error(
-        "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\""
-    )]
-    NotACase { curve: String },
-    #[error("the scenario has no vehicle \"{name}\": its vehicles are {known}")]
-    NoVehicle { name: String, known: String },
-    #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
-    TooShort { states: usize, until_s: f64 },
-    #[error(
-        "{path}: the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
-    )]
-    RunTooShort { path: PathBuf, duration_s: f64, until_s: f64 },
-    #[error("{path}: [reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
-    NoNodes { path: PathBuf },
-    #[error(
-        "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
-    )]
-    OtherSpeed { path: PathBuf, vehicle: String, fe_m_per_s: f64, m_per_s: f64 },
-    #[error("{path}: the scenario has no [reference]: add one that names FE's run of the train")]
-    NoReference { path: PathBuf },
-    #[error(
-        "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
-    )]
-    NoHistory { path: PathBuf, node: i64, component: String },
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    #[error(transparent)]
-    Scenario(#[from] Box<ScenarioError>),
-    #[error(transparent)]
-    Database(#[from] DatabaseError),
-}
-
-impl From<ScenarioError> for CompareError {
-    fn from(error: ScenarioError) -> Self {
-        TrainError::from(Box::new(error)).into()
-    }
 }
 
 /// FE's vehicles begin at the scenario's speeds, but for this share.

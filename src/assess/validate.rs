@@ -12,33 +12,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{NextRun, choose};
+use super::error::ValidateError;
 use super::left_out::{LeftOutCase, Trial, query_of};
-use super::reference::MotionError;
 use crate::curve::Case;
-use crate::dataset::{DatasetError, TrainingSet, is_same_speed};
+use crate::dataset::{TrainingSet, is_same_speed};
 use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::predict::PredictError;
-use crate::surrogate::{MODELS, Model, ModelError, ModelKind, predict};
-
-/// Why there is no validation or no model.
-#[derive(Debug, thiserror::Error)]
-pub enum ValidateError {
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error(transparent)]
-    Predict(#[from] PredictError),
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    #[error("without this speed: {0}")]
-    NotFitted(String),
-    #[error("its errors against FE are no finite numbers")]
-    NotFinite,
-}
+use crate::surrogate::{MODELS, Model, ModelKind, predict};
 
 /// What `crumple validate --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]

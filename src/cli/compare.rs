@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::assess::compare::{self, Comparison, NsdmReport, Settings};
+use crumple::assess::compare::{self, Comparison, NsdmReport};
 use crumple::assess::train::{TrainComparison, compare_train};
+use crumple::assess::{Row, Settings};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::nsdm::Start;
@@ -255,9 +256,7 @@ fn means(comparisons: &[Comparison]) -> Vec<Mean> {
             let all = || {
                 comparisons.iter().flat_map(|c| &c.rows).filter(|other| other.method == row.method)
             };
-            let mean = |of: &dyn Fn(&compare::Row) -> f64| {
-                all().map(of).sum::<f64>() / all().count() as f64
-            };
+            let mean = |of: &dyn Fn(&Row) -> f64| all().map(of).sum::<f64>() / all().count() as f64;
             Mean {
                 method: row.method.clone(),
                 driven_by: row.driven_by,

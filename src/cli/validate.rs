@@ -4,7 +4,8 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crumple::assess::choose::{NextRun, next_run};
-use crumple::assess::validate::{GroupReport, Report, ValidateError, add_nested, validate};
+use crumple::assess::error::ValidateError;
+use crumple::assess::validate::{GroupReport, Report, add_nested, validate};
 use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;

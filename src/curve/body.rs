@@ -1,6 +1,5 @@
 //! Body force: what moves the car body, from the rate of the deflection.
 
-use super::driving::rebound_stiffness_n_per_m;
 use super::loading::{loading_branch, loading_end};
 use super::{Case, Curve, Envelope};
 use crate::signal::{cfc, derivative};
@@ -26,6 +25,13 @@ impl BodyMotion {
         let top_n = self.force.force_at(self.force.end_m());
         rebound_stiffness_n_per_m(top_n, mass_kg, self.rebound_speed_m_per_s?)
     }
+}
+
+/// Stiffness in N/m of the straight line on which a body of `mass_kg` leaves a force of `top_n`
+/// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is no stiffness.
+pub fn rebound_stiffness_n_per_m(top_n: f64, mass_kg: f64, rebound_m_per_s: f64) -> Option<f64> {
+    let stiffness = top_n * top_n / (mass_kg * rebound_m_per_s * rebound_m_per_s);
+    (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }
 
 /// The body force `−m dv/dt` of the closing speed `v`, with the case's effective mass.

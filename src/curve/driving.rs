@@ -1,7 +1,7 @@
 //! Driving curves: what the database, models, files and NSDM give, and what multi-body runs,
 //! exports and comparisons take.
 
-use super::body::recorded_force;
+use super::body::{rebound_stiffness_n_per_m, recorded_force};
 use super::{Case, Envelope, EnvelopeError, ForceKind};
 use crate::unit::SpeedKind;
 
@@ -50,13 +50,6 @@ pub enum NoDrivingCurve {
     /// Its body force cannot be told from its speeds.
     #[error("its sampled states make no loading branch")]
     NoMotion,
-}
-
-/// Stiffness in N/m of the straight line on which a body of `mass_kg` leaves a force of `top_n`
-/// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is no stiffness.
-pub fn rebound_stiffness_n_per_m(top_n: f64, mass_kg: f64, rebound_m_per_s: f64) -> Option<f64> {
-    let stiffness = top_n * top_n / (mass_kg * rebound_m_per_s * rebound_m_per_s);
-    (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }
 
 impl DrivingCurve {

@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::write::explained;
+use super::folder::explained;
 
 /// Why the lock was not given.
 #[derive(Debug, thiserror::Error)]

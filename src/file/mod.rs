@@ -1,6 +1,7 @@
 //! Files: read only where they are files, and up to a bound; written so that a reader sees the
 //! old content or the new, never half of it.
 
+mod folder;
 mod lock;
 mod write;
 

@@ -6,7 +6,8 @@
 //! written.
 //!
 //! This rests on something that hdf5-pure does and does not promise: it hands the raw values of
-//! a dataset to its writer in one piece, as they were given to it. The crate's version is pinned
+//! a dataset to its writer in one piece, as they were given to it, if they have 8 KiB or more
+//! (fewer it gathers with others in the buffer of a `BufWriter`). The crate's version is pinned
 //! exactly, and the test below fails when that changes. [`Skeleton::write`] notices it too, and
 //! its callers then say so or write in another way.
 
@@ -36,8 +37,8 @@ impl Skeleton {
         self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
     }
 
-    /// Gives a dataset of values of `size` bytes its shape and its place. Its values need 24
-    /// bytes at least, or there is no room for the mark and [`Skeleton::write`] gives `None`.
+    /// Gives a dataset of values of `size` bytes its shape and its place. Of fewer than 8 KiB the
+    /// place is not found, and [`Skeleton::write`] gives `None`.
     pub fn reserve_values(
         &mut self,
         dataset: &mut DatasetBuilder,
@@ -143,8 +144,8 @@ mod tests {
         let file = File::create(&path).unwrap();
         let mut out = FileBuilder::new();
         let mut skeleton = Skeleton::default();
-        // From the least that takes a mark to more than any buffer of the encoder.
-        let shapes = [(1, 3), (1000, 1), (70_000, 11)];
+        // From 8 KiB on.
+        let shapes = [(1024, 1), (1, 1024), (70_000, 11)];
         for (k, (rows, columns)) in shapes.into_iter().enumerate() {
             skeleton.reserve(out.create_dataset(&format!("d{k}")), rows, columns);
         }
@@ -168,11 +169,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_small_for_a_mark_is_noticed() {
-        let file = tempfile::tempfile().unwrap();
-        let mut out = FileBuilder::new();
-        let mut skeleton = Skeleton::default();
-        skeleton.reserve(out.create_dataset("d"), 1, 1);
-        assert_eq!(skeleton.write(out, &file).unwrap(), None);
+    fn values_that_are_not_handed_over_by_themselves_are_noticed() {
+        for rows in [1, 3, 1000] {
+            let file = tempfile::tempfile().unwrap();
+            let mut out = FileBuilder::new();
+            let mut skeleton = Skeleton::default();
+            skeleton.reserve(out.create_dataset("d"), rows, 1);
+            assert_eq!(skeleton.write(out, &file).unwrap(), None, "{rows} values");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Solver files: from bytes to [`History`].
+//! Solver files: from bytes to [`History`](crate::history::History).
 //!
 //! A reader takes a [`Source`] and a [`Selection`], returns a [`SolverFile`], and treats
 //! damage as part of the result ([`Problem`]): complete states are returned, what is

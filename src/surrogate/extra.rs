@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use super::forest::{ForestOptions, ForestSurrogate};
+use super::entry::{ModelEntry, loaded};
+use super::forest::ForestSurrogate;
+use super::forest_options::ForestOptions;
 use super::max_crush::MaxCrushRule;
-use super::models::{ModelEntry, loaded};
 use crate::forest::Thresholds;
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

@@ -2,18 +2,19 @@
 
 use std::sync::Arc;
 
-use linfa::ParamGuard;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
-use super::models::{ModelEntry, loaded};
 use super::{At, CaseCurve, Surrogate, Warning};
 use crate::curve::ForceKind;
-use crate::dataset::{TableKind, TrainingSet};
-use crate::forest::{ForestError, ForestParams, RegressionForest, StopRule, Thresholds};
+use crate::dataset::TrainingSet;
+use crate::forest::{ForestError, RegressionForest, Thresholds};
+
+pub use super::forest_options::ForestOptions;
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "forest",
@@ -30,72 +31,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     },
     load: loaded::<ForestSurrogate>,
 };
-
-/// Choices of the forest surrogate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ForestOptions {
-    pub trees: usize,
-    pub seed: u64,
-    pub thresholds: Thresholds,
-    pub stop: StopRule,
-    pub min_samples_leaf: usize,
-    pub table: TableKind,
-    /// Whether each tree sees a sample drawn with replacement, or all points.
-    #[serde(default = "yes")]
-    pub bootstrap: bool,
-    /// Whether the leaves keep their members, for quantiles.
-    #[serde(default)]
-    pub quantiles: bool,
-}
-
-fn yes() -> bool {
-    true
-}
-
-impl Default for ForestOptions {
-    /// 50 trees on a deflection grid from the solver's rate.
-    fn default() -> Self {
-        Self {
-            trees: 50,
-            seed: 0,
-            thresholds: Thresholds::Midpoint,
-            stop: StopRule::StdOverMean(0.01),
-            min_samples_leaf: 1,
-            table: TableKind::Grid,
-            bootstrap: true,
-            quantiles: false,
-        }
-    }
-}
-
-impl ForestOptions {
-    /// The reference method: 50 trees, the states at the common interval, and the stop
-    /// rule as printed, `Var/Mean`. Its threshold is not printed with a unit; 0.01 (in N)
-    /// leaves the trees practically unpruned.
-    pub fn paper() -> Self {
-        Self { stop: StopRule::VarOverMean(0.01), table: TableKind::Samples, ..Self::default() }
-    }
-}
-
-impl ForestOptions {
-    /// Whether they make a forest.
-    ///
-    /// # Errors
-    /// [`ForestError`] names the option that is out of its range.
-    pub fn check(&self) -> Result<(), ForestError> {
-        self.params().check_ref().map(|_| ())
-    }
-
-    fn params(&self) -> ForestParams<f64> {
-        ForestParams::new(self.trees)
-            .seed(self.seed)
-            .thresholds(self.thresholds)
-            .stop(self.stop)
-            .min_samples_leaf(self.min_samples_leaf)
-            .bootstrap(self.bootstrap)
-            .out_of_bag(self.bootstrap)
-    }
-}
 
 /// A fitted forest and the speeds it jumps between.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

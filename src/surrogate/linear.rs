@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::curves::interpolate_held;
+use super::entry::ModelEntry;
 use super::max_crush::MaxCrushRule;
-use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use super::predict::PredictError;
+use super::predict_error::PredictError;
 use crate::curve::Envelope;
 
 /// How the maximal crush is found.

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use super::band::{self, Band};
 use super::cases::{Curves, Kink, ModelCase};
+use super::entry::FitInput;
 use super::forest::ForestSurrogate;
 use super::landmarks::Landmarks;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::model_file::VERSION;
-use super::models::{FitInput, MODELS, ModelKind};
+use super::models::{MODELS, ModelKind};
 use super::{At, CaseCurve, Surrogate, Warning};
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::entry::ModelEntry;
 use super::max_crush::MaxCrushRule;
-use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

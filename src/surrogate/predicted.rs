@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::Warning;
 use super::band::Band;
 use super::max_crush::{MaxCrush, MaxCrushRule};
-use super::predict::PredictError;
+use super::predict_error::PredictError;
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::unit::{SpeedKind, UnitSystem};
 

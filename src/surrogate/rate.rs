@@ -18,8 +18,8 @@ use serde_json::value::RawValue;
 
 use super::cached::Cached;
 use super::curves::neighbours;
+use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
-use super::models::{ModelEntry, loaded};
 use super::{At, CaseCurve, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::curves::{interpolate_held, least_squares};
+use super::entry::ModelEntry;
 use super::landmarks::{Landmarks, Warp};
 use super::linear::Linear;
 use super::max_crush::MaxCrushRule;
-use super::models::ModelEntry;
 use super::{At, CaseCurve, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

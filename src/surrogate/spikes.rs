@@ -1,7 +1,7 @@
 //! Spikes: points of a predicted force that stand alone as none of a training curve does.
 
 use super::Model;
-use super::predict::PredictError;
+use super::predict_error::PredictError;
 
 /// A point stands alone if its force lies above both neighbours, or below both, by more than
 /// this factor of what any training curve shows.

@@ -1,0 +1,70 @@
+//! What the table of models says of each.
+
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+use serde_json::value::RawValue;
+
+use super::forest_options::ForestOptions;
+use super::max_crush::MaxCrushRule;
+use super::{CaseCurve, Surrogate};
+use crate::curve::ForceKind;
+use crate::dataset::TrainingSet;
+use crate::forest::ForestError;
+
+/// One model: what it is called, what it needs, how it is fitted and read again.
+#[derive(Clone, Copy, Debug)]
+pub struct ModelEntry {
+    /// As the command line and model files name it.
+    pub name: &'static str,
+    /// What it is, in one line.
+    pub about: &'static str,
+    /// Place from simple (0) to elaborate: of about equally good models the simplest is taken.
+    pub complexity: u8,
+    /// Whether a chosen model must be at least as good as this one.
+    pub baseline: bool,
+    /// Whether it sees parameters beside the speed.
+    pub sees_features: bool,
+    /// Fewest training curves that it answers from.
+    pub least_curves: usize,
+    /// The rule for the maximal crush of a model that was not validated, if speed alone differs.
+    pub crush_rule: MaxCrushRule,
+    /// Options of its forest; `None` for a model without one.
+    pub(super) forest: Option<fn() -> ForestOptions>,
+    pub(super) fit: Fit,
+    /// From what [`Surrogate::parameters`] gave; `None` for a model without any.
+    pub(super) load: Load,
+}
+
+/// Fits a model.
+pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, ForestError>;
+
+/// Makes a model of its parameters in a model file.
+pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
+
+/// What a model is fitted to.
+pub(super) struct FitInput<'a> {
+    pub set: &'a TrainingSet,
+    /// The curves of `force`, in order of speed.
+    pub curves: &'a [CaseCurve],
+    pub force: ForceKind,
+    pub forest: Option<&'a ForestOptions>,
+}
+
+impl FitInput<'_> {
+    /// The forest's options.
+    pub fn forest_options(&self) -> &ForestOptions {
+        self.forest.expect("ModelKind gives options to each model with a forest")
+    }
+}
+
+/// `parameters` of a model that has some.
+pub(super) fn loaded<T>(
+    parameters: Option<&RawValue>,
+) -> Result<Arc<dyn Surrogate>, serde_json::Error>
+where
+    T: Surrogate + DeserializeOwned + 'static,
+{
+    let parameters = parameters.map_or("null", RawValue::get);
+    Ok(Arc::new(serde_json::from_str::<T>(parameters)?))
+}

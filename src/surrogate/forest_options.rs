@@ -1,0 +1,73 @@
+//! Options of a forest surrogate.
+
+use linfa::ParamGuard;
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::TableKind;
+use crate::forest::{ForestError, ForestParams, StopRule, Thresholds};
+
+/// Choices of the forest surrogate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForestOptions {
+    pub trees: usize,
+    pub seed: u64,
+    pub thresholds: Thresholds,
+    pub stop: StopRule,
+    pub min_samples_leaf: usize,
+    pub table: TableKind,
+    /// Whether each tree sees a sample drawn with replacement, or all points.
+    #[serde(default = "yes")]
+    pub bootstrap: bool,
+    /// Whether the leaves keep their members, for quantiles.
+    #[serde(default)]
+    pub quantiles: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl Default for ForestOptions {
+    /// 50 trees on a deflection grid from the solver's rate.
+    fn default() -> Self {
+        Self {
+            trees: 50,
+            seed: 0,
+            thresholds: Thresholds::Midpoint,
+            stop: StopRule::StdOverMean(0.01),
+            min_samples_leaf: 1,
+            table: TableKind::Grid,
+            bootstrap: true,
+            quantiles: false,
+        }
+    }
+}
+
+impl ForestOptions {
+    /// The reference method: 50 trees, the states at the common interval, and the stop
+    /// rule as printed, `Var/Mean`. Its threshold is not printed with a unit; 0.01 (in N)
+    /// leaves the trees practically unpruned.
+    pub fn paper() -> Self {
+        Self { stop: StopRule::VarOverMean(0.01), table: TableKind::Samples, ..Self::default() }
+    }
+}
+
+impl ForestOptions {
+    /// Whether they make a forest.
+    ///
+    /// # Errors
+    /// [`ForestError`] names the option that is out of its range.
+    pub fn check(&self) -> Result<(), ForestError> {
+        self.params().check_ref().map(|_| ())
+    }
+
+    pub(super) fn params(&self) -> ForestParams<f64> {
+        ForestParams::new(self.trees)
+            .seed(self.seed)
+            .thresholds(self.thresholds)
+            .stop(self.stop)
+            .min_samples_leaf(self.min_samples_leaf)
+            .bootstrap(self.bootstrap)
+            .out_of_bag(self.bootstrap)
+    }
+}
