@@ -283,7 +283,9 @@ pub fn add_nested(
             let predictions = train(&group, &others, Choice::Auto { seed, trees: None })
                 .and_then(|model| {
                     let curve = predict(&model, &query_of(held.case, &model))?;
-                    Ok((curve.provenance.max_crush_rule, held.judged(curve)?))
+                    let rule = curve.provenance.max_crush_rule;
+                    let rule = rule.expect("a prediction says its rule");
+                    Ok((rule, held.judged(curve)?))
                 })
                 .map_or_else(
                     |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),

@@ -7,6 +7,8 @@ mod db;
 mod deck_report;
 mod demo;
 mod export;
+mod export_input;
+mod export_output;
 mod histories;
 mod inspect;
 mod output;

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
-pub use driving::{CurveUnloading, DrivingCurve};
+pub use driving::{CurveUnloading, DrivingCurve, NoDrivingCurve};
 pub use envelope::{Envelope, EnvelopeError};
 
 /// A force–deflection history: what one run measured at an interface.

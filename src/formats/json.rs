@@ -2,18 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, MAX_CURVE_BYTES, Options};
+use super::export_curve::file_stem;
+use super::{ExportError, ExportInput, Exported, MAX_CURVE_BYTES, Options};
 use crate::file;
 use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::PredictError;
 
-pub fn write(curve: &PredictedCurve, options: &Options) -> Result<Vec<u8>, ExportError> {
+pub fn write(input: &ExportInput, options: &Options) -> Result<Exported, ExportError> {
     if options.units.is_some() {
         return Err(ExportError::SiOnly { format: "json" });
     }
-    let mut bytes = serde_json::to_vec_pretty(curve)?;
+    let mut bytes = serde_json::to_vec_pretty(&input.curve)?;
     bytes.push(b'\n');
-    Ok(bytes)
+    Ok(Exported::file(format!("{}.json", file_stem(&input.curve)), bytes))
 }
 
 /// Why a file is no predicted curve.

@@ -57,6 +57,12 @@ pub struct MaxCrush {
     pub spread_m: f64,
 }
 
+impl MaxCrush {
+    /// No rule has an answer.
+    pub(super) const NONE: Self =
+        Self { spline_m: None, monotone_m: None, energy_m: None, motion_m: None, spread_m: 0.0 };
+}
+
 /// Cubic spline through `points` (speed in m/s increasing, crush in m) at `v`.
 ///
 /// Natural ends, continued straight beyond them; through two points a straight line,

@@ -25,6 +25,7 @@ mod predict_error;
 pub mod predicted;
 mod query;
 mod rate;
+pub mod recorded;
 mod registered;
 mod spikes;
 pub mod warning;
@@ -38,6 +39,7 @@ pub use curves::CaseCurve;
 pub use model::{Model, ModelError};
 pub use models::{MODELS, ModelKind};
 pub use predict::{PredictedCurve, Query, predict};
+pub use predict_error::PredictError;
 pub use warning::Warning;
 
 /// Where a surrogate is asked.

@@ -75,6 +75,29 @@ pub fn predict_driving(
     Ok((DrivingCurve { beyond: Some(beyond), ..driving }, curve.warnings))
 }
 
+/// The forces of a prediction along deflections of which some lie beyond its maximal crush.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beyond {
+    /// What the recipe declares.
+    pub declared: Envelope,
+    /// What moves a body of one mass.
+    pub body: Envelope,
+}
+
+/// [`predict`], and how its forces go on beyond the maximal crush.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_beyond(
+    model: &Model,
+    query: &Query,
+) -> Result<(PredictedCurve, Beyond), PredictError> {
+    let prediction = Prediction::new(model, query)?;
+    let curve = prediction.curve(prediction.rule())?;
+    let Prediction { motion, declared, .. } = prediction;
+    Ok((curve, Beyond { declared, body: motion.body }))
+}
+
 /// The motion that the body's force gives, beyond any maximal crush.
 struct Motion<'a> {
     asked: Asked<'a>,
@@ -294,7 +317,7 @@ fn provenance(
         in_range: (low..=high).contains(&v),
         nearest_training_speed_m_per_s: nearest,
         distance_to_nearest_m_per_s: (nearest - v).abs(),
-        max_crush_rule: rule,
+        max_crush_rule: Some(rule),
         max_crush: crush,
         kinetic_energy_j: asked.kinetic_energy_j,
         energy_over_kinetic: energy,

@@ -103,7 +103,9 @@ pub struct Provenance {
     pub in_range: bool,
     pub nearest_training_speed_m_per_s: f64,
     pub distance_to_nearest_m_per_s: f64,
-    pub max_crush_rule: MaxCrushRule,
+    /// How the maximal crush was found; absent for a recorded curve, which has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_crush_rule: Option<MaxCrushRule>,
     pub max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]
