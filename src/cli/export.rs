@@ -120,7 +120,11 @@ const TAILS: &[(&str, Tail, &str)] = &[
 /// Spring materials of LS-DYNA.
 const MATERIALS: &[(&str, Material, &str)] = &[
     ("s08", Material::S08, "*MAT_SPRING_INELASTIC: unloads with KU, at least the steepest rise"),
-    ("mat121", Material::Mat121, "Discrete beam of one degree of freedom: unloads with its own stiffness"),
+    (
+        "mat121",
+        Material::Mat121,
+        "Discrete beam of one degree of freedom: unloads with its own stiffness",
+    ),
     ("s06", Material::S06, "*MAT_SPRING_GENERAL_NONLINEAR: unloads along a curve"),
 ];
 

@@ -7,7 +7,8 @@ use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::dataset::is_same_speed;
 use crumple::file;
-use crumple::formats::{ExportInput, json};
+use crumple::formats::ExportInput;
+use crumple::formats::json::{self, CurveFileError};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
@@ -40,7 +41,7 @@ const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 impl Input {
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let mut head = Vec::new();
-        let named = |e: std::io::Error| Failure::Usage(format!("{}: {e}", path.display()));
+        let named = |source| CurveFileError::Io { path: path.into(), source };
         file::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head)).map_err(named)?;
         if head.starts_with(HDF5) {
             return Ok(Self::Database(path.into(), Database::read(path)?));
@@ -142,8 +143,7 @@ impl Chosen<'_> {
         for name in self.cases {
             database.case(path, group, name)?;
         }
-        let has_speed =
-            |case: &Case, v: f64| is_same_speed(case.speed.m_per_s, v);
+        let has_speed = |case: &Case, v: f64| is_same_speed(case.speed.m_per_s, v);
         if let Some(&v) =
             self.speeds_m_per_s.iter().find(|&&v| !cases.iter().any(|c| has_speed(c, v)))
         {

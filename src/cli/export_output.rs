@@ -48,7 +48,9 @@ impl Destination<'_> {
         if files != [path] {
             make_folders(&files)?;
         }
-        write_all_whole(&files.iter().zip(&exported.files).map(|(p, f)| (&**p, &*f.1)).collect::<Vec<_>>())?;
+        write_all_whole(
+            &files.iter().zip(&exported.files).map(|(p, f)| (&**p, &*f.1)).collect::<Vec<_>>(),
+        )?;
         if options.json {
             return output::print_json(&Document {
                 format: self.format.name,
@@ -70,9 +72,11 @@ impl Destination<'_> {
             )));
         };
         match std::str::from_utf8(bytes) {
-            Ok(text) if options.json => {
-                output::print_json(&Text { format: name, text: text.into(), notes: &exported.notes })
-            }
+            Ok(text) if options.json => output::print_json(&Text {
+                format: name,
+                text: text.into(),
+                notes: &exported.notes,
+            }),
             Err(_) if options.json => {
                 Err(Failure::Usage(format!("{name} is binary: name a file with -o")))
             }

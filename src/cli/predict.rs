@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
+use crumple::formats::ExportInput;
 use crumple::surrogate::band::{Band, LeftOutSpeeds};
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::formats::ExportInput;
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
 use crumple::unit::km_per_h;

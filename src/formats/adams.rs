@@ -101,7 +101,8 @@ impl<'a> Spline<'a> {
         lines.add(format_args!("SPLINE/{}, LINEAR_EXTRAPOLATE", self.id));
         for (name, numbers) in self.columns() {
             for (i, row) in numbers.chunks(PER_LINE).enumerate() {
-                let key = if i == 0 { format!("{}=", name.to_ascii_uppercase()) } else { String::new() };
+                let key =
+                    if i == 0 { format!("{}=", name.to_ascii_uppercase()) } else { String::new() };
                 lines.add(format_args!(", {key}{}", row.join(",")));
             }
         }

@@ -39,7 +39,9 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         for (key, value) in curve.facts() {
             lines.add(format_args!("** {key}: {}", ascii(&value)));
         }
-        lines.add(format_args!("** elongation is positive: a crush stands as (-force, -deflection)"));
+        lines.add(format_args!(
+            "** elongation is positive: a crush stands as (-force, -deflection)"
+        ));
         if options.deck {
             nodes(&mut lines, curve, units, id);
         }

@@ -301,7 +301,11 @@ impl Format {
     ///
     /// # Errors
     /// [`ExportError`] if the target cannot take them.
-    pub fn export(&self, inputs: &[ExportInput], options: &Options) -> Result<Exported, ExportError> {
+    pub fn export(
+        &self,
+        inputs: &[ExportInput],
+        options: &Options,
+    ) -> Result<Exported, ExportError> {
         for input in inputs {
             let points = input.curve.deflection_m.len();
             if points < MIN_POINTS {
@@ -309,7 +313,10 @@ impl Format {
             }
         }
         let exported = match self.writer {
-            Writer::Model(_) => return Err(self.unfit("a whole model: remove --speed")),
+            Writer::Model(_) => {
+                let how = format!("a model: crumple export MODEL --to {}", self.name);
+                return Err(self.unfit(how));
+            }
             Writer::Case(_) => {
                 return Err(self.unfit(
                     "histories over time: name a case of a database, which has them, or use crumple simulate -o",

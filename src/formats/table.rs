@@ -62,7 +62,8 @@ impl Table {
             }
             asked => asked.unwrap_or(Tail::Hold),
         };
-        let (mut max_deflection_m, mut stiffness, mut curves) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut max_deflection_m, mut stiffness, mut curves) =
+            (Vec::new(), Vec::new(), Vec::new());
         let mut warnings = Vec::new();
         for &speed in &speed_m_per_s {
             let (curve, beyond) = predict_beyond(model, &Query::at(speed))?;

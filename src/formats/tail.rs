@@ -94,7 +94,9 @@ impl Tail {
     pub fn rule(self, follows_faster_runs: bool) -> &'static str {
         match (self, follows_faster_runs) {
             (Self::None, _) => "none: the last point is the maximal crush",
-            (Self::Hold, true) => "beyond max_deflection_m along faster runs, then the force is held",
+            (Self::Hold, true) => {
+                "beyond max_deflection_m along faster runs, then the force is held"
+            }
             (Self::Hold, false) => "beyond max_deflection_m the level of its last tenth is held",
             (Self::Bottom, true) => {
                 "beyond max_deflection_m along faster runs, then the force rises with the unloading stiffness"

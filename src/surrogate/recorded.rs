@@ -62,7 +62,11 @@ impl PredictedCurve {
             mass_kg: case.masses.body_kg,
             energy_j: loading.work(),
             model: RECORDED.into(),
-            warnings: case.is_truncated().then(|| Warning::truncated_training_run(&case.name)).into_iter().collect(),
+            warnings: case
+                .is_truncated()
+                .then(|| Warning::truncated_training_run(&case.name))
+                .into_iter()
+                .collect(),
             provenance: Provenance {
                 written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
                 group: case.group.clone(),

@@ -81,7 +81,9 @@ pub fn write(
     lines.add(format_args!("$#     nid        vx        vy        vz"));
     lines.add(format_args!("{:>10}{:>10.3}{:>10}{:>10}", 2, -speed, "0.0", "0.0"));
     lines.add(format_args!("*BOUNDARY_SPC_NODE"));
-    lines.add(format_args!("$#     nid       cid      dofx      dofy      dofz     dofrx     dofry     dofrz"));
+    lines.add(format_args!(
+        "$#     nid       cid      dofx      dofy      dofz     dofrx     dofry     dofrz"
+    ));
     let free = usize::from(curve.other_mass_kg().is_none());
     for (node, along) in [(1, free), (2, 0)] {
         lines.add(format_args!(
