@@ -44,9 +44,9 @@ pub struct Feature {
 }
 
 /// The parameter that masses become if they differ within a group.
-pub const MASS: &str = "mass_kg";
+pub(crate) const MASS: &str = "mass_kg";
 /// The mass of the other body of a pair, where it is not that of the first.
-pub const OTHER_MASS: &str = "other_mass_kg";
+pub(crate) const OTHER_MASS: &str = "other_mass_kg";
 
 /// The cases of one group.
 ///
@@ -82,23 +82,43 @@ pub enum DatasetError {
         hint: &'static str,
     },
     #[error("cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group")]
-    Mixed { first: String, second: String, what: &'static str },
+    Mixed {
+        first: String,
+        second: String,
+        what: &'static str,
+    },
     #[error(
         "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group"
     )]
-    NoParameter { parameter: String, with: String, without: String },
+    NoParameter {
+        parameter: String,
+        with: String,
+        without: String,
+    },
     #[error(
         "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
     )]
-    MixedParameter { parameter: String, number: String, category: String },
+    MixedParameter {
+        parameter: String,
+        number: String,
+        category: String,
+    },
     #[error("case \"{name}\": {source}")]
-    Envelope { name: String, source: EnvelopeError },
+    Envelope {
+        name: String,
+        source: EnvelopeError,
+    },
     #[error(
         "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval"
     )]
-    NoMotion { name: String },
+    NoMotion {
+        name: String,
+    },
     #[error("the model needs {parameter}{among}: give it with the query")]
-    Asked { parameter: String, among: String },
+    Asked {
+        parameter: String,
+        among: String,
+    },
 }
 
 impl Feature {
@@ -125,7 +145,7 @@ impl Feature {
 ///
 /// # Errors
 /// [`DatasetError::Asked`] names what is missing, or the categories there are.
-pub fn feature_values(
+pub(crate) fn feature_values(
     features: &[Feature],
     parameters: &BTreeMap<String, Parameter>,
 ) -> Result<Vec<f64>, DatasetError> {
@@ -223,19 +243,19 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
 pub enum TableKind {
     /// The states at the common interval (reference method).
     Samples,
-    /// An even deflection grid from the solver's rate, no coarser than [`GRID_M`].
+    /// An even deflection grid from the solver's rate, no coarser than 2 mm.
     Grid,
 }
 
 /// Coarsest deflection grid for training: at 20 m/s one state each 0.75 ms is 15 mm, a
 /// third of the way to the first peak.
-pub const GRID_M: f64 = 2e-3;
+pub(crate) const GRID_M: f64 = 2e-3;
 
 /// Speeds within this share of each other count as one.
 const SAME_SPEED: f64 = 1e-3;
 
 /// Whether two speeds count as one.
-pub fn is_same_speed(a: f64, b: f64) -> bool {
+pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
@@ -244,13 +264,13 @@ const MOST_STEPS: f64 = 20_000.0;
 
 /// Even deflections from 0 to `end_m`, at least `fewest` steps and no coarser than [`GRID_M`]
 /// up to 40 m.
-pub fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
+pub(crate) fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
     let steps = ((end_m / GRID_M).ceil().clamp(1.0, MOST_STEPS) as usize).max(fewest);
     (0..=steps).map(|i| end_m * i as f64 / steps as f64).collect()
 }
 
 /// Index of the speed nearest to `v`; of two equally near ones the first.
-pub fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
+pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
     let closer = |best: (usize, f64), (i, s): (usize, f64)| {
         let distance = (s - v).abs();
         if distance < best.1 { (i, distance) } else { best }
@@ -324,7 +344,7 @@ impl TrainingSet {
     }
 
     /// Hash over the fingerprints of the cases.
-    pub fn hash(&self) -> String {
+    pub(crate) fn hash(&self) -> String {
         let mut hash = blake3::Hasher::new();
         for case in &self.cases {
             hash.update(case.fingerprint.as_bytes());
@@ -332,13 +352,8 @@ impl TrainingSet {
         hash.finalize().to_hex().to_string()
     }
 
-    pub fn speeds_m_per_s(&self) -> Vec<f64> {
+    pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
         self.cases.iter().map(|c| c.speed_m_per_s).collect()
-    }
-
-    /// Largest deflection of any case, in m.
-    pub fn max_deflection_m(&self) -> f64 {
-        self.cases.iter().map(|c| c.envelope.end_m()).fold(0.0, f64::max)
     }
 
     /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
@@ -348,7 +363,11 @@ impl TrainingSet {
     }
 
     /// The same table of the declared force or of the body's.
-    pub fn table_of(&self, kind: TableKind, force: ForceKind) -> Dataset<f64, f64, ndarray::Ix1> {
+    pub(crate) fn table_of(
+        &self,
+        kind: TableKind,
+        force: ForceKind,
+    ) -> Dataset<f64, f64, ndarray::Ix1> {
         let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();

@@ -26,7 +26,7 @@ pub enum ManifestError {
 ///
 /// # Errors
 /// [`ManifestError`] with the place of an unknown key, a missing key or a bad value.
-pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
+pub(crate) fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
     parse(path, &read_text(path)?)
 }
 
@@ -34,13 +34,13 @@ pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
 ///
 /// # Errors
 /// [`ManifestError::Io`] for what is no file, not UTF-8 or too large.
-pub fn read_text(path: &Path) -> Result<String, ManifestError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, ManifestError> {
     file::read_text(path, MAX_BYTES)
         .map_err(|source| ManifestError::Io { path: path.into(), source })
 }
 
 /// Parses TOML text; `path` is for messages.
-pub fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
+pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
     toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', "; ");
         match error.span() {

@@ -22,7 +22,7 @@ const TIE: f64 = 0.10;
 /// force and in velocity error, those within 10 % of the smallest force error tie, and the
 /// simplest of them is taken. If none keeps to all baselines, the one whose worst ratio to
 /// them is smallest.
-pub fn choose(means: &[Means]) -> Option<(String, String)> {
+pub(crate) fn choose(means: &[Means]) -> Option<(String, String)> {
     let entry = |m: &Means| MODELS.iter().find(|entry| entry.name == m.model);
     let baselines = || means.iter().filter(|m| entry(m).is_some_and(|e| e.baseline));
     let least = |of: fn(&Means) -> f64| baselines().map(of).fold(f64::INFINITY, f64::min);

@@ -61,13 +61,23 @@ pub enum NotLeftOut {
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     #[error("group \"{group}\" has no case at {asked}: it has {known}")]
-    NoCase { group: String, asked: String, known: String },
+    NoCase {
+        group: String,
+        asked: String,
+        known: String,
+    },
     #[error("leaving out one of {cases} cases leaves too few: a comparison needs at least 3")]
-    TooFew { cases: usize },
+    TooFew {
+        cases: usize,
+    },
     #[error("case \"{case}\" ended while loading: it is no reference; compare at another speed")]
-    Truncated { case: String },
+    Truncated {
+        case: String,
+    },
     #[error("the fixed curve is that of {asked}, the speed that is left out: choose another one")]
-    FixedIsLeftOut { asked: String },
+    FixedIsLeftOut {
+        asked: String,
+    },
     #[error(transparent)]
     Validate(#[from] ValidateError),
     #[error(transparent)]
@@ -110,27 +120,52 @@ pub enum TrainError {
     #[error(
         "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\""
     )]
-    NotACase { curve: String },
+    NotACase {
+        curve: String,
+    },
     #[error("the scenario has no vehicle \"{name}\": its vehicles are {known}")]
-    NoVehicle { name: String, known: String },
+    NoVehicle {
+        name: String,
+        known: String,
+    },
     #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
-    TooShort { states: usize, until_s: f64 },
+    TooShort {
+        states: usize,
+        until_s: f64,
+    },
     #[error(
         "{path}: the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
     )]
-    RunTooShort { path: PathBuf, duration_s: f64, until_s: f64 },
+    RunTooShort {
+        path: PathBuf,
+        duration_s: f64,
+        until_s: f64,
+    },
     #[error("{path}: [reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
-    NoNodes { path: PathBuf },
+    NoNodes {
+        path: PathBuf,
+    },
     #[error(
         "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
     )]
-    OtherSpeed { path: PathBuf, vehicle: String, fe_m_per_s: f64, m_per_s: f64 },
+    OtherSpeed {
+        path: PathBuf,
+        vehicle: String,
+        fe_m_per_s: f64,
+        m_per_s: f64,
+    },
     #[error("{path}: the scenario has no [reference]: add one that names FE's run of the train")]
-    NoReference { path: PathBuf },
+    NoReference {
+        path: PathBuf,
+    },
     #[error(
         "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
     )]
-    NoHistory { path: PathBuf, node: i64, component: String },
+    NoHistory {
+        path: PathBuf,
+        node: i64,
+        component: String,
+    },
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error(transparent)]

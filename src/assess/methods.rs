@@ -95,7 +95,7 @@ pub(super) struct FittedNsdm {
 
 impl FittedNsdm {
     /// The fit with the least objective, as one who knows nothing of the new speed would choose.
-    pub fn best(&self) -> &nsdm::Fit {
+    pub(crate) fn best(&self) -> &nsdm::Fit {
         let fits = self.fits.iter().map(|(fit, _)| fit);
         fits.min_by(|a, b| a.objective.total_cmp(&b.objective)).expect("at least one seed")
     }

@@ -70,7 +70,7 @@ struct Motion<'a> {
 
 impl RowBuilder<'_> {
     /// The row of a method with a curve.
-    pub fn row(&self, method: Method) -> Result<Row, CompareError> {
+    pub(crate) fn row(&self, method: Method) -> Result<Row, CompareError> {
         let Method { name, made_from, curve, forces: (truth, ours), times } = method;
         let start = Instant::now();
         let run = self.reference.run(&curve)?;
@@ -89,7 +89,7 @@ impl RowBuilder<'_> {
     }
 
     /// The row of a spring and damper.
-    pub fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
+    pub(crate) fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
         let reference = self.reference;
         let start = Instant::now();
         let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());

@@ -28,7 +28,7 @@ use crate::solver::{self, Selection, WantedId};
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FeTrain {
+pub(crate) struct FeTrain {
     pub time_s: Vec<f64>,
     /// Vehicle, as the scenario names it, and its speed in m/s at each time.
     pub velocities: Vec<(String, Vec<f64>)>,
@@ -41,7 +41,7 @@ impl FeTrain {
     ///
     /// # Errors
     /// [`TrainError`] names the file, node or component.
-    pub fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
+    pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(&reference.file);
         let selection = Selection {

@@ -2,11 +2,11 @@
 //!
 //! Deflection is positive in compression, force pushes the bodies apart; SI throughout.
 
-pub mod body;
-pub mod contact;
-pub mod driving;
+pub(crate) mod body;
+pub(crate) mod contact;
+pub(crate) mod driving;
 pub mod energy;
-pub mod envelope;
+pub(crate) mod envelope;
 pub mod extract;
 pub mod loading;
 pub mod recipe;
@@ -17,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
+pub use body::BodyMotion;
 pub use driving::{CurveUnloading, DrivingCurve};
 pub use envelope::{Envelope, EnvelopeError};
 
@@ -34,13 +35,27 @@ pub struct Curve {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
     #[error("a curve needs at least 2 states, found {states}")]
-    TooShort { states: usize },
+    TooShort {
+        states: usize,
+    },
     #[error("columns differ in length: {time} times, {deflection} deflections, {force} forces")]
-    Lengths { time: usize, deflection: usize, force: usize },
+    Lengths {
+        time: usize,
+        deflection: usize,
+        force: usize,
+    },
     #[error("the {column} of state {state} is {value}: expected a finite number")]
-    NotFinite { column: &'static str, state: usize, value: f64 },
+    NotFinite {
+        column: &'static str,
+        state: usize,
+        value: f64,
+    },
     #[error("time does not increase at state {state}: {time_s} s follows {before_s} s")]
-    TimeOrder { state: usize, time_s: f64, before_s: f64 },
+    TimeOrder {
+        state: usize,
+        time_s: f64,
+        before_s: f64,
+    },
 }
 
 impl Curve {
@@ -105,7 +120,7 @@ impl ForceKind {
     }
 
     /// The kind of that name.
-    pub fn parse(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Contact, Self::Body].into_iter().find(|kind| kind.name() == name)
     }
 
@@ -139,7 +154,7 @@ impl Masses {
     }
 
     /// Kinetic energy that a stop at a common velocity takes up, in J.
-    pub fn kinetic_energy_j(&self, speed: Speed) -> f64 {
+    pub(crate) fn kinetic_energy_j(&self, speed: Speed) -> f64 {
         0.5 * self.effective_kg() * speed.m_per_s * speed.m_per_s
     }
 }
@@ -178,7 +193,7 @@ pub struct EnergyAudit {
 
 impl EnergyAudit {
     /// Imbalance over which a warning is due.
-    pub const TOLERANCE: f64 = 0.05;
+    pub(crate) const TOLERANCE: f64 = 0.05;
 
     /// `W/E`; 1 where the curve takes up exactly the impact's energy.
     pub fn ratio(&self) -> f64 {
@@ -235,7 +250,7 @@ impl Case {
 
     /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
     /// versions.
-    pub fn units(&self) -> Option<UnitSystem> {
+    pub(crate) fn units(&self) -> Option<UnitSystem> {
         let recipe: serde_json::Value = serde_json::from_str(&self.recipe).ok()?;
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }

@@ -54,7 +54,7 @@ pub enum DisplacementComponent {
 }
 
 impl DisplacementComponent {
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::XDisplacement => "x_displacement",
             Self::YDisplacement => "y_displacement",
@@ -63,7 +63,7 @@ impl DisplacementComponent {
     }
 
     /// The component that holds its rate.
-    pub fn velocity(self) -> &'static str {
+    pub(crate) fn velocity(self) -> &'static str {
         match self {
             Self::XDisplacement => "x_velocity",
             Self::YDisplacement => "y_velocity",
@@ -78,9 +78,19 @@ impl DisplacementComponent {
 #[schemars(with = "ForceTable")]
 pub enum ForceSource {
     /// A contact force: rigid wall, side of an interface.
-    Contact { file: String, id: i64, side: Option<Side>, component: String },
+    Contact {
+        file: String,
+        id: i64,
+        side: Option<Side>,
+        component: String,
+    },
     /// Mass of the body times the acceleration of its node.
-    Body { file: String, node: i64, motion: BodyMotion, component: String },
+    Body {
+        file: String,
+        node: i64,
+        motion: BodyMotion,
+        component: String,
+    },
 }
 
 /// What the acceleration of a body is made from.

@@ -7,7 +7,7 @@ use super::tree::Tree;
 
 /// What the model says of itself.
 #[derive(Clone, Copy, Debug)]
-pub struct OnnxDescription<'a> {
+pub(crate) struct OnnxDescription<'a> {
     /// Name of the graph.
     pub name: &'a str,
     /// For a reader of the model.
@@ -41,7 +41,7 @@ impl RegressionForest<f64> {
     ///
     /// # Errors
     /// [`OnnxError`] if the names do not fit the features or the file would be too large.
-    pub fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, OnnxError> {
+    pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, OnnxError> {
         let features = self.features();
         if description.features.len() != features {
             let named = description.features.len();

@@ -111,7 +111,7 @@ pub struct ForestValidParams<F> {
 
 impl<F> ForestValidParams<F> {
     /// How thresholds are chosen.
-    pub fn thresholds(&self) -> Thresholds {
+    pub(crate) fn thresholds(&self) -> Thresholds {
         self.thresholds
     }
 }

@@ -5,7 +5,7 @@ use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
 
 /// Marks a leaf in [`Tree::feature`].
-pub const LEAF: i32 = -1;
+pub(crate) const LEAF: i32 = -1;
 
 /// A regression tree as flat arrays over its nodes; node 0 is the root.
 ///
@@ -102,7 +102,7 @@ impl<F: Float> Tree<F> {
     ///
     /// # Errors
     /// [`TreeError`] names the first node that breaks it.
-    pub fn check(&self, features: usize) -> Result<(), TreeError> {
+    pub(crate) fn check(&self, features: usize) -> Result<(), TreeError> {
         let nodes = self.nodes();
         let lengths = [self.feature.len(), self.threshold.len(), self.left.len(), self.right.len()];
         if nodes == 0 || lengths.iter().any(|&l| l != nodes) {

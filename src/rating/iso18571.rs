@@ -20,10 +20,10 @@ const WINDOW: usize = 10;
 const SMOOTHED: usize = 9;
 
 /// Fewest samples: what a shift leaves must hold a mean of nine.
-pub const LEAST_SAMPLES: usize = 12;
+pub(crate) const LEAST_SAMPLES: usize = 12;
 /// Most samples: the warping takes a fifth of their square in bytes, here 80 MB, and the
 /// search for the shift as many steps.
-pub const MOST_SAMPLES: usize = 20_000;
+pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -59,7 +59,7 @@ pub enum Grade {
 
 impl Grade {
     /// Grade of a rating R.
-    pub fn of(rating: f64) -> Self {
+    pub(crate) fn of(rating: f64) -> Self {
         match rating {
             r if r > 0.94 => Self::Excellent,
             r if r > 0.80 => Self::Good,
@@ -86,7 +86,7 @@ impl Grade {
 /// A relative error over zeros counts as none if the prediction is zero there as well, else as
 /// the worst. Correlations that differ by less than 1e-12 count as equal, and the smaller shift
 /// is taken, as the standard has it for equal ones.
-pub fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
+pub(crate) fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
     let n = reference.len();
     if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n) || prediction.len() != n {
         return None;

@@ -12,28 +12,31 @@
 //! within 1e-12 are equal here. Of a reference of zeros it gives NaN. No public program computes CORA (pyisomme 1.1 has ISO/TS
 //! 18571 only, through the same package); the tests compute it a second way.
 
-pub mod cora;
-pub mod corridor;
+pub(crate) mod cora;
+pub(crate) mod corridor;
 pub mod deceleration;
-pub mod differences;
+pub(crate) mod differences;
 pub mod iso18571;
 pub mod magnitude_phase;
-pub mod shift;
+pub(crate) mod shift;
 mod signal;
 pub mod table;
-pub mod warping;
+pub(crate) mod warping;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-use cora::{Cora, cora};
+pub use cora::Cora;
+use cora::cora;
 use deceleration::Deceleration;
-use differences::{MaxAbs, Pointwise, integral_error, max_abs, peak_norm, pointwise, rms_ratio};
+pub use differences::{MaxAbs, Pointwise};
+use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
 use iso18571::{Iso18571, iso18571};
 use magnitude_phase::{MagnitudePhase, russell, sprague_geers};
-pub use signal::{INTERVAL_S, Pair, Signal, SignalError};
+pub(crate) use signal::{INTERVAL_S, Pair};
+pub use signal::{Signal, SignalError};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -145,9 +148,9 @@ pub struct Decelerations {
 
 /// Rates `prediction` against `reference`.
 ///
-/// Signals of other lengths and times are brought to common times, [`INTERVAL_S`] apart as
+/// Signals of other lengths and times are brought to common times, 0.1 ms apart as
 /// ISO/TS 18571 wants it, by linear interpolation where both have values; a filter comes before
-/// that. Over more than [`iso18571::MOST_SAMPLES`] samples ISO/TS 18571 and CORA are left out,
+/// that. Over more than 20 000 samples ISO/TS 18571 and CORA are left out,
 /// with a warning, as their time and memory grow with the square.
 ///
 /// # Errors

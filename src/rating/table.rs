@@ -23,27 +23,55 @@ pub enum TableError {
     #[error(
         "line {line}: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"
     )]
-    NoHeader { line: u64 },
+    NoHeader {
+        line: u64,
+    },
     #[error(
         "line {line}: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"{found}\""
     )]
-    OneColumn { line: u64, found: String },
+    OneColumn {
+        line: u64,
+        found: String,
+    },
     #[error("there is no column \"{wanted}\": name one of {known}")]
-    NoColumn { wanted: String, known: String },
+    NoColumn {
+        wanted: String,
+        known: String,
+    },
     #[error("{count} columns are called \"{name}\": rename all but one")]
-    SameNames { name: String, count: usize },
+    SameNames {
+        name: String,
+        count: usize,
+    },
     #[error("there are several columns: name one of {known}")]
-    SeveralColumns { known: String },
+    SeveralColumns {
+        known: String,
+    },
     #[error("line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"")]
-    NotANumber { line: u64, column: usize, name: String, found: String },
+    NotANumber {
+        line: u64,
+        column: usize,
+        name: String,
+        found: String,
+    },
     #[error(
         "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"
     )]
-    NotFinite { line: u64, column: usize, name: String, found: String },
+    NotFinite {
+        line: u64,
+        column: usize,
+        name: String,
+        found: String,
+    },
     #[error(
         "line {line}, column 1 (\"{name}\"): time {found} does not come after {before}: times must rise strictly, so cut or sort the file first"
     )]
-    TimeGoesBack { line: u64, name: String, found: f64, before: f64 },
+    TimeGoesBack {
+        line: u64,
+        name: String,
+        found: f64,
+        before: f64,
+    },
 }
 
 /// Reads the first column and the one called `wanted`; without a name, the only other one.

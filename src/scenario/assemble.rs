@@ -138,7 +138,7 @@ fn limited(scenario: &CheckedScenario<'_>, order: &[usize], limits: &LimitsTable
 ///
 /// # Errors
 /// [`ScenarioError`] as of [`assemble`](super::assemble); the chain is then not to be run.
-pub fn adjust(
+pub(crate) fn adjust(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     prepared: &mut Prepared,

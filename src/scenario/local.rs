@@ -36,7 +36,7 @@ const SLOWEST_M_PER_S: f64 = 0.1;
 ///
 /// # Errors
 /// [`ScenarioError`] names the curve.
-pub fn assemble(
+pub(crate) fn assemble(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     sources: &Sources,

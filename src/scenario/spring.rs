@@ -152,7 +152,7 @@ fn which_force(
 
 impl Spring {
     /// The force law that the curve's table asks for, with what must be said of it.
-    pub fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), String> {
+    pub(crate) fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), String> {
         let end = match table.end {
             EndName::Hold => EnvelopeEnd::Hold,
             EndName::Slope => EnvelopeEnd::Slope,

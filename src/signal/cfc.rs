@@ -27,7 +27,7 @@ const MAX_SPREAD: f64 = 0.6;
 
 /// A filtered history.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filtered {
+pub(crate) struct Filtered {
     /// In the unit of the input, one per time.
     pub values: Vec<f64>,
     /// Whether the intervals differed so much that it was filtered at their mean.
@@ -42,7 +42,7 @@ const PAD_SAMPLES: usize = 100;
 
 /// Coefficients of one pass: a two-pole Butterworth low-pass.
 #[derive(Debug, Clone, Copy)]
-pub struct Coefficients {
+pub(crate) struct Coefficients {
     /// Factor of the input.
     pub a0: f64,
     /// Factor of the input one step before.
@@ -58,7 +58,7 @@ pub struct Coefficients {
 impl Coefficients {
     /// `class`: CFC in Hz (60, 180, 600, 1000); `interval_s`: sampling interval.
     /// Formulas of SAE J211-1, appendix C.
-    pub fn new(class: u32, interval_s: f64) -> Self {
+    pub(crate) fn new(class: u32, interval_s: f64) -> Self {
         let w_d = 2.0 * PI * f64::from(class) * 2.0775;
         let w_a = (w_d * interval_s / 2.0).tan();
         let denominator = 1.0 + SQRT_2 * w_a + w_a * w_a;
@@ -92,7 +92,7 @@ impl Coefficients {
 ///
 /// # Errors
 /// [`CfcError`] if the interval is over `1/(10 CFC)` or the intervals differ.
-pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
+pub(crate) fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
     let n = values.len();
     if n < 2 {
         return Ok(Filtered { values: values.to_vec(), resampled: false, spread: 0.0 });

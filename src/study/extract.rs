@@ -15,7 +15,7 @@ impl LocatedRun<'_> {
     ///
     /// # Errors
     /// [`RunError`] names the file and what to change.
-    pub fn extract(&self) -> Result<Case, RunError> {
+    pub(crate) fn extract(&self) -> Result<Case, RunError> {
         let mut remarks = Remarks { notes: self.deck_notes.clone(), ..Remarks::default() };
         let units = remarks.take(self.units()?);
         let files = RunFiles::read(self, &self.study.manifest.recipe)?;

@@ -110,7 +110,7 @@ pub(super) struct Kink {
 }
 
 impl Curves {
-    pub fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
+    pub(crate) fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
         let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
             cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
         };

@@ -47,7 +47,7 @@ impl ForestSurrogate {
     ///
     /// # Errors
     /// [`ForestError`] for options that make no forest.
-    pub fn fit(
+    pub(crate) fn fit(
         set: &TrainingSet,
         force: ForceKind,
         options: &ForestOptions,
@@ -65,7 +65,7 @@ impl ForestSurrogate {
 
     /// Lowest and highest force in N at each deflection between which the leaves' members lie
     /// with a weight of `level`; `None` if the leaves kept none.
-    pub fn quantiles(
+    pub(crate) fn quantiles(
         &self,
         at: &At<'_>,
         deflection_m: &[f64],

@@ -57,7 +57,7 @@ impl ForestOptions {
     ///
     /// # Errors
     /// [`ForestError`] names the option that is out of its range.
-    pub fn check(&self) -> Result<(), ForestError> {
+    pub(crate) fn check(&self) -> Result<(), ForestError> {
         self.params().check_ref().map(|_| ())
     }
 

@@ -22,7 +22,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 
 /// Interpolates over the cases that reach a deflection; holds the outermost beyond them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linear;
+pub(crate) struct Linear;
 
 impl Surrogate for Linear {
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {

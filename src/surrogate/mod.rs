@@ -7,7 +7,7 @@
 pub mod band;
 mod cached;
 mod cases;
-pub mod curves;
+pub(crate) mod curves;
 mod entry;
 mod extra;
 pub mod forest;
@@ -18,27 +18,28 @@ mod linear;
 pub mod max_crush;
 mod model;
 mod model_file;
-pub mod models;
+pub(crate) mod models;
 mod nearest;
 pub mod predict;
 mod predict_error;
-pub mod predicted;
+pub(crate) mod predicted;
 mod query;
 mod rate;
 mod registered;
 mod spikes;
-pub mod warning;
+pub(crate) mod warning;
 
 use std::fmt::Debug;
 
 use serde_json::value::RawValue;
 
 pub use cases::ModelCase;
-pub use curves::CaseCurve;
+pub(crate) use curves::CaseCurve;
 pub use model::{Model, ModelError};
 pub use models::{MODELS, ModelKind};
 pub use predict::{PredictedCurve, Query, predict};
-pub use warning::Warning;
+pub use warning::{Warning, WarningCode};
+pub use entry::ModelEntry;
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +57,7 @@ pub struct At<'a> {
 
 /// A model of the force at an interface over impact speed, deflection and whatever else
 /// distinguishes the cases it was fitted to.
-pub trait Surrogate: Debug + Send + Sync {
+pub(crate) trait Surrogate: Debug + Send + Sync {
     /// Forces in N at increasing deflections (m), one per deflection. `cases` are the
     /// curves it was fitted to, in order of speed.
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64>;

@@ -71,23 +71,45 @@ pub enum ModelError {
     #[error(
         "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
     )]
-    TooFewCurves { model: &'static str, least: usize, found: usize },
+    TooFewCurves {
+        model: &'static str,
+        least: usize,
+        found: usize,
+    },
     #[error(
         "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone"
     )]
-    OneParameter { model: &'static str, features: String, others: String },
+    OneParameter {
+        model: &'static str,
+        features: String,
+        others: String,
+    },
     #[error("{0}")]
     Curve(#[from] EnvelopeError),
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error(
         "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train"
     )]
-    NotAModel { path: PathBuf, line: usize, column: usize, detail: String },
+    NotAModel {
+        path: PathBuf,
+        line: usize,
+        column: usize,
+        detail: String,
+    },
     #[error("{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train", known = VERSION)]
-    Version { path: PathBuf, found: u32 },
+    Version {
+        path: PathBuf,
+        found: u32,
+    },
     #[error("{path}: the model is damaged: {detail}")]
-    Damaged { path: PathBuf, detail: String },
+    Damaged {
+        path: PathBuf,
+        detail: String,
+    },
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -144,7 +166,7 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError::TooFewCurves`] or [`ModelError::OneParameter`].
-    pub fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
+    pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
         let (model, entry) = (kind.name(), kind.entry());
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
@@ -171,7 +193,7 @@ impl Model {
     }
 
     /// Masses of the training runs.
-    pub fn masses(&self) -> Masses {
+    pub(crate) fn masses(&self) -> Masses {
         Masses { body_kg: self.mass_kg, other_kg: self.other_mass_kg }
     }
 
@@ -242,7 +264,7 @@ impl Model {
     }
 
     /// The training curves: of the declared force, and of the body's where it is another.
-    pub fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
+    pub(crate) fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
         (&self.curves.declared, &self.curves.body)
     }
 
@@ -264,7 +286,7 @@ impl Model {
     }
 
     /// What a query here must say, for any mass and rule.
-    pub fn warnings(&self, at: &At<'_>) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, at: &At<'_>) -> Vec<Warning> {
         let v = at.speed_m_per_s;
         let (low, high) = self.range_m_per_s();
         let mut warnings = Vec::new();

@@ -21,7 +21,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 
 /// The measured curve that lies nearest answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest;
+pub(crate) struct Nearest;
 
 impl Surrogate for Nearest {
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {

@@ -138,7 +138,7 @@ impl<'a> Motion<'a> {
 
 /// What a prediction is before a rule for the maximal crush is chosen: the forces beyond any
 /// crush, and the crush by every rule. One such serves all rules.
-pub struct Prediction<'a> {
+pub(crate) struct Prediction<'a> {
     motion: Motion<'a>,
     /// Declared force over the same even deflections as the body's.
     declared: Envelope,
@@ -157,7 +157,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// As [`predict`].
-    pub fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
         Self::of(Motion::new(model, query)?)
     }
 
@@ -169,7 +169,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// The rule that the query asks for, or the model's own.
-    pub fn rule(&self) -> MaxCrushRule {
+    pub(crate) fn rule(&self) -> MaxCrushRule {
         self.motion.rule()
     }
 
@@ -177,7 +177,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// [`PredictError`] if the rule gives no crush, or the energy correction is out of bounds.
-    pub fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
+    pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
         let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;

@@ -126,7 +126,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// [`PredictError`] if the curve was read from a file and breaks its promises.
-    pub fn envelope(&self) -> Result<Envelope, PredictError> {
+    pub(crate) fn envelope(&self) -> Result<Envelope, PredictError> {
         let stiffness = self.unloading_stiffness_n_per_m;
         if !(stiffness > 0.0 && stiffness.is_finite()) {
             return Err(PredictError::Damaged(format!(
@@ -162,7 +162,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
-    /// force, else as [`envelope`](Self::envelope).
+    /// force, else the error that its points are no envelope.
     pub fn of_force(&self, kind: ForceKind) -> Result<Self, PredictError> {
         match (kind, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => Err(PredictError::NoContactForce),
@@ -213,7 +213,7 @@ impl PredictedCurve {
 
     /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
     /// energy of the rebound is the same whichever force it comes from.
-    pub fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
+    pub(crate) fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
         let end = self.max_deflection_m;
         let driving = self.body_force_n.as_ref().unwrap_or(&self.force_n).last();
         let share = driving.map_or(1.0, |driving| envelope.force_at(end) / driving);
@@ -226,7 +226,7 @@ impl PredictedCurve {
     /// The curve of one force that drives an interface.
     ///
     /// # Errors
-    /// As [`driving_member`](Self::driving_member).
+    /// [`PredictError`] if the curve does not have that force, or its points are no envelope.
     pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, PredictError> {
         self.driving_member(force, None)
     }
@@ -237,7 +237,7 @@ impl PredictedCurve {
     /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] or
     /// [`PredictError::NoContactForce`] if it does not have that force; [`PredictError::Damaged`]
     /// for a member outside these bounds or a curve without a band.
-    pub fn driving_member(
+    pub(crate) fn driving_member(
         &self,
         force: ForceKind,
         member: Option<f64>,
@@ -283,7 +283,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] for a contact force alone.
-    pub fn driving_envelope(&self) -> Result<Envelope, PredictError> {
+    pub(crate) fn driving_envelope(&self) -> Result<Envelope, PredictError> {
         let declared = self.envelope()?;
         match &self.body_force_n {
             Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),

@@ -47,7 +47,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// Beyond the end of a slower neighbour, its Q is that of the next faster curve times a ratio that
 /// begins at their ratio there and decays to 1, so that the blend has no step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rate {
+pub(crate) struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
@@ -82,7 +82,7 @@ impl Rate {
     /// also differ in how they fold, and by what is stopped at the nose at impact speed,
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
     /// curves cannot tell the two causes apart.
-    pub fn fit(cases: &[CaseCurve]) -> Self {
+    pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
         let trial = |k: usize| MOST * k as f64 / STEPS as f64;
         let best = (0..=STEPS)
             .map(|k| (k, disagreement(cases, trial(k))))

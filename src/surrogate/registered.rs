@@ -26,7 +26,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// landmark, each case contributes the force of its own landmark. Only inside the training
 /// speeds; outside, the outermost curve as `linear` holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Registered;
+pub(crate) struct Registered;
 
 impl Surrogate for Registered {
     fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {

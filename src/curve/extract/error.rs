@@ -53,7 +53,7 @@ pub enum ExtractError {
 
 impl ExtractError {
     /// Whether it speaks of the force's file rather than of the motion's.
-    pub fn is_of_force(&self) -> bool {
+    pub(crate) fn is_of_force(&self) -> bool {
         match self {
             Self::TooShort { origin, .. } | Self::NotFinite { origin, .. } => {
                 *origin == Origin::Force

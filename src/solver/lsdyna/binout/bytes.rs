@@ -23,7 +23,7 @@ pub(super) struct Bytes<'a> {
 pub(super) type Scratch = Vec<u8>;
 
 impl<'a> Bytes<'a> {
-    pub fn new(parts: &'a [Box<dyn Source>], headers: &'a [Option<Header>]) -> Self {
+    pub(crate) fn new(parts: &'a [Box<dyn Source>], headers: &'a [Option<Header>]) -> Self {
         Self { parts, headers }
     }
 
@@ -38,11 +38,11 @@ impl<'a> Bytes<'a> {
     }
 
     /// The bytes of a text.
-    pub fn text(&self, place: Place) -> io::Result<Vec<u8>> {
+    pub(crate) fn text(&self, place: Place) -> io::Result<Vec<u8>> {
         self.whole(place).map(|(_, _, bytes)| bytes)
     }
 
-    pub fn integers(&self, mut place: Place) -> io::Result<Vec<i64>> {
+    pub(crate) fn integers(&self, mut place: Place) -> io::Result<Vec<i64>> {
         let size = place.payload.kind.size().unwrap_or(1) as u64;
         place.payload.bytes = place.payload.bytes.min(MAX_IDS * size);
         let (kind, header, bytes) = self.whole(place)?;
@@ -50,7 +50,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// The first value of a record.
-    pub fn first_real(&self, place: Place) -> io::Result<Option<f64>> {
+    pub(crate) fn first_real(&self, place: Place) -> io::Result<Option<f64>> {
         let (kind, header, bytes) = self.whole(place)?;
         let mut values = Vec::new();
         kind.reals(header, &bytes, &mut values);
@@ -58,7 +58,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// Appends some values of a record to `out`.
-    pub fn reals(
+    pub(crate) fn reals(
         &self,
         place: Place,
         range: Range<usize>,

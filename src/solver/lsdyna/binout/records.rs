@@ -76,7 +76,7 @@ pub(super) struct Component {
 
 impl Tree {
     /// Notes all records of one container.
-    pub fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
+    pub(crate) fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
         let header = lsda::header(source)?;
         self.headers.push(header);
         let Some(header) = header else {
@@ -207,30 +207,30 @@ impl Section {
 
     /// Whether an id can only be one that was overwritten with zeros: LS-DYNA counts from 1,
     /// but prints a part 0 for lumped masses.
-    pub fn is_lost(&self, id: i64) -> bool {
+    pub(crate) fn is_lost(&self, id: i64) -> bool {
         id == 0 && self.name != "matsum"
     }
 
-    pub fn component(&self, name: &str) -> Option<&Component> {
+    pub(crate) fn component(&self, name: &str) -> Option<&Component> {
         self.component_index.get(name).map(|&index| &self.components[index])
     }
 }
 
 impl Place {
     /// Order of writing.
-    pub fn order(&self) -> (usize, u64) {
+    pub(crate) fn order(&self) -> (usize, u64) {
         (self.part, self.payload.at)
     }
 
     /// Number of values.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         let size = self.payload.kind.size().unwrap_or(1) as u64;
         usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)
     }
 }
 
 impl Component {
-    pub fn is_real(&self) -> bool {
+    pub(crate) fn is_real(&self) -> bool {
         self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
     }
 }

@@ -24,7 +24,7 @@ pub(super) type Ids = Arc<[i64]>;
 impl States {
     /// A state is whole if it has a time and no damage; the last one must also have what the
     /// one before has. Of states that a restart wrote again the last ones are kept.
-    pub fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
+    pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
         let mut problems = Problems::default();
         problems.extend(order_of(section));
         let (mut timed, left_out) = Timed::of(section, bytes)?;
@@ -47,7 +47,7 @@ impl States {
     }
 
     /// Entities that some states lack.
-    pub fn absent(&self, section: &Section) -> Option<Problem> {
+    pub(crate) fn absent(&self, section: &Section) -> Option<Problem> {
         let ids = self.ids.as_ref()?;
         let mut states_with: HashMap<i64, usize> = HashMap::new();
         for id in ids.iter().flat_map(|ids| ids.iter()) {

@@ -36,7 +36,7 @@ struct Lacks {
 
 impl Series<'_> {
     /// The histories of the selected entities; of all of them for an audit.
-    pub fn histories(
+    pub(crate) fn histories(
         &self,
         states: &States,
         selection: &Selection,

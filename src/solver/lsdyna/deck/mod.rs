@@ -19,10 +19,9 @@ mod velocity;
 
 use std::io::{self, BufRead};
 
-pub use contents::{
-    At, Deck, ImpactSpeed, Include, InitialVelocity, Interface, Named, Output, Scope, StatedUnits,
-};
-pub use keyword::signature;
+pub use contents::{At, ImpactSpeed, Include, InitialVelocity, Output, Scope, StatedUnits};
+pub use contents::{Deck, Interface, Named};
+pub(crate) use keyword::signature;
 pub use parameters::Value;
 
 /// Reads a deck.
