@@ -15,7 +15,9 @@ use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 /// One case as models see it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingCase {
+    /// Name of the case.
     pub name: String,
+    /// Speed before contact, in m/s, of the set's kind.
     pub speed_m_per_s: f64,
     /// Values of the set's [`features`](TrainingSet::features).
     pub features: Vec<f64>,
@@ -27,8 +29,11 @@ pub struct TrainingCase {
     pub sampled: Envelope,
     /// The body's motion, and the force that follows from it.
     pub motion: BodyMotion,
+    /// Whether the record ended while loading, so that the largest deflection is not known.
     pub truncated: bool,
+    /// Measured unloading stiffness, in N/m, if the record reaches so far.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Hash over the case's recipe, entry and sources.
     pub fingerprint: String,
 }
 
@@ -54,8 +59,11 @@ pub(crate) const OTHER_MASS: &str = "other_mass_kg";
 /// both; one kind of speed and force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingSet {
+    /// Name of the group.
     pub group: String,
+    /// What the speeds are measured against.
     pub speed_kind: SpeedKind,
+    /// Which force the curves hold.
     pub force_kind: ForceKind,
     /// Masses of the first case.
     pub masses: Masses,
@@ -63,60 +71,88 @@ pub struct TrainingSet {
     pub units: Option<UnitSystem>,
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
+    /// The cases, in order of speed, then features.
     pub cases: Vec<TrainingCase>,
 }
 
 /// Why cases are no training set.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DatasetError {
+    /// There is no case.
     #[error("the group is empty: build it first")]
     Empty,
+    /// Two cases cannot be told apart by speed and parameters.
     #[error(
         "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}: keep one of them{hint}"
     )]
     EqualSpeeds {
+        /// Name of the one case.
         first: String,
+        /// Name of the other case.
         second: String,
+        /// Their speed, as text with its unit.
         speed: String,
+        /// Words that add the parameters, if there are any.
         parameters: &'static str,
+        /// Words that add a remedy, if there is one.
         hint: &'static str,
     },
+    /// Two cases differ in what a group must share.
     #[error("cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group")]
     Mixed {
+        /// Name of the one case.
         first: String,
+        /// Name of the other case.
         second: String,
+        /// What they differ in, such as kinds of speed.
         what: &'static str,
     },
+    /// A case lacks a parameter that another has.
     #[error(
         "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group"
     )]
     NoParameter {
+        /// Name of the parameter.
         parameter: String,
+        /// Name of the case that has it.
         with: String,
+        /// Name of the case that lacks it.
         without: String,
     },
+    /// A parameter is a number in one case and a category in another.
     #[error(
         "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
     )]
     MixedParameter {
+        /// Name of the parameter.
         parameter: String,
+        /// Name of the case where it is a number.
         number: String,
+        /// Name of the case where it is a category.
         category: String,
     },
+    /// The loading branch of a case is no envelope.
     #[error("case \"{name}\": {source}")]
     Envelope {
+        /// Name of the case.
         name: String,
+        /// Why.
         source: EnvelopeError,
     },
+    /// Its states at the common interval are too few to load along.
     #[error(
         "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval"
     )]
     NoMotion {
+        /// Name of the case.
         name: String,
     },
+    /// The query does not give a parameter that the model has, or not so that it makes sense.
     #[error("the model needs {parameter}{among}: give it with the query")]
     Asked {
+        /// What must be given.
         parameter: String,
+        /// The categories there are, or that a number is expected, in words.
         among: String,
     },
 }

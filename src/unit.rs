@@ -39,7 +39,9 @@ impl SpeedKind {
 /// An impact speed in m/s together with what it is measured against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speed {
+    /// The speed, in m/s.
     pub m_per_s: f64,
+    /// What it is measured against.
     pub kind: SpeedKind,
 }
 
@@ -58,49 +60,73 @@ pub fn km_per_h(m_per_s: f64) -> String {
 /// Why a number with a unit was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
+    /// The text is a number by itself.
     #[error("{what} \"{text}\" has no unit: write for example {example}")]
     NoUnit {
+        /// What kind of quantity was expected, such as "speed".
         what: &'static str,
+        /// The text as given.
         text: String,
+        /// The same number with a unit.
         example: String,
     },
+    /// The unit is none of this kind of quantity.
     #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
     UnknownUnit {
+        /// What kind of quantity was expected.
         what: &'static str,
+        /// The text as given.
         text: String,
+        /// Its unit.
         unit: String,
+        /// The units that are known, as a list.
         known: String,
     },
+    /// The text does not begin with a number.
     #[error("{what} \"{text}\" is not a number with a unit: write for example {example}")]
     NotANumber {
+        /// What kind of quantity was expected.
         what: &'static str,
+        /// The text as given.
         text: String,
+        /// A text that would be right.
         example: &'static str,
     },
+    /// The number makes no sense for this quantity, such as a mass of 0.
     #[error("{what} \"{text}\" is out of range: it must be {range}")]
     OutOfRange {
+        /// What kind of quantity was expected.
         what: &'static str,
+        /// The text as given.
         text: String,
+        /// The range it must lie in.
         range: &'static str,
     },
+    /// The text names no unit system.
     #[error(
         "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\""
     )]
     UnknownSystem {
+        /// The text as given.
         text: String,
+        /// Units of length that are known, as a list.
         lengths: String,
+        /// Units of mass that are known, as a list.
         masses: String,
+        /// Units of time that are known, as a list.
         times: String,
     },
 }
 
 /// One kind of quantity: its name for messages, its units with their size in SI.
 pub struct Dimension {
+    /// Name for messages, such as "speed".
     pub what: &'static str,
     example_unit: &'static str,
     units: &'static [(&'static str, f64)],
 }
 
+/// Speeds, in m/s inside.
 pub const SPEED: Dimension = Dimension {
     what: "speed",
     example_unit: "km/h",
@@ -112,6 +138,7 @@ pub const SPEED: Dimension = Dimension {
         ("mph", 0.44704),
     ],
 };
+/// Masses, in kg inside.
 pub const MASS: Dimension =
     Dimension { what: "mass", example_unit: "t", units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)] };
 pub(crate) const LENGTH: Dimension = Dimension {
@@ -119,6 +146,7 @@ pub(crate) const LENGTH: Dimension = Dimension {
     example_unit: "mm",
     units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
 };
+/// Times, in s inside.
 pub const TIME: Dimension = Dimension {
     what: "time",
     example_unit: "ms",
@@ -254,8 +282,11 @@ fn continues_number(text: &str, i: usize, c: char) -> bool {
 /// The units in which a solver's files are written; factors turn a file's value into SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitSystem {
+    /// The files' unit of length, in m: 0.001 for mm.
     pub length_m: f64,
+    /// The files' unit of mass, in kg: 1000 for t.
     pub mass_kg: f64,
+    /// The files' unit of time, in s.
     pub time_s: f64,
 }
 

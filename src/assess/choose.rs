@@ -54,12 +54,14 @@ pub(crate) fn choose(means: &[Means]) -> Option<(String, String)> {
 /// The speed whose FE run would help most.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NextRun {
+    /// The speed to run, in m/s.
     pub speed_m_per_s: f64,
     /// Training speeds that it lies between.
     pub between_m_per_s: (f64, f64),
     /// Force error expected there now, from the errors at the speeds that were left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_force_l1: Option<f64>,
+    /// Why this one, in a sentence.
     pub reason: String,
 }
 

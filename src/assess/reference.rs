@@ -37,19 +37,27 @@ pub struct Reference {
 /// Why a motion cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
+    /// Too few states lie in the window of the comparison.
     #[error("case \"{case}\": only {states} states lie in the window: at least 3 are needed")]
     TooShort {
+        /// Name of the case.
         case: String,
+        /// How many do.
         states: usize,
     },
+    /// An error against FE is no finite number.
     #[error("its errors against FE are no finite numbers")]
     NotFinite,
+    /// The multi-body run ends within the window.
     #[error("case \"{case}\": the multi-body run is shorter than the window")]
     RunTooShort {
+        /// Name of the case.
         case: String,
     },
+    /// The one-mass model is no chain.
     #[error(transparent)]
     Chain(#[from] ChainError),
+    /// The run of the one-mass model failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
 }
@@ -58,6 +66,7 @@ pub enum MotionError {
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionErrors {
+    /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
     /// CFC 60 on both sides.
     pub acceleration_l1: f64,

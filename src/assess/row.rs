@@ -23,6 +23,7 @@ pub struct Row {
     pub driven_by: Option<ForceKind>,
     /// What its curve was made from.
     pub curve: String,
+    /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
     /// Accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
@@ -31,8 +32,10 @@ pub struct Row {
     /// Force of the method's curve along FE's crush, of the same kind of force; null for a
     /// spring and damper.
     pub force_l1: Option<f64>,
+    /// Largest force at the interface, in N; of a spring and damper mass times deceleration.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
+    /// Largest deflection of the run, in m.
     pub max_crush_m: f64,
     /// Time to fit, from the training cases on.
     pub fit_time_s: f64,

@@ -89,10 +89,13 @@ impl FeTrain {
 pub struct TrainComparison {
     /// Compared from 0 to here.
     pub until_s: f64,
+    /// Times of the comparison, in s.
     pub time_s: Vec<f64>,
     /// FE's speeds in m/s.
     pub fe: BTreeMap<String, Vec<f64>>,
+    /// Time by the clock that FE took for the train, in s, if the run's folder tells.
     pub fe_time_s: Option<f64>,
+    /// One row per method.
     pub rows: Vec<TrainRow>,
 }
 
@@ -107,13 +110,17 @@ pub struct TrainRow {
     pub driven_by: String,
     /// Means over the vehicles of the two below.
     pub mean_velocity_l1: f64,
+    /// Of the acceleration, filtered with CFC 60.
     pub mean_acceleration_l1: f64,
+    /// Errors of each vehicle.
     pub vehicles: Vec<VehicleErrors>,
     /// Speed each interface's curve is for, in m/s; null where no speed belongs to it.
     pub interface_speeds_m_per_s: BTreeMap<String, Option<f64>>,
+    /// Time to fit, in s.
     pub fit_time_s: f64,
     /// Curves and run.
     pub simulation_time_s: f64,
+    /// What a user should know about its curves.
     pub warnings: Vec<String>,
     /// Speeds in m/s at the times of the comparison.
     pub velocities: BTreeMap<String, Vec<f64>>,
@@ -122,7 +129,9 @@ pub struct TrainRow {
 /// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct VehicleErrors {
+    /// Name of the vehicle.
     pub vehicle: String,
+    /// Of the velocity.
     pub velocity_l1: f64,
     /// CFC 60 on both sides.
     pub acceleration_l1: f64,

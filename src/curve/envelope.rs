@@ -14,31 +14,46 @@ pub struct Envelope {
 /// Why two columns are no envelope.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EnvelopeError {
+    /// Fewer than two points.
     #[error("an envelope needs at least 2 points, found {points}")]
     TooShort {
+        /// Number of points.
         points: usize,
     },
+    /// The columns differ in length.
     #[error("{deflections} deflections but {forces} forces")]
     Lengths {
+        /// Number of deflections.
         deflections: usize,
+        /// Number of forces.
         forces: usize,
     },
+    /// A value is infinite or no number.
     #[error("point {point} is ({deflection_m} m, {force_n} N): expected finite numbers")]
     NotFinite {
+        /// The point, counted from 1.
         point: usize,
+        /// Its deflection, in m.
         deflection_m: f64,
+        /// Its force, in N.
         force_n: f64,
     },
+    /// The first deflection is not 0.
     #[error("the deflection must begin at 0, found {first_m} m")]
     NotFromZero {
+        /// The first deflection, in m.
         first_m: f64,
     },
+    /// A deflection is not larger than the one before it.
     #[error(
         "the deflection must increase, found {deflection_m} m after {before_m} m at point {point}"
     )]
     Order {
+        /// The later point, counted from 1.
         point: usize,
+        /// Its deflection, in m.
         deflection_m: f64,
+        /// The deflection before it, in m.
         before_m: f64,
     },
 }
@@ -97,10 +112,12 @@ impl Envelope {
         self
     }
 
+    /// Deflections in m, from 0, strictly increasing.
     pub fn deflection_m(&self) -> &[f64] {
         &self.deflection_m
     }
 
+    /// Forces in N, one per deflection.
     pub fn force_n(&self) -> &[f64] {
         &self.force_n
     }

@@ -9,6 +9,7 @@ const MIN_ADVANCE: f64 = 1e-6;
 /// The loading branch of a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loading {
+    /// Force over deflection, from (0, 0) to the largest deflection.
     pub envelope: Envelope,
     /// Samples left out because the deflection did not advance.
     pub dropped: usize,

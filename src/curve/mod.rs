@@ -34,26 +34,40 @@ pub struct Curve {
 /// Why three columns are no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
+    /// Fewer than two states.
     #[error("a curve needs at least 2 states, found {states}")]
     TooShort {
+        /// Number of states.
         states: usize,
     },
+    /// The columns differ in length.
     #[error("columns differ in length: {time} times, {deflection} deflections, {force} forces")]
     Lengths {
+        /// Number of times.
         time: usize,
+        /// Number of deflections.
         deflection: usize,
+        /// Number of forces.
         force: usize,
     },
+    /// A value is infinite or no number.
     #[error("the {column} of state {state} is {value}: expected a finite number")]
     NotFinite {
+        /// The column: time, deflection or force.
         column: &'static str,
+        /// Its state, counted from 1.
         state: usize,
+        /// The value.
         value: f64,
     },
+    /// A time is not later than the one before it.
     #[error("time does not increase at state {state}: {time_s} s follows {before_s} s")]
     TimeOrder {
+        /// State of the later row, counted from 1.
         state: usize,
+        /// Its time, in s.
         time_s: f64,
+        /// The time before it, in s.
         before_s: f64,
     },
 }
@@ -88,14 +102,17 @@ impl Curve {
         Ok(Self { time_s, deflection_m, force_n })
     }
 
+    /// Times in s, strictly increasing; 0 is the first contact.
     pub fn time_s(&self) -> &[f64] {
         &self.time_s
     }
 
+    /// Deflections in m, positive in compression, one per time.
     pub fn deflection_m(&self) -> &[f64] {
         &self.deflection_m
     }
 
+    /// Forces in N, positive in compression, one per time.
     pub fn force_n(&self) -> &[f64] {
         &self.force_n
     }
@@ -112,6 +129,7 @@ pub enum ForceKind {
 }
 
 impl ForceKind {
+    /// The name in files: `contact` or `body`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
@@ -138,6 +156,7 @@ impl ForceKind {
 /// Masses of a case: one body against a wall, or two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Masses {
+    /// Mass of the body, or of the first body of a pair, in kg.
     pub body_kg: f64,
     /// The other body of a pair; `None` against a rigid wall.
     pub other_kg: Option<f64>,
@@ -164,12 +183,19 @@ impl Masses {
 pub struct Source {
     /// As found from the manifest: `25kmh/nodout`.
     pub path: String,
+    /// Size in bytes when it was read.
     pub size_bytes: u64,
+    /// BLAKE3 hash of its bytes, in hexadecimal.
     pub blake3: String,
+    /// Name of the file's format, such as `nodout`.
     pub format: String,
+    /// Solver that wrote it, if the file tells.
     pub solver: Option<String>,
+    /// Version of that solver, if the file tells.
     pub version: Option<String>,
+    /// Title of the run, if the file has one.
     pub title: Option<String>,
+    /// How many damaged places the reader found.
     pub problems: usize,
 }
 
@@ -178,7 +204,9 @@ pub struct Source {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Parameter {
+    /// A number, in the unit that the parameter's name ends with.
     Number(f64),
+    /// One of some names.
     Category(String),
 }
 
@@ -204,13 +232,19 @@ impl EnergyAudit {
 /// One FE run as the database keeps it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
+    /// Name of the study that it comes from.
     pub study: String,
+    /// Group of cases that differ in speed and parameters alone.
     pub group: String,
+    /// Name of the case, unique in its group.
     pub name: String,
+    /// Speed before contact, and what it is measured against.
     pub speed: Speed,
+    /// The masses that meet.
     pub masses: Masses,
     /// What else distinguishes the case from others of its group, by name.
     pub parameters: BTreeMap<String, Parameter>,
+    /// Which force the curves hold.
     pub force_kind: ForceKind,
     /// At the common interval, from contact on.
     pub sampled: Curve,
@@ -225,11 +259,13 @@ pub struct Case {
     /// Secant of the unloading branch between 90 % and 10 % of its force, in N/m;
     /// `None` if the record ends before.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Work of the force against the kinetic energy.
     pub audit: EnergyAudit,
     /// The recipe and the run's entry, as JSON.
     pub recipe: String,
     /// Hash over recipe, entry and sources: equal hashes need no new extraction.
     pub fingerprint: String,
+    /// Files that it was made from.
     pub sources: Vec<Source>,
     /// What the extraction did that the manifest does not say.
     pub notes: Vec<String>,

@@ -117,11 +117,14 @@ pub enum DatabaseError {
         /// The file.
         path: PathBuf,
     },
+    /// Something of another program would be lost by writing.
     #[error(
         "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
     )]
     WouldDrop {
+        /// The file.
         path: PathBuf,
+        /// What would be lost, by its name in the file.
         what: String,
     },
     /// HDF5 cannot hold it.

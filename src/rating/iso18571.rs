@@ -38,6 +38,7 @@ pub struct Iso18571 {
     pub slope: f64,
     /// `R = 0.4 Z + 0.2 (E_P + E_M + E_S)`.
     pub rating: f64,
+    /// The standard's word for this rating.
     pub grade: Grade,
     /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
     /// the interval; 0 if one of the signals is constant.
@@ -54,6 +55,7 @@ pub enum Grade {
     Good,
     /// Above 0.58.
     Fair,
+    /// All below.
     Poor,
 }
 
@@ -68,6 +70,7 @@ impl Grade {
         }
     }
 
+    /// The word in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Excellent => "excellent",

@@ -12,6 +12,7 @@ pub struct MagnitudePhase {
     pub magnitude: f64,
     /// 0 to 1.
     pub phase: f64,
+    /// Of Sprague and Geers the root of the sum of the two squares; of Russell that, times √(π/4).
     pub combined: f64,
 }
 

@@ -44,6 +44,7 @@ pub use signal::{Signal, SignalError};
 pub enum Quantity {
     /// Means of the deceleration are rated as well.
     Acceleration,
+    /// Anything else.
     #[default]
     Other,
 }
@@ -60,11 +61,13 @@ impl Quantity {
 /// How two signals are rated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
+    /// What the signals are.
     pub quantity: Quantity,
     /// Class of a CFC filter for both, such as 60.
     pub cfc: Option<u32>,
     /// Begin and end of what is rated, in s; without them all common times.
     pub from_s: Option<f64>,
+    /// End of what is rated.
     pub to_s: Option<f64>,
 }
 
@@ -74,15 +77,21 @@ pub struct Settings {
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Rating {
+    /// The signal that is taken as right.
     pub reference: Rated,
+    /// The signal that is rated.
     pub prediction: Rated,
+    /// What the signals are.
     pub quantity: Quantity,
     /// Class of the filter on both signals, run over all their samples; null without one.
     pub cfc: Option<u32>,
     /// The common times: both signals are interpolated linearly at these.
     pub from_s: f64,
+    /// End of the common times, in s.
     pub to_s: f64,
+    /// Time between two of them, in s.
     pub interval_s: f64,
+    /// Number of common times.
     pub samples: usize,
     /// `Σ|p − r|/Σ|r|`, the headline.
     pub l1_ratio: Option<f64>,
@@ -90,7 +99,9 @@ pub struct Rating {
     pub rms_ratio: Option<f64>,
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
+    /// Relative differences sample by sample.
     pub pointwise: Option<Pointwise>,
+    /// The largest difference and its time.
     pub max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
@@ -98,7 +109,9 @@ pub struct Rating {
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
+    /// Measure of Sprague and Geers.
     pub sprague_geers: Option<MagnitudePhase>,
+    /// Measure of Russell.
     pub russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
     pub iso18571: Option<Iso18571>,
@@ -106,16 +119,20 @@ pub struct Rating {
     pub cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
     pub deceleration: Option<Decelerations>,
+    /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
 
 /// A signal that was rated.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Rated {
+    /// Name of its column.
     pub name: String,
     /// Its own samples, before anything is done to it.
     pub samples: usize,
+    /// Time of its first sample, in s.
     pub first_s: f64,
+    /// Time of its last sample, in s.
     pub last_s: f64,
 }
 
@@ -129,6 +146,7 @@ impl Rated {
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Peak {
+    /// Time of the reference's peak, in s.
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
     pub value: f64,
@@ -142,7 +160,9 @@ pub struct Peak {
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Decelerations {
+    /// Of the reference.
     pub reference: Deceleration,
+    /// Of the prediction.
     pub prediction: Deceleration,
 }
 

@@ -25,64 +25,94 @@ pub struct Signal {
 /// Why two columns are no signal, or two signals cannot be rated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SignalError {
+    /// Too few samples to be a history.
     #[error("{samples} samples are no history: at least {LEAST_SAMPLES} are needed")]
     TooFew {
+        /// Number of samples.
         samples: usize,
     },
+    /// The columns differ in length.
     #[error("columns differ in length: {times} times, {values} values")]
     Lengths {
+        /// Number of times.
         times: usize,
+        /// Number of values.
         values: usize,
     },
+    /// A value is infinite, no number or beyond 1e100.
     #[error("sample {sample}: the value is {value}: expected a finite number up to 1e100")]
     NotFinite {
+        /// The sample, counted from 1.
         sample: usize,
+        /// The value.
         value: f64,
     },
+    /// A time is not later than the one before it.
     #[error(
         "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first"
     )]
     TimeGoesBack {
+        /// The later sample, counted from 1.
         sample: usize,
+        /// Its time, in s.
         time_s: f64,
+        /// The time before it, in s.
         before_s: f64,
     },
+    /// The signal cannot be filtered.
     #[error("{name}: {}", too_much(source))]
     Filter {
+        /// Name of the signal.
         name: String,
+        /// Why.
         source: CfcError,
     },
+    /// The signals have no common times.
     #[error(
         "there are no common times: the reference goes from {0} s to {1} s, the prediction from {2} s to {3} s; check the units of time",
         reference.0, reference.1, prediction.0, prediction.1
     )]
     NoOverlap {
+        /// First and last time of the reference, in s.
         reference: (f64, f64),
+        /// First and last time of the prediction, in s.
         prediction: (f64, f64),
     },
+    /// The interval that is asked for lies outside the common times.
     #[error(
         "what is asked for, from {0} s to {1} s, lies outside the common times from {2} s to {3} s",
         asked.0, asked.1, common.0, common.1
     )]
     Outside {
+        /// Its begin and end, in s.
         asked: (f64, f64),
+        /// First and last common time, in s.
         common: (f64, f64),
     },
+    /// The common times hold too few samples.
     #[error(
         "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
     )]
     TooShort {
+        /// First common time, in s.
         from_s: f64,
+        /// Last common time, in s.
         to_s: f64,
+        /// Number of samples at 10 kHz.
         samples: usize,
+        /// How many are needed.
         least: usize,
     },
+    /// The common times hold more samples than can be rated.
     #[error(
         "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
     )]
     TooLong {
+        /// First common time, in s.
         from_s: f64,
+        /// Last common time, in s.
         to_s: f64,
+        /// Number of samples at 10 kHz.
         samples: f64,
     },
 }

@@ -59,6 +59,7 @@ impl ForestSurrogate {
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
 
+    /// The forest that was fitted, on speed, deflection and features.
     pub fn forest(&self) -> &RegressionForest<f64> {
         &self.forest
     }

@@ -32,8 +32,10 @@ pub enum MaxCrushRule {
 }
 
 impl MaxCrushRule {
+    /// Every rule, in the order of tables.
     pub const ALL: [Self; 4] = [Self::Spline, Self::Monotone, Self::Energy, Self::Motion];
 
+    /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spline => "spline",
@@ -47,8 +49,11 @@ impl MaxCrushRule {
 /// The maximal crush by all rules, in m; `None` where a rule has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaxCrush {
+    /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,
+    /// By a cubic that never falls with the speed.
     pub monotone_m: Option<f64>,
+    /// Where the curve has taken up the impact's energy.
     pub energy_m: Option<f64>,
     /// Absent in files of earlier versions.
     #[serde(default)]

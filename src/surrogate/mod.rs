@@ -35,11 +35,11 @@ use serde_json::value::RawValue;
 
 pub use cases::ModelCase;
 pub(crate) use curves::CaseCurve;
+pub use entry::ModelEntry;
 pub use model::{Model, ModelError};
 pub use models::{MODELS, ModelKind};
 pub use predict::{PredictedCurve, Query, predict};
 pub use warning::{Warning, WarningCode};
-pub use entry::ModelEntry;
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]

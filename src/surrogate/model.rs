@@ -64,52 +64,78 @@ pub struct Model {
 /// Why a model cannot be fitted, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
+    /// The cases are no training set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// The forest cannot be fitted.
     #[error(transparent)]
     Forest(#[from] ForestError),
+    /// The group has fewer curves than the model needs.
     #[error(
         "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
     )]
     TooFewCurves {
+        /// Name of the model.
         model: &'static str,
+        /// How many it needs.
         least: usize,
+        /// How many there are.
         found: usize,
     },
+    /// The cases differ in more than the speed, which is all the model sees.
     #[error(
         "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone"
     )]
     OneParameter {
+        /// Name of the model.
         model: &'static str,
+        /// What else they differ in, as a list.
         features: String,
+        /// Models that see it, as a list.
         others: String,
     },
+    /// The curve of a case is no envelope.
     #[error("{0}")]
     Curve(#[from] EnvelopeError),
+    /// The file cannot be read.
     #[error("{path}: {source}")]
     Io {
+        /// The file.
         path: PathBuf,
+        /// Why.
         source: std::io::Error,
     },
+    /// The file is no model file.
     #[error(
         "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train"
     )]
     NotAModel {
+        /// The file.
         path: PathBuf,
+        /// Line in the file, counted from 1.
         line: usize,
+        /// Column in that line, counted from 1.
         column: usize,
+        /// What was expected there.
         detail: String,
     },
+    /// The file was written by a later or much earlier program.
     #[error("{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train", known = VERSION)]
     Version {
+        /// The file.
         path: PathBuf,
+        /// Version of its layout.
         found: u32,
     },
+    /// The file contradicts itself.
     #[error("{path}: the model is damaged: {detail}")]
     Damaged {
+        /// The file.
         path: PathBuf,
+        /// How.
         detail: String,
     },
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }

@@ -17,11 +17,13 @@ use crate::unit::{SpeedKind, UnitSystem};
 pub struct PredictedCurve {
     /// Loading branch from (0, 0) to the maximal crush.
     pub deflection_m: Vec<f64>,
+    /// Force in N, one value per deflection; which force it is says `provenance.force_kind`.
     #[serde(rename = "force_N")]
     pub force_n: Vec<f64>,
     /// Band around the force, where the model gives one.
     #[serde(rename = "force_low_N", default, skip_serializing_if = "Option::is_none")]
     pub force_low_n: Option<Vec<f64>>,
+    /// Upper end of the band.
     #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub force_high_n: Option<Vec<f64>>,
     /// The force that moves the body, where `force_N` is what the obstacle feels: mass that
@@ -53,16 +55,22 @@ pub struct PredictedCurve {
     /// The rebound from the maximal crush.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound: Option<Rebound>,
+    /// Maximal crush, in m: the last deflection.
     pub max_deflection_m: f64,
+    /// Speed that the curve is for, in m/s.
     pub speed_m_per_s: f64,
+    /// What that speed is measured against.
     pub speed_kind: SpeedKind,
     /// Mass of the body, or of each body of a pair.
     pub mass_kg: f64,
     /// Integral of force over deflection.
     #[serde(rename = "energy_J")]
     pub energy_j: f64,
+    /// Name of the model.
     pub model: String,
+    /// What a user should know before using the curve.
     pub warnings: Vec<Warning>,
+    /// Where it comes from and how it was checked.
     pub provenance: Provenance,
 }
 
@@ -71,8 +79,10 @@ pub struct PredictedCurve {
 pub struct ForestQuantiles {
     /// Share of the members' weight between the two.
     pub level: f64,
+    /// Lower quantile in N, one value per deflection.
     #[serde(rename = "low_N")]
     pub low_n: Vec<f64>,
+    /// Upper quantile in N, one value per deflection.
     #[serde(rename = "high_N")]
     pub high_n: Vec<f64>,
 }
@@ -92,18 +102,28 @@ pub struct Rebound {
 /// Where a predicted curve comes from and how it was checked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Provenance {
+    /// Program and version.
     pub written_by: String,
+    /// Group of cases that the model was trained on.
     pub group: String,
+    /// Which force the recipe declares.
     pub force_kind: ForceKind,
+    /// Hash over the training cases.
     pub training_hash: String,
     /// Units of the training runs' files: what an export to their solver is written in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study_units: Option<UnitSystem>,
+    /// Speeds of the training cases, in m/s, rising.
     pub training_speeds_m_per_s: Vec<f64>,
+    /// Whether the speed lies within those of training.
     pub in_range: bool,
+    /// The training speed nearest to this one, in m/s.
     pub nearest_training_speed_m_per_s: f64,
+    /// Distance to it, in m/s.
     pub distance_to_nearest_m_per_s: f64,
+    /// The rule by which the maximal crush was found.
     pub max_crush_rule: MaxCrushRule,
+    /// The maximal crush by every rule.
     pub max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]

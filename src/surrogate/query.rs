@@ -20,6 +20,7 @@ const SAME_MASS: f64 = 1e-3;
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
+    /// Speed before contact in m/s, of the model's kind.
     pub speed_m_per_s: f64,
     /// Mass of the body, or of each body of a pair; the training runs' if absent.
     pub mass_kg: Option<f64>,

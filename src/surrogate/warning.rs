@@ -10,7 +10,9 @@ use crate::unit::km_per_h;
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
+    /// Its kind, the same for all curves.
     pub code: WarningCode,
+    /// What was found, with numbers, and what to do.
     pub message: String,
 }
 

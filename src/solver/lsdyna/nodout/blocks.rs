@@ -37,7 +37,9 @@ pub struct Blocks {
 
 /// One component of some entities: neighbouring values of a state.
 pub struct Column {
+    /// Name of the component, as binout has it: `x_displacement`.
     pub component: String,
+    /// The nodes whose values these are, in their order.
     pub entities: Vec<EntityId>,
 }
 
