@@ -9,7 +9,7 @@ use super::left_out::LeftOutCase;
 use super::methods;
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
-use super::settings::Settings;
+use super::settings::ComparisonSettings;
 use crate::curve::Case;
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::nsdm::{self, Identifiability, Start};
@@ -106,7 +106,7 @@ pub fn compare(
     group: &str,
     cases: &[Case],
     speed_m_per_s: f64,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
     let near = |v: f64| is_same_speed(v, speed_m_per_s);
@@ -186,7 +186,7 @@ fn fixed_case<'a>(
     group: &str,
     rest: &'a TrainingSet,
     left_out_m_per_s: f64,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<&'a TrainingCase, CompareError> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
         let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
@@ -204,7 +204,7 @@ fn nsdm_report(
     fitted: &methods::FittedNsdm,
     fixed: &Case,
     reference: &Reference,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<NsdmReport, CompareError> {
     let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, CompareError> {
         let motion = fit.model.run(at.mass_kg(), at.speed_m_per_s(), at.time_s())?;

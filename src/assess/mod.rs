@@ -13,4 +13,4 @@ pub mod train;
 pub mod validate;
 
 pub use row::Row;
-pub use settings::Settings;
+pub use settings::ComparisonSettings;

@@ -9,7 +9,7 @@ use crate::curve::ForceKind;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::rating::{Quantity, Rating, Settings, Signal, rate};
+use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
 
 /// One method.
@@ -128,7 +128,7 @@ impl RowBuilder<'_> {
         let rated = |fe: &[f64], ours: &[f64], quantity| -> Result<Rating, CompareError> {
             let time_s = &reference.time_s()[..inside];
             let signal = |name, values: &[f64]| Signal::new(name, time_s.to_vec(), values.to_vec());
-            let settings = Settings { quantity, ..Settings::default() };
+            let settings = RatingSettings { quantity, ..RatingSettings::default() };
             Ok(rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)?)
         };
         let own_s = times.predict_s + simulation_s;

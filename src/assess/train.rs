@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::error::{CompareError, TrainError};
 use super::methods::{ddtcm_model, fit_nsdm};
-use super::settings::Settings;
+use super::settings::ComparisonSettings;
 use super::validate::{self, Choice};
 use crate::curve::body::filtered;
 use crate::curve::{Case, DrivingCurve};
@@ -19,7 +19,8 @@ use crate::file;
 use crate::history::EntityId;
 use crate::multibody::simulate;
 use crate::scenario::{
-    self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, Source, Sources,
+    self, CurveSource, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
+    Sources,
 };
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
@@ -157,7 +158,7 @@ struct Method<'a> {
 pub fn compare_train(
     path: &Path,
     scenario: &Scenario,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<TrainComparison, CompareError> {
     let reference =
         scenario.reference.as_ref().ok_or_else(|| TrainError::NoReference { path: path.into() })?;
@@ -219,7 +220,7 @@ fn methods<'a>(
     path: &Path,
     scenario: &Scenario,
     sources: &Sources,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<Vec<Method<'a>>, CompareError> {
     let groups = groups(path, scenario)?;
     // Every curve with the body's force, or with the recipe's.
@@ -253,7 +254,7 @@ fn methods<'a>(
     for (name, (case, cases)) in &groups {
         // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
         let model = ddtcm_model(&TrainingSet::new(&case.group, cases)?, settings.seed)?;
-        forests.replace(name, Source::Model(Box::new(model)));
+        forests.replace(name, CurveSource::Model(Box::new(model)));
     }
     let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
@@ -264,7 +265,7 @@ fn methods<'a>(
     for (name, (case, cases)) in &groups {
         let choice = Choice::Auto { seed: settings.seed, trees: None };
         let model = validate::train(&case.group, cases, choice)?;
-        best.replace(name, Source::Model(Box::new(model)));
+        best.replace(name, CurveSource::Model(Box::new(model)));
     }
     let fit_s = start.elapsed().as_secs_f64();
     for (name, speed) in
@@ -282,7 +283,7 @@ fn with_nsdm(
     scenario: &Scenario,
     sources: &Sources,
     groups: &BTreeMap<String, (Case, Vec<Case>)>,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<(Scenario, Sources), CompareError> {
     let (mut changed, mut springs) = (scenario.clone(), sources.clone());
     for (name, (case, _)) in groups {
@@ -296,7 +297,7 @@ fn with_nsdm(
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
         });
         let curve = DrivingCurve::of_body(fit.model.envelope()?);
-        springs.replace(name, Source::Curve(Box::new(curve)));
+        springs.replace(name, CurveSource::Curve(Box::new(curve)));
     }
     Ok((changed, springs))
 }

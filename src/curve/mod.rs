@@ -180,7 +180,7 @@ impl Masses {
 
 /// A file a case was made from, so that a curve can be traced to its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Source {
+pub struct SourceFile {
     /// As found from the manifest: `25kmh/nodout`.
     pub path: String,
     /// Size in bytes when it was read.
@@ -266,7 +266,7 @@ pub struct Case {
     /// Hash over recipe, entry and sources: equal hashes need no new extraction.
     pub fingerprint: String,
     /// Files that it was made from.
-    pub sources: Vec<Source>,
+    pub sources: Vec<SourceFile>,
     /// What the extraction did that the manifest does not say.
     pub notes: Vec<String>,
     /// What the user should look at before trusting the case.

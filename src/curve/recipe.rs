@@ -102,7 +102,7 @@ pub enum ForceSource {
         /// Number of the node that moves with the body.
         node: i64,
         /// What the acceleration is made from.
-        motion: BodyMotion,
+        motion: RecordedMotion,
         /// Component of that motion, such as `x_acceleration`.
         component: String,
     },
@@ -110,7 +110,7 @@ pub enum ForceSource {
 
 /// What the acceleration of a body is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BodyMotion {
+pub enum RecordedMotion {
     /// The acceleration that the solver wrote.
     Acceleration,
     /// Differentiated by central differences: a mean over two output intervals.
@@ -164,9 +164,9 @@ impl TryFrom<ForceTable> for ForceSource {
             (None, Some(node), Some("mass")) => {
                 let motion = match component.as_str() {
                     "x_acceleration" | "y_acceleration" | "z_acceleration" => {
-                        BodyMotion::Acceleration
+                        RecordedMotion::Acceleration
                     }
-                    "x_velocity" | "y_velocity" | "z_velocity" => BodyMotion::Velocity,
+                    "x_velocity" | "y_velocity" | "z_velocity" => RecordedMotion::Velocity,
                     _ => {
                         return Err(format!(
                             "\"{component}\" times mass is no force: use x_acceleration, or x_velocity to differentiate it"

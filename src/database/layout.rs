@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 use super::{Database, DatabaseError, damaged_curve};
-use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, Source};
+use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
 use crate::file;
 use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};
@@ -479,7 +479,7 @@ fn decode_case(
     let original_place =
         Location { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
     let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
-    let sources: Vec<Source> = attrs.json("sources")?;
+    let sources: Vec<SourceFile> = attrs.json("sources")?;
     let case = Case {
         study: attrs.text("study")?.into(),
         group: group_name.into(),

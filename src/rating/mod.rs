@@ -60,7 +60,7 @@ impl Quantity {
 
 /// How two signals are rated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Settings {
+pub struct RatingSettings {
     /// What the signals are.
     pub quantity: Quantity,
     /// Class of a CFC filter for both, such as 60.
@@ -178,7 +178,7 @@ pub struct Decelerations {
 pub fn rate(
     reference: &Signal,
     prediction: &Signal,
-    settings: &Settings,
+    settings: &RatingSettings,
 ) -> Result<Rating, SignalError> {
     let filtered = |signal: &Signal| match settings.cfc {
         Some(class) => signal.filtered(class),
@@ -236,7 +236,7 @@ fn first_peaks(pair: &Pair) -> Vec<Peak> {
     matched.into_iter().filter(|peak| peak.reference.1 > 0.0).map(peak).collect()
 }
 
-fn warnings(rating: &Rating, reference: &[f64], settings: &Settings) -> Vec<String> {
+fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
     let (from_s, to_s) =
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
@@ -288,7 +288,7 @@ mod tests {
     }
 
     fn plain(reference: &Signal, prediction: &Signal) -> Rating {
-        rate(reference, prediction, &Settings::default()).unwrap()
+        rate(reference, prediction, &RatingSettings::default()).unwrap()
     }
 
     proptest! {
@@ -365,11 +365,12 @@ mod tests {
     #[test]
     fn a_filter_comes_before_the_cut() {
         let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
-        let beyond = Settings { to_s: Some(5.0), ..Settings::default() };
+        let beyond = RatingSettings { to_s: Some(5.0), ..RatingSettings::default() };
         let beyond = rate(&step, &step, &beyond).unwrap().warnings;
         assert!(beyond.iter().any(|w| w.contains("to 5 s was asked for")), "{beyond:?}");
-        let window = Settings { from_s: Some(0.052), cfc: Some(60), ..Settings::default() };
-        let whole = Settings { from_s: None, ..window };
+        let window =
+            RatingSettings { from_s: Some(0.052), cfc: Some(60), ..RatingSettings::default() };
+        let whole = RatingSettings { from_s: None, ..window };
         let zero = signal(vec![0.0; 200]);
         let cut = rate(&zero, &step, &window).unwrap();
         assert_eq!(cut.from_s, 0.052);

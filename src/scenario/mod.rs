@@ -14,7 +14,7 @@ pub use assemble::AssemblyError;
 pub(crate) use assemble::adjust;
 pub use check::{CheckError, CheckedScenario};
 pub(crate) use local::assemble;
-pub(crate) use sources::{Source, Sources};
+pub(crate) use sources::{CurveSource, Sources};
 pub use tables::*;
 
 use crate::database::DatabaseError;

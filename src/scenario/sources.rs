@@ -12,12 +12,12 @@ use crate::surrogate::{Model, PredictedCurve};
 /// What the curves of a scenario are made of: the same for every variation of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Sources {
-    pub(super) curves: BTreeMap<String, Source>,
+    pub(super) curves: BTreeMap<String, CurveSource>,
 }
 
 /// What a curve is made of.
 #[derive(Clone, Debug)]
-pub(crate) enum Source {
+pub(crate) enum CurveSource {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
     /// Of a file.
@@ -69,7 +69,7 @@ impl Sources {
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
             let source =
-                Source::read(table, name, folder, &mut databases).map_err(|e| match e {
+                CurveSource::read(table, name, folder, &mut databases).map_err(|e| match e {
                     ReadError::Message(message) => {
                         ScenarioError::Invalid { path: path.into(), message }
                     }
@@ -81,7 +81,7 @@ impl Sources {
     }
 
     /// Puts another source in place of a curve's.
-    pub(crate) fn replace(&mut self, curve: &str, source: Source) {
+    pub(crate) fn replace(&mut self, curve: &str, source: CurveSource) {
         self.curves.insert(curve.into(), source);
     }
 }
@@ -97,7 +97,7 @@ impl<E: Into<ScenarioError>> From<E> for ReadError {
     }
 }
 
-impl Source {
+impl CurveSource {
     fn read(
         table: &CurveTable,
         name: &str,

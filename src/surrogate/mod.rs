@@ -43,7 +43,7 @@ pub use warning::{Warning, WarningCode};
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a> {
+pub struct QueryPoint<'a> {
     /// Impact speed, of the training cases' kind.
     pub speed_m_per_s: f64,
     /// Values of the training set's further features.
@@ -60,10 +60,10 @@ pub struct At<'a> {
 pub(crate) trait Surrogate: Debug + Send + Sync {
     /// Forces in N at increasing deflections (m), one per deflection. `cases` are the
     /// curves it was fitted to, in order of speed.
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64>;
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64>;
 
     /// What a user must know about a query here, beyond what holds for all models.
-    fn warnings(&self, _cases: &[CaseCurve], _at: &At<'_>) -> Vec<Warning> {
+    fn warnings(&self, _cases: &[CaseCurve], _at: &QueryPoint<'_>) -> Vec<Warning> {
         Vec::new()
     }
 

@@ -12,7 +12,7 @@ use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::model_file::VERSION;
 use super::models::{MODELS, ModelKind};
-use super::{At, CaseCurve, Surrogate, Warning};
+use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};
 use crate::file::WriteError;
@@ -234,7 +234,7 @@ impl Model {
     }
 
     /// The band at a query's place, or why there is none although speeds were left out.
-    pub(super) fn band(&self, at: &At<'_>) -> Result<Option<Band>, Warning> {
+    pub(super) fn band(&self, at: &QueryPoint<'_>) -> Result<Option<Band>, Warning> {
         let Some(of) = &self.leave_one_out else { return Ok(None) };
         if of.band.or(of.band_outside).is_none() {
             return Ok(None);
@@ -259,7 +259,10 @@ impl Model {
 
     /// Numbers among the parameters that lie outside the training cases', as feature, value,
     /// lowest and highest.
-    fn features_outside(&self, at: &At<'_>) -> impl Iterator<Item = (&Feature, f64, f64, f64)> {
+    fn features_outside(
+        &self,
+        at: &QueryPoint<'_>,
+    ) -> impl Iterator<Item = (&Feature, f64, f64, f64)> {
         let numbers = self.features.iter().enumerate().filter(|(_, f)| f.category.is_none());
         numbers.filter_map(|(k, feature)| {
             let known = || self.cases.iter().map(|c| c.features[k]);
@@ -271,13 +274,13 @@ impl Model {
     }
 
     /// The declared forces in N at increasing deflections.
-    pub fn force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    pub fn force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         self.fitted.force_n(&self.curves.declared, at, deflection_m)
     }
 
     /// The forces in N that move the body: of its motion, or the declared ones if the model
     /// has no others.
-    pub fn body_force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
             Some(body) => body.force_n(&self.curves.body, at, deflection_m),
             None => self.force_n(at, deflection_m),
@@ -312,7 +315,7 @@ impl Model {
     }
 
     /// What a query here must say, for any mass and rule.
-    pub(crate) fn warnings(&self, at: &At<'_>) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, at: &QueryPoint<'_>) -> Vec<Warning> {
         let v = at.speed_m_per_s;
         let (low, high) = self.range_m_per_s();
         let mut warnings = Vec::new();

@@ -20,7 +20,7 @@ use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predict_error::CORRECTION;
 use super::query::{Asked, over_speed};
 use super::spikes::without_spikes;
-use super::{At, Model, Warning};
+use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{grid, nearest};
 
@@ -106,7 +106,7 @@ impl<'a> Motion<'a> {
         }
         let closing_at = |&d: &f64| (v * v - 2.0 * self.body.work_to(d) / mass_kg).max(0.0).sqrt();
         let closing: Vec<f64> = deflection_m.iter().map(closing_at).collect();
-        let at = At { closing_m_per_s: Some(&closing), ..self.asked.at() };
+        let at = QueryPoint { closing_m_per_s: Some(&closing), ..self.asked.at() };
         without_spikes(model, deflection_m, model.force_n(&at, deflection_m), false)
     }
 

@@ -8,7 +8,7 @@ use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predict_error::PredictError;
 use super::predicted::Rebound;
 use super::warning::{Warning, is_far_outside, outside_of};
-use super::{At, Model};
+use super::{Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
 use crate::dataset::{MASS, OTHER_MASS, feature_values};
@@ -119,8 +119,8 @@ impl<'a> Asked<'a> {
         Ok(Self { model, v, masses, mass_kg, same_mass, parameters, features, kinetic_energy_j })
     }
 
-    pub(crate) fn at(&self) -> At<'_> {
-        At {
+    pub(crate) fn at(&self) -> QueryPoint<'_> {
+        QueryPoint {
             speed_m_per_s: self.v,
             features: &self.features,
             mass_kg: self.mass_kg,

@@ -4,7 +4,7 @@ use super::error::{ExtractError, Origin};
 use super::input::{Measured, MeasuredForce, Setup};
 use super::remarks::Remarks;
 use crate::curve::contact::milliseconds;
-use crate::curve::recipe::BodyMotion;
+use crate::curve::recipe::RecordedMotion;
 use crate::history::History;
 use crate::signal::derivative;
 use crate::signal::resample::interpolate;
@@ -240,10 +240,10 @@ fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Remarks)
     let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);
     match measured.force {
         MeasuredForce::Contact(history) => of(history, units.force(), "force"),
-        MeasuredForce::Body(history, BodyMotion::Acceleration) => {
+        MeasuredForce::Body(history, RecordedMotion::Acceleration) => {
             of(history, mass * units.acceleration(), "acceleration")
         }
-        MeasuredForce::Body(history, BodyMotion::Velocity) => {
+        MeasuredForce::Body(history, RecordedMotion::Velocity) => {
             let (velocity, mut remarks) = of(history, mass * units.speed(), "velocity")?;
             remarks.note("body force: mass times the central difference of the velocity");
             let values = derivative(&velocity.time_s, &velocity.values);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::bytes::Bytes;
 use super::metadata::Metadata;
-use super::records::{Component, Place, Section};
+use super::records::{Component, DataRecord, Section};
 use super::states::States;
 use crate::history::EntityId;
 use crate::solver::problem::{Problem, ProblemCode};
@@ -49,7 +49,7 @@ impl Owners {
     ) -> io::Result<Found> {
         let first = states.whole.iter().find_map(|state| component.records.get(state));
         let any = first.or_else(|| component.records.values().next());
-        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(Place::width) else {
+        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(DataRecord::width) else {
             return Ok(Found::Nothing);
         };
         if width == 0 || is_total(&component.name) {

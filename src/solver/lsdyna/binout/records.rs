@@ -26,7 +26,7 @@ const MAX_RECORDS: usize = 20_000_000;
 
 /// A data record of one of the containers.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct DataRecord {
     pub part: usize,
     pub payload: Payload,
 }
@@ -49,9 +49,9 @@ pub(super) struct Tree {
 #[derive(Default)]
 pub(super) struct Section {
     pub name: String,
-    pub metadata: HashMap<String, Place>,
+    pub metadata: HashMap<String, DataRecord>,
     /// Lists of ids and sides, each for the states written behind it.
-    pub lists: Vec<(&'static str, Place)>,
+    pub lists: Vec<(&'static str, DataRecord)>,
     /// Directory numbers of the states, in order of appearance.
     pub states: Vec<u64>,
     pub state_index: HashMap<u64, usize>,
@@ -71,7 +71,7 @@ pub(super) struct Section {
 pub(super) struct Component {
     pub name: Arc<str>,
     /// By state.
-    pub records: HashMap<usize, Place>,
+    pub records: HashMap<usize, DataRecord>,
 }
 
 impl Tree {
@@ -98,7 +98,7 @@ impl Tree {
                     self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
                 }
                 if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
-                    self.sections[section].note(name, state, Place { part, payload });
+                    self.sections[section].note(name, state, DataRecord { part, payload });
                 }
             }
             Event::Damage { at, resumed, message } => {
@@ -177,7 +177,7 @@ impl Section {
         })
     }
 
-    fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
+    fn note(&mut self, name: &str, state: Option<usize>, place: DataRecord) {
         let Some(state) = state else {
             if let Some(list) = LISTS.into_iter().find(|list| *list == name) {
                 self.lists.push((list, place));
@@ -216,7 +216,7 @@ impl Section {
     }
 }
 
-impl Place {
+impl DataRecord {
     /// Order of writing.
     pub(crate) fn order(&self) -> (usize, u64) {
         (self.part, self.payload.at)

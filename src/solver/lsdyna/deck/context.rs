@@ -2,7 +2,7 @@
 //! files that are open, and its problems.
 
 use super::card::{Card, Field};
-use super::contents::{At, Deck};
+use super::contents::{Deck, DeckPlace};
 use super::keyword::{Format, Keyword};
 use super::kind::Kind;
 use super::parameters::{NoNumber, Parameters};
@@ -102,8 +102,8 @@ impl Context {
         }
     }
 
-    pub(crate) fn at(&self, place: Place) -> At {
-        At { line: place.line, include: self.reading.last().map(|&(index, _)| index) }
+    pub(crate) fn at(&self, place: Place) -> DeckPlace {
+        DeckPlace { line: place.line, include: self.reading.last().map(|&(index, _)| index) }
     }
 
     pub(crate) fn problem(
