@@ -20,12 +20,21 @@ pub(crate) struct OnnxDescription<'a> {
 
 /// Why a forest cannot be an ONNX model.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum OnnxError {
+    /// There are not as many names as features.
     #[error("{named} features are named, the forest was fitted to {fitted}")]
-    Names { named: usize, fitted: usize },
+    Names {
+        /// Number of names.
+        named: usize,
+        /// Number of features that the forest was fitted with.
+        fitted: usize,
+    },
+    /// The file would be larger than protobuf allows.
     #[error("an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes")]
-    TooLarge { bytes: usize },
+    TooLarge {
+        /// Its size, in bytes.
+        bytes: usize,
+    },
 }
 
 /// Name of the model's input.

@@ -24,18 +24,36 @@ pub struct Tree<F> {
 
 /// Why stored node arrays are no tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum TreeError {
+    /// The node arrays differ in length, or are empty.
     #[error("the node arrays differ in length or are empty")]
     Lengths,
+    /// A node splits on a feature that is not there.
     #[error("node {node} splits on feature {feature} of {features}")]
-    Feature { node: usize, feature: i32, features: usize },
+    Feature {
+        /// The node, counted from 0.
+        node: usize,
+        /// The feature, counted from 0.
+        feature: i32,
+        /// Number of features.
+        features: usize,
+    },
+    /// The children of a node do not stand side by side after it.
     #[error("node {node} has children that do not stand side by side after it")]
-    Child { node: usize },
+    Child {
+        /// The node, counted from 0.
+        node: usize,
+    },
+    /// A threshold or value is infinite or no number.
     #[error("node {node} holds a value that is not finite")]
-    NotFinite { node: usize },
+    NotFinite {
+        /// The node, counted from 0.
+        node: usize,
+    },
+    /// The members of the leaves do not fit the leaves.
     #[error("the samples of the leaves do not fit the trees")]
     Members,
+    /// The features' shares do not fit their number.
     #[error("the shares of the features do not fit their number")]
     Importance,
 }

@@ -6,16 +6,27 @@ use super::resample::interpolate;
 
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum CfcError {
+    /// The samples are too far apart for the class.
     #[error(
         "the interval of {interval_s:e} s is too long for CFC{class}: at most {longest_s:e} s; use a lower class, filter = \"none\", or output at a higher rate"
     )]
-    TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
+    TooCoarse {
+        /// The class, such as 60.
+        class: u32,
+        /// Time between samples, in s.
+        interval_s: f64,
+        /// Longest time between samples that the class allows, in s.
+        longest_s: f64,
+    },
+    /// The samples are not evenly spaced.
     #[error(
         "the filter needs about equal intervals, but they differ by up to {spread_percent:.0} % of their mean: use filter = \"none\""
     )]
-    Uneven { spread_percent: f64 },
+    Uneven {
+        /// By how much the intervals differ, in % of their mean.
+        spread_percent: f64,
+    },
 }
 
 /// Largest deviation of an interval from the mean that still counts as equal.
