@@ -5,7 +5,7 @@ use csv::StringRecord;
 
 /// The rows below a header line. Separated by commas, semicolons or tabs, whichever stand in the
 /// header; lines that begin with `#` are comments.
-pub struct CsvTable<'a> {
+pub(crate) struct CsvTable<'a> {
     reader: csv::Reader<&'a [u8]>,
     header: StringRecord,
     /// Lines of the file in front of the text.
@@ -13,7 +13,7 @@ pub struct CsvTable<'a> {
 }
 
 /// One row.
-pub struct Row {
+pub(crate) struct Row {
     record: StringRecord,
     /// Line in the file, counted from 1.
     pub line: u64,
@@ -21,7 +21,7 @@ pub struct Row {
 
 /// A field that holds no number, or none that is finite.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NoNumber {
+pub(crate) struct NoNumber {
     /// Line in the file, counted from 1.
     pub line: u64,
     /// Field of the row, counted from 1.
@@ -37,7 +37,7 @@ impl<'a> CsvTable<'a> {
     ///
     /// # Errors
     /// If the header is no UTF-8.
-    pub fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
+    pub(crate) fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
@@ -50,17 +50,17 @@ impl<'a> CsvTable<'a> {
     }
 
     /// The names of the columns.
-    pub fn header(&self) -> &StringRecord {
+    pub(crate) fn header(&self) -> &StringRecord {
         &self.header
     }
 
     /// Line of the header in the file, counted from 1.
-    pub fn header_line(&self) -> u64 {
+    pub(crate) fn header_line(&self) -> u64 {
         self.lines_before + self.header.position().map_or(1, csv::Position::line)
     }
 
     /// The rows in their order.
-    pub fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
+    pub(crate) fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
         let before = self.lines_before;
         self.reader.records().map(move |record| {
             let record = record?;
@@ -75,7 +75,7 @@ impl Row {
     ///
     /// # Errors
     /// [`NoNumber`] with its place.
-    pub fn number(&self, field: usize) -> Result<f64, NoNumber> {
+    pub(crate) fn number(&self, field: usize) -> Result<f64, NoNumber> {
         let found = self.record.get(field).unwrap_or_default();
         let parsed = found.parse::<f64>();
         match parsed {

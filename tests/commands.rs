@@ -449,7 +449,7 @@ fn a_saved_model_predicts_the_same_bits() {
     use crumple::database::Database;
     use crumple::dataset::TrainingSet;
     use crumple::surrogate::forest::ForestOptions;
-    use crumple::surrogate::{At, Model, ModelKind};
+    use crumple::surrogate::{Model, ModelKind, QueryPoint};
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), WALL);
     let database = Database::read(&path).unwrap();
@@ -469,7 +469,12 @@ fn a_saved_model_predicts_the_same_bits() {
         assert_eq!(read.to_json().unwrap(), model.to_json().unwrap());
         let d: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.003).collect();
         for v in [7.0, 13.3, 14.9, 15.1, 25.0] {
-            let at = At { speed_m_per_s: v, features: &[], mass_kg: 24e3, closing_m_per_s: None };
+            let at = QueryPoint {
+                speed_m_per_s: v,
+                features: &[],
+                mass_kg: 24e3,
+                closing_m_per_s: None,
+            };
             let bits = |m: &Model| -> Vec<u64> {
                 let forces = [m.force_n(&at, &d), m.body_force_n(&at, &d)];
                 forces.concat().iter().map(|f| f.to_bits()).collect()

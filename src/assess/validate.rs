@@ -33,15 +33,20 @@ pub struct Report {
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum GroupReport {
+    /// The table of a group.
     Validated {
+        /// Every model at every speed that was left out.
         #[serde(flatten)]
         validation: Box<Validation>,
         /// Absent if it was not asked for, or if there is no gap to run in.
         #[serde(skip_serializing_if = "Option::is_none")]
         next_run: Option<NextRun>,
     },
+    /// There is no table.
     Failed {
+        /// Name of the group.
         group: String,
+        /// Why, in a sentence.
         error: String,
     },
 }

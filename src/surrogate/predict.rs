@@ -20,7 +20,7 @@ use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predict_error::CORRECTION;
 use super::query::{Asked, over_speed};
 use super::spikes::without_spikes;
-use super::{At, Model, Warning};
+use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{grid, nearest};
 
@@ -129,7 +129,7 @@ impl<'a> Motion<'a> {
         }
         let closing_at = |&d: &f64| (v * v - 2.0 * self.body.work_to(d) / mass_kg).max(0.0).sqrt();
         let closing: Vec<f64> = deflection_m.iter().map(closing_at).collect();
-        let at = At { closing_m_per_s: Some(&closing), ..self.asked.at() };
+        let at = QueryPoint { closing_m_per_s: Some(&closing), ..self.asked.at() };
         without_spikes(model, deflection_m, model.force_n(&at, deflection_m), false)
     }
 
@@ -161,7 +161,7 @@ impl<'a> Motion<'a> {
 
 /// What a prediction is before a rule for the maximal crush is chosen: the forces beyond any
 /// crush, and the crush by every rule. One such serves all rules.
-pub struct Prediction<'a> {
+pub(crate) struct Prediction<'a> {
     motion: Motion<'a>,
     /// Declared force over the same even deflections as the body's.
     declared: Envelope,
@@ -180,7 +180,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// As [`predict`].
-    pub fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
         Self::of(Motion::new(model, query)?)
     }
 
@@ -192,7 +192,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// The rule that the query asks for, or the model's own.
-    pub fn rule(&self) -> MaxCrushRule {
+    pub(crate) fn rule(&self) -> MaxCrushRule {
         self.motion.rule()
     }
 
@@ -200,7 +200,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// [`PredictError`] if the rule gives no crush, or the energy correction is out of bounds.
-    pub fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
+    pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
         let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;

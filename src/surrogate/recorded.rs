@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound};
 use super::{PredictError, Warning};
-use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, NoDrivingCurve, Parameter};
+use crate::curve::driving::NoDrivingCurve;
+use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 
 /// The name that stands where a predicted curve has its model's.
