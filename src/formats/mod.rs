@@ -1,6 +1,7 @@
 //! Exports: a predicted curve or a model as a file for another tool. One file per target.
 
 pub mod csv;
+pub mod fmu;
 pub mod json;
 pub mod lsdyna;
 pub mod onnx;

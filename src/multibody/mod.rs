@@ -21,7 +21,7 @@ pub use chain::{
 };
 pub use damping::{Damping, DampingError};
 pub use driven::UnloadingChoice;
-pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
+pub use law::{EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingShape};
 pub use ledger::Ledger;
 pub use run::{
     BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError,
