@@ -30,7 +30,10 @@ const MAY_NAME: [(&str, &[&str]); 25] = [
     ("surrogate", &["dataset", "forest", "curve", "signal", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
     ("nsdm", &["curve", "signal", "stream"]),
-    ("formats", &["surrogate", "dataset", "forest", "curve", "table", "hdf5", "file", "unit"]),
+    (
+        "formats",
+        &["multibody", "surrogate", "dataset", "forest", "curve", "table", "hdf5", "file", "unit"],
+    ),
     ("plan", &["stream", "unit"]),
     (
         "scenario",
@@ -230,7 +233,8 @@ fn tests_that_need_clients_are_found_by_name() {
         let text = fs::read_to_string(&path).unwrap();
         for behind in text.split("#[ignore = \"needs the Python clients").skip(1) {
             let name = behind.split("fn ").nth(1).unwrap().split('(').next().unwrap();
-            let is_found = ["clients", "documents"].contains(&module) || name.contains("h5py");
+            let is_found =
+                ["clients", "documents", "fmu"].contains(&module) || name.contains("h5py");
             assert!(is_found, "{module}::{name} needs h5py in its name");
         }
     }

@@ -239,7 +239,7 @@ impl Database {
     ///
     /// # Errors
     /// [`DatabaseError::NoGroup`] or [`DatabaseError::NoCase`], with the names there are.
-    pub(crate) fn case(
+    pub fn case(
         &self,
         path: &Path,
         group: &str,
