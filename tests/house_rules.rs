@@ -30,7 +30,7 @@ const MAY_NAME: [(&str, &[&str]); 25] = [
     ("surrogate", &["dataset", "forest", "curve", "signal", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
     ("nsdm", &["curve", "signal", "stream"]),
-    ("formats", &["surrogate", "dataset", "forest", "curve", "table", "file", "unit"]),
+    ("formats", &["surrogate", "dataset", "forest", "curve", "table", "signal", "file", "unit"]),
     ("plan", &["stream", "unit"]),
     (
         "scenario",

@@ -157,7 +157,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let bytes = match format.takes_model() {
         true => format.encode_model(&Model::read(input)?)?,
-        false => args.target.encode(format, &formats::json::read(input)?)?,
+        false => args.target.encode(format, &formats::read::json::predicted(input)?)?,
     };
     match output {
         None if options.json && format.takes_model() => {

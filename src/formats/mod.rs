@@ -1,9 +1,11 @@
 //! Exports: a predicted curve or a model as a file for another tool. One file per target.
+//! [`read`] takes curves back from such files.
 
 pub mod csv;
 pub mod json;
 pub mod lsdyna;
 pub mod onnx;
+pub mod read;
 
 use std::path::Path;
 

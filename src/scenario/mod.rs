@@ -17,7 +17,7 @@ pub use sources::{Source, Sources};
 pub use tables::*;
 
 use crate::database::DatabaseError;
-use crate::formats::{csv, json};
+use crate::formats::read::{ReadCurveError, json};
 use crate::manifest::{self, ManifestError};
 use crate::multibody::{Chain, ChainError, RunSettings, SimulationError};
 use crate::surrogate::ModelError;
@@ -102,7 +102,7 @@ pub enum ScenarioError {
     CurveFile(#[from] json::CurveFileError),
     /// A table of a curve cannot be used.
     #[error(transparent)]
-    Csv(#[from] csv::CsvError),
+    Csv(#[from] ReadCurveError),
     /// Its bodies make no chain.
     #[error("{path}: {source}")]
     Chain {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{CurveTable, Scenario, ScenarioError, StageTable};
 use crate::curve::{Case, DrivingCurve, Envelope};
 use crate::database::Database;
-use crate::formats::{csv, json};
+use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
@@ -111,9 +111,9 @@ impl Source {
             (None, Some(file), None, None) => {
                 let path = folder.join(file);
                 if path.extension().is_some_and(|e| e == "json") {
-                    return Ok(Self::Predicted(Box::new(json::read(&path)?)));
+                    return Ok(Self::Predicted(Box::new(json::predicted(&path)?)));
                 }
-                let mut held = csv::read(&path)?;
+                let mut held = csv::driving(&path)?;
                 let stated = table.force.or(held.force);
                 if held.force.is_some() && stated != held.force {
                     return Err(ReadError::Message(format!(
