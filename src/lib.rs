@@ -65,6 +65,8 @@ pub mod nsdm;
 
 pub mod formats;
 
+pub mod import;
+
 pub mod plan;
 
 pub mod scenario;

@@ -15,6 +15,7 @@ mod files;
 mod forest;
 mod growing;
 mod house_rules;
+mod import;
 mod known_solutions;
 mod models;
 mod nsdm;

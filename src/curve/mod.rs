@@ -8,8 +8,10 @@ pub mod driving;
 pub mod energy;
 pub mod envelope;
 pub mod extract;
+pub mod from_table;
 pub mod loading;
 pub mod recipe;
+pub mod retrace;
 
 use std::collections::BTreeMap;
 
