@@ -7,7 +7,7 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-use crumple::assess::Settings;
+use crumple::assess::ComparisonSettings;
 use crumple::assess::train::compare_train;
 use crumple::build::build;
 use crumple::scenario;
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::copy(root.join("fixtures/train-set/36kmh/nodout"), fe.join("nodout"))?;
     let path = folder.path().join("train-set.toml");
     fs::copy(root.join("examples/trains/train-set.toml"), &path)?;
-    let settings = Settings { nsdm_seeds: 0, ..Settings::default() };
+    let settings = ComparisonSettings { nsdm_seeds: 0, ..ComparisonSettings::default() };
     let scenario = scenario::read(&path)?;
     let comparison = compare_train(&path, &scenario, &settings)?;
 

@@ -15,7 +15,9 @@ use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 /// One case as models see it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingCase {
+    /// Name of the case.
     pub name: String,
+    /// Speed before contact, in m/s, of the set's kind.
     pub speed_m_per_s: f64,
     /// Values of the set's [`features`](TrainingSet::features).
     pub features: Vec<f64>,
@@ -27,8 +29,11 @@ pub struct TrainingCase {
     pub sampled: Envelope,
     /// The body's motion, and the force that follows from it.
     pub motion: BodyMotion,
+    /// Whether the record ended while loading, so that the largest deflection is not known.
     pub truncated: bool,
+    /// Measured unloading stiffness, in N/m, if the record reaches so far.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Hash over the case's recipe, entry and sources.
     pub fingerprint: String,
 }
 
@@ -44,9 +49,9 @@ pub struct Feature {
 }
 
 /// The parameter that masses become if they differ within a group.
-pub const MASS: &str = "mass_kg";
+pub(crate) const MASS: &str = "mass_kg";
 /// The mass of the other body of a pair, where it is not that of the first.
-pub const OTHER_MASS: &str = "other_mass_kg";
+pub(crate) const OTHER_MASS: &str = "other_mass_kg";
 
 /// The cases of one group.
 ///
@@ -54,8 +59,11 @@ pub const OTHER_MASS: &str = "other_mass_kg";
 /// both; one kind of speed and force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingSet {
+    /// Name of the group.
     pub group: String,
+    /// What the speeds are measured against.
     pub speed_kind: SpeedKind,
+    /// Which force the curves hold.
     pub force_kind: ForceKind,
     /// Masses of the first case.
     pub masses: Masses,
@@ -63,42 +71,90 @@ pub struct TrainingSet {
     pub units: Option<UnitSystem>,
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
+    /// The cases, in order of speed, then features.
     pub cases: Vec<TrainingCase>,
 }
 
 /// Why cases are no training set.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DatasetError {
+    /// There is no case.
     #[error("the group is empty: build it first")]
     Empty,
+    /// Two cases cannot be told apart by speed and parameters.
     #[error(
         "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}: keep one of them{hint}"
     )]
     EqualSpeeds {
+        /// Name of the one case.
         first: String,
+        /// Name of the other case.
         second: String,
+        /// Their speed, as text with its unit.
         speed: String,
+        /// Words that add the parameters, if there are any.
         parameters: &'static str,
+        /// Words that add a remedy, if there is one.
         hint: &'static str,
     },
+    /// Two cases differ in what a group must share.
     #[error("cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group")]
-    Mixed { first: String, second: String, what: &'static str },
+    Mixed {
+        /// Name of the one case.
+        first: String,
+        /// Name of the other case.
+        second: String,
+        /// What they differ in, such as kinds of speed.
+        what: &'static str,
+    },
+    /// A case lacks a parameter that another has.
     #[error(
         "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group"
     )]
-    NoParameter { parameter: String, with: String, without: String },
+    NoParameter {
+        /// Name of the parameter.
+        parameter: String,
+        /// Name of the case that has it.
+        with: String,
+        /// Name of the case that lacks it.
+        without: String,
+    },
+    /// A parameter is a number in one case and a category in another.
     #[error(
         "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
     )]
-    MixedParameter { parameter: String, number: String, category: String },
+    MixedParameter {
+        /// Name of the parameter.
+        parameter: String,
+        /// Name of the case where it is a number.
+        number: String,
+        /// Name of the case where it is a category.
+        category: String,
+    },
+    /// The loading branch of a case is no envelope.
     #[error("case \"{name}\": {source}")]
-    Envelope { name: String, source: EnvelopeError },
+    Envelope {
+        /// Name of the case.
+        name: String,
+        /// Why.
+        source: EnvelopeError,
+    },
+    /// Its states at the common interval are too few to load along.
     #[error(
         "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval"
     )]
-    NoMotion { name: String },
+    NoMotion {
+        /// Name of the case.
+        name: String,
+    },
+    /// The query does not give a parameter that the model has, or not so that it makes sense.
     #[error("the model needs {parameter}{among}: give it with the query")]
-    Asked { parameter: String, among: String },
+    Asked {
+        /// What must be given.
+        parameter: String,
+        /// The categories there are, or that a number is expected, in words.
+        among: String,
+    },
 }
 
 impl Feature {
@@ -125,7 +181,7 @@ impl Feature {
 ///
 /// # Errors
 /// [`DatasetError::Asked`] names what is missing, or the categories there are.
-pub fn feature_values(
+pub(crate) fn feature_values(
     features: &[Feature],
     parameters: &BTreeMap<String, Parameter>,
 ) -> Result<Vec<f64>, DatasetError> {
@@ -223,19 +279,19 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
 pub enum TableKind {
     /// The states at the common interval (reference method).
     Samples,
-    /// An even deflection grid from the solver's rate, no coarser than [`GRID_M`].
+    /// An even deflection grid from the solver's rate, no coarser than 2 mm.
     Grid,
 }
 
 /// Coarsest deflection grid for training: at 20 m/s one state each 0.75 ms is 15 mm, a
 /// third of the way to the first peak.
-pub const GRID_M: f64 = 2e-3;
+pub(crate) const GRID_M: f64 = 2e-3;
 
 /// Speeds within this share of each other count as one.
 const SAME_SPEED: f64 = 1e-3;
 
 /// Whether two speeds count as one.
-pub fn is_same_speed(a: f64, b: f64) -> bool {
+pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
@@ -244,13 +300,13 @@ const MOST_STEPS: f64 = 20_000.0;
 
 /// Even deflections from 0 to `end_m`, at least `fewest` steps and no coarser than [`GRID_M`]
 /// up to 40 m.
-pub fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
+pub(crate) fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
     let steps = ((end_m / GRID_M).ceil().clamp(1.0, MOST_STEPS) as usize).max(fewest);
     (0..=steps).map(|i| end_m * i as f64 / steps as f64).collect()
 }
 
 /// Index of the speed nearest to `v`; of two equally near ones the first.
-pub fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
+pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
     let closer = |best: (usize, f64), (i, s): (usize, f64)| {
         let distance = (s - v).abs();
         if distance < best.1 { (i, distance) } else { best }
@@ -324,7 +380,7 @@ impl TrainingSet {
     }
 
     /// Hash over the fingerprints of the cases.
-    pub fn hash(&self) -> String {
+    pub(crate) fn hash(&self) -> String {
         let mut hash = blake3::Hasher::new();
         for case in &self.cases {
             hash.update(case.fingerprint.as_bytes());
@@ -332,13 +388,8 @@ impl TrainingSet {
         hash.finalize().to_hex().to_string()
     }
 
-    pub fn speeds_m_per_s(&self) -> Vec<f64> {
+    pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
         self.cases.iter().map(|c| c.speed_m_per_s).collect()
-    }
-
-    /// Largest deflection of any case, in m.
-    pub fn max_deflection_m(&self) -> f64 {
-        self.cases.iter().map(|c| c.envelope.end_m()).fold(0.0, f64::max)
     }
 
     /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
@@ -348,7 +399,11 @@ impl TrainingSet {
     }
 
     /// The same table of the declared force or of the body's.
-    pub fn table_of(&self, kind: TableKind, force: ForceKind) -> Dataset<f64, f64, ndarray::Ix1> {
+    pub(crate) fn table_of(
+        &self,
+        kind: TableKind,
+        force: ForceKind,
+    ) -> Dataset<f64, f64, ndarray::Ix1> {
         let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();

@@ -20,7 +20,7 @@ pub enum Side {
 
 impl Side {
     /// Reads either generation's name, in upper or lower case.
-    pub fn parse(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         match name.trim().to_ascii_lowercase().as_str() {
             "surfa" | "slave" => Some(Self::SurfA),
             "surfb" | "master" => Some(Self::SurfB),
@@ -89,7 +89,7 @@ impl History {
 
 /// A hole in time: an interval without a state, far longer than those around it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TimeGap {
+pub(crate) struct TimeGap {
     /// Index of the state behind it.
     pub state: usize,
     /// Times of the states before and behind it.
@@ -132,7 +132,7 @@ const GAP_KNOWN: usize = 3;
 /// three holes within four intervals count as a rate. A last state off the raster and small
 /// jitter stay far below 3. Equal printed times (they have six digits) and times that go back
 /// make no interval. Files of four states or fewer have no holes.
-pub fn time_gaps(time: &[f64]) -> Vec<TimeGap> {
+pub(crate) fn time_gaps(time: &[f64]) -> Vec<TimeGap> {
     let mut intervals: Vec<(usize, f64, f64)> = Vec::new();
     let mut last: Option<f64> = None;
     for (state, &now) in time.iter().enumerate().filter(|(_, t)| t.is_finite()) {

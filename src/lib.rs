@@ -27,6 +27,8 @@
 //! The modules below stand in the order worth reading. Inside is SI; units enter at the
 //! edges ([`unit`](mod@unit)). A speed always says what it is measured against.
 
+#![deny(missing_docs, unnameable_types)]
+
 pub mod unit;
 
 pub mod history;
@@ -63,6 +65,7 @@ pub mod multibody;
 
 pub mod nsdm;
 
+#[allow(missing_docs)]
 pub mod formats;
 
 pub mod import;

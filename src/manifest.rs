@@ -12,21 +12,44 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// Why a TOML file cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ManifestError {
+    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The text is no TOML, or has a key or value that does not belong there.
     #[error("{path}: line {line}, columns {from}-{to}: {message}")]
-    Toml { path: PathBuf, line: usize, from: usize, to: usize, message: String },
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Line in the file, counted from 1.
+        line: usize,
+        /// First column of what is wrong, counted from 1.
+        from: usize,
+        /// Last column of what is wrong, counted from 1.
+        to: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// The file is wrong as a whole.
     #[error("{path}: {message}")]
-    Invalid { path: PathBuf, message: String },
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
 }
 
 /// Reads and parses the TOML file at `path`.
 ///
 /// # Errors
 /// [`ManifestError`] with the place of an unknown key, a missing key or a bad value.
-pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
+pub(crate) fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
     parse(path, &read_text(path)?)
 }
 
@@ -34,13 +57,13 @@ pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
 ///
 /// # Errors
 /// [`ManifestError::Io`] for what is no file, not UTF-8 or too large.
-pub fn read_text(path: &Path) -> Result<String, ManifestError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, ManifestError> {
     file::read_text(path, MAX_BYTES)
         .map_err(|source| ManifestError::Io { path: path.into(), source })
 }
 
 /// Parses TOML text; `path` is for messages.
-pub fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
+pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
     toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', "; ");
         match error.span() {

@@ -5,7 +5,7 @@ use csv::StringRecord;
 
 /// The rows below a header line. Separated by commas, semicolons or tabs, whichever stand in the
 /// header; lines that begin with `#` are comments.
-pub struct CsvTable<'a> {
+pub(crate) struct CsvTable<'a> {
     reader: csv::Reader<&'a [u8]>,
     header: StringRecord,
     /// Lines of the file in front of the text.
@@ -14,7 +14,7 @@ pub struct CsvTable<'a> {
 }
 
 /// One row.
-pub struct Row {
+pub(crate) struct Row {
     record: StringRecord,
     /// Line in the file, counted from 1.
     pub line: u64,
@@ -24,7 +24,7 @@ pub struct Row {
 
 /// A field that holds no number, or none that is finite.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NoNumber {
+pub(crate) struct NoNumber {
     /// Line in the file, counted from 1.
     pub line: u64,
     /// Field of the row, counted from 1.
@@ -40,7 +40,7 @@ impl<'a> CsvTable<'a> {
     ///
     /// # Errors
     /// If the header is no UTF-8.
-    pub fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
+    pub(crate) fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
         let separator = separator(text);
         let mut reader = csv::ReaderBuilder::new()
@@ -54,23 +54,23 @@ impl<'a> CsvTable<'a> {
     }
 
     /// The names of the columns.
-    pub fn header(&self) -> &StringRecord {
+    pub(crate) fn header(&self) -> &StringRecord {
         &self.header
     }
 
     /// Line of the header in the file, counted from 1.
-    pub fn header_line(&self) -> u64 {
+    pub(crate) fn header_line(&self) -> u64 {
         self.lines_before + self.header.position().map_or(1, csv::Position::line)
     }
 
     /// The header as a row, for tables that have none.
-    pub fn header_row(&self) -> Row {
+    pub(crate) fn header_row(&self) -> Row {
         let decimal_comma = self.separator != b',';
         Row { record: self.header.clone(), line: self.header_line(), decimal_comma }
     }
 
     /// The rows in their order.
-    pub fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
+    pub(crate) fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
         let before = self.lines_before;
         let decimal_comma = self.separator != b',';
         self.reader.records().map(move |record| {
@@ -83,7 +83,7 @@ impl<'a> CsvTable<'a> {
 
 impl Row {
     /// The text of a field, counted from 0; empty if there is none.
-    pub fn field(&self, field: usize) -> &str {
+    pub(crate) fn field(&self, field: usize) -> &str {
         self.record.get(field).unwrap_or_default()
     }
 
@@ -92,7 +92,7 @@ impl Row {
     ///
     /// # Errors
     /// [`NoNumber`] with its place.
-    pub fn number(&self, field: usize) -> Result<f64, NoNumber> {
+    pub(crate) fn number(&self, field: usize) -> Result<f64, NoNumber> {
         let found = self.field(field);
         let parsed = match self.decimal_comma && !found.contains('.') {
             true => found.replacen(',', ".", 1).parse::<f64>(),

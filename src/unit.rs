@@ -31,7 +31,7 @@ impl SpeedKind {
     }
 
     /// The kind of that name.
-    pub fn parse(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Wall, Self::Closing].into_iter().find(|kind| kind.name() == name)
     }
 }
@@ -39,7 +39,9 @@ impl SpeedKind {
 /// An impact speed in m/s together with what it is measured against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speed {
+    /// The speed, in m/s.
     pub m_per_s: f64,
+    /// What it is measured against.
     pub kind: SpeedKind,
 }
 
@@ -58,27 +60,73 @@ pub fn km_per_h(m_per_s: f64) -> String {
 /// Why a number with a unit was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
+    /// The text is a number by itself.
     #[error("{what} \"{text}\" has no unit: write for example {example}")]
-    NoUnit { what: &'static str, text: String, example: String },
+    NoUnit {
+        /// What kind of quantity was expected, such as "speed".
+        what: &'static str,
+        /// The text as given.
+        text: String,
+        /// The same number with a unit.
+        example: String,
+    },
+    /// The unit is none of this kind of quantity.
     #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
-    UnknownUnit { what: &'static str, text: String, unit: String, known: String },
+    UnknownUnit {
+        /// What kind of quantity was expected.
+        what: &'static str,
+        /// The text as given.
+        text: String,
+        /// Its unit.
+        unit: String,
+        /// The units that are known, as a list.
+        known: String,
+    },
+    /// The text does not begin with a number.
     #[error("{what} \"{text}\" is not a number with a unit: write for example {example}")]
-    NotANumber { what: &'static str, text: String, example: &'static str },
+    NotANumber {
+        /// What kind of quantity was expected.
+        what: &'static str,
+        /// The text as given.
+        text: String,
+        /// A text that would be right.
+        example: &'static str,
+    },
+    /// The number makes no sense for this quantity, such as a mass of 0.
     #[error("{what} \"{text}\" is out of range: it must be {range}")]
-    OutOfRange { what: &'static str, text: String, range: &'static str },
+    OutOfRange {
+        /// What kind of quantity was expected.
+        what: &'static str,
+        /// The text as given.
+        text: String,
+        /// The range it must lie in.
+        range: &'static str,
+    },
+    /// The text names no unit system.
     #[error(
         "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\""
     )]
-    UnknownSystem { text: String, lengths: String, masses: String, times: String },
+    UnknownSystem {
+        /// The text as given.
+        text: String,
+        /// Units of length that are known, as a list.
+        lengths: String,
+        /// Units of mass that are known, as a list.
+        masses: String,
+        /// Units of time that are known, as a list.
+        times: String,
+    },
 }
 
 /// One kind of quantity: its name for messages, its units with their size in SI.
 pub struct Dimension {
+    /// Name for messages, such as "speed".
     pub what: &'static str,
     example_unit: &'static str,
     units: &'static [(&'static str, f64)],
 }
 
+/// Speeds, in m/s inside.
 pub const SPEED: Dimension = Dimension {
     what: "speed",
     example_unit: "km/h",
@@ -90,19 +138,21 @@ pub const SPEED: Dimension = Dimension {
         ("mph", 0.44704),
     ],
 };
+/// Masses, in kg inside.
 pub const MASS: Dimension =
     Dimension { what: "mass", example_unit: "t", units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)] };
-pub const LENGTH: Dimension = Dimension {
+pub(crate) const LENGTH: Dimension = Dimension {
     what: "length",
     example_unit: "mm",
     units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
 };
+/// Times, in s inside.
 pub const TIME: Dimension = Dimension {
     what: "time",
     example_unit: "ms",
     units: &[("us", 1e-6), ("ms", 1e-3), ("s", 1.0)],
 };
-pub const STIFFNESS: Dimension = Dimension {
+pub(crate) const STIFFNESS: Dimension = Dimension {
     what: "stiffness",
     example_unit: "MN/m",
     units: &[
@@ -114,7 +164,7 @@ pub const STIFFNESS: Dimension = Dimension {
         ("kN/mm", 1e6),
     ],
 };
-pub const FORCE: Dimension =
+pub(crate) const FORCE: Dimension =
     Dimension { what: "force", example_unit: "kN", units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)] };
 
 impl Dimension {
@@ -166,13 +216,13 @@ impl Dimension {
     }
 
     /// The unit of that size in SI, if one has it.
-    pub fn name_of(&self, size: f64) -> Option<&'static str> {
+    pub(crate) fn name_of(&self, size: f64) -> Option<&'static str> {
         let same = |unit: f64| (unit / size - 1.0).abs() < 1e-9;
         self.units.iter().find(|(_, unit)| same(*unit)).map(|&(name, _)| name)
     }
 
     /// SI value of one `unit`, or `None` when the unit is not one of this quantity's.
-    pub fn size_of(&self, unit: &str) -> Option<f64> {
+    pub(crate) fn size_of(&self, unit: &str) -> Option<f64> {
         self.units.iter().find(|(name, _)| *name == unit).map(|&(_, size)| size)
     }
 
@@ -187,7 +237,7 @@ impl Dimension {
     }
 
     /// Like [`Dimension::parse`], but refuses values below zero.
-    pub fn parse_not_negative(&self, text: &str) -> Result<f64, UnitError> {
+    pub(crate) fn parse_not_negative(&self, text: &str) -> Result<f64, UnitError> {
         let value = self.parse(text)?;
         if value >= 0.0 {
             Ok(value)
@@ -201,7 +251,7 @@ impl Dimension {
     }
 
     /// The units of this quantity, for messages: `km/h, m/s, …`.
-    pub fn known_units(&self) -> String {
+    pub(crate) fn known_units(&self) -> String {
         names(self.units)
     }
 
@@ -232,8 +282,11 @@ fn continues_number(text: &str, i: usize, c: char) -> bool {
 /// The units in which a solver's files are written; factors turn a file's value into SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitSystem {
+    /// The files' unit of length, in m: 0.001 for mm.
     pub length_m: f64,
+    /// The files' unit of mass, in kg: 1000 for t.
     pub mass_kg: f64,
+    /// The files' unit of time, in s.
     pub time_s: f64,
 }
 
@@ -242,9 +295,9 @@ const MASSES: &[(&str, f64)] = &[("kg", 1.0), ("t", 1e3), ("Mg", 1e3), ("g", 1e-
 const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl UnitSystem {
-    pub const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
+    pub(crate) const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
     /// Systems that crash models are written in.
-    pub const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
+    pub(crate) const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
 
     /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
     pub fn parse(text: &str) -> Result<Self, UnitError> {

@@ -8,7 +8,7 @@ use crumple::curve::Masses;
 use crumple::curve::extract::{
     ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract,
 };
-use crumple::curve::recipe::{BodyMotion, Recipe};
+use crumple::curve::recipe::{Recipe, RecordedMotion};
 use crumple::history::{EntityId, History};
 use crumple::solver::{self, Selection};
 use crumple::unit::{SpeedKind, UnitSystem};
@@ -103,7 +103,7 @@ impl Run {
             velocity: Some(&self.velocity),
             minus_velocity: None,
             force: match is_body {
-                true => MeasuredForce::Body(&self.acceleration, BodyMotion::Acceleration),
+                true => MeasuredForce::Body(&self.acceleration, RecordedMotion::Acceleration),
                 false => MeasuredForce::Contact(&self.force),
             },
             contact: recipe.contact.as_ref().map(|_| &self.force),

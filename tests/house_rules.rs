@@ -30,7 +30,10 @@ const MAY_NAME: [(&str, &[&str]); 26] = [
     ("surrogate", &["dataset", "forest", "curve", "signal", "file", "unit"]),
     ("multibody", &["curve", "unit"]),
     ("nsdm", &["curve", "signal", "stream"]),
-    ("formats", &["surrogate", "dataset", "forest", "curve", "table", "signal", "file", "unit"]),
+    (
+        "formats",
+        &["surrogate", "dataset", "forest", "curve", "signal", "table", "hdf5", "file", "unit"],
+    ),
     ("import", &["formats", "database", "curve", "file", "unit"]),
     ("plan", &["stream", "unit"]),
     (

@@ -184,11 +184,14 @@ fn a_curve_of_several_is_chosen() {
     is_points(&read_bytes("a.k", two.as_bytes(), &options("101")).unwrap().0, "101");
     let error = read_bytes("a.k", two.as_bytes(), &given(Some("SI"))).unwrap_err();
     assert!(
-        error.ends_with("a.k: the file holds several curves: choose one with --curve: 101, 102"),
+        error.ends_with("a.k: the file holds several curves: choose one with --curve: 101 (\"one\"), 102 (\"two\")"),
         "{error}"
     );
     let error = read_bytes("a.k", two.as_bytes(), &options("7")).unwrap_err();
-    assert!(error.ends_with("the file has no curve \"7\": it has 101, 102"), "{error}");
+    assert!(
+        error.ends_with("the file has no curve \"7\": it has 101 (\"one\"), 102 (\"two\")"),
+        "{error}"
+    );
 
     let values = rows(1.0, 1.0, " ", ".");
     let two = format!("#1\ndouble a(5,2) # d [m], F [N]\n{values}double b(5,2)\n{values}");

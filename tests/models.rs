@@ -11,7 +11,7 @@ use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::forest::ForestOptions;
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{At, Model, ModelKind, PredictedCurve, Query, predict};
+use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, QueryPoint, predict};
 use crumple::unit::{Speed, SpeedKind};
 use serde_json::Value;
 
@@ -275,7 +275,7 @@ fn forests_at_a_midpoint() {
     let step = |options: ModelKind| {
         let model = Model::fit(&set, options).unwrap();
         let at = |km_per_h: f64| {
-            let at = At {
+            let at = QueryPoint {
                 speed_m_per_s: km_per_h / 3.6,
                 features: &[],
                 mass_kg: 24e3,

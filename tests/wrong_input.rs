@@ -263,12 +263,9 @@ fn files_that_are_not_ours() {
         &["predict", "curves.h5", "--speed", "50km/h"],
         "curves.h5: line 1, column 1: this is no model file",
     );
-    t(here, &["export", "m.model", "--to", "csv"], "m.model: this is no predicted curve");
-    t(
-        here,
-        &["export", "curves.h5", "--to", "onnx"],
-        "curves.h5: line 1, column 1: this is no model",
-    );
+    t(here, &["export", "m.model", "--to", "json", "--speed", "500km/h"], "with --extrapolate");
+    let error = crumple_fails(here, 2, &["export", "curves.h5", "--to", "onnx"]);
+    assert!(error.contains("onnx takes a model: crumple train"), "{error}");
     t(
         here,
         &["export", "m.model", "--to", "onnx"],
@@ -317,13 +314,13 @@ fn command_lines() {
     t(&["predict", "m", "--speed", "36km/h", "--mass", "24"], "mass \"24\" has no unit");
     t(
         &["predict", "m", "--speed", "36km/h", "-o", "a.xyz"],
-        "use one of .json, .csv, .k, .key, .dyn, .onnx",
+        "use one of .json, .csv, .k, .key, .dyn, .rad, .inp, .cmd, .adm, .spr",
     );
     t(
         &["export", "m", "--to", "xyz"],
-        "there is no export format \"xyz\": use one of json, csv, lsdyna, onnx",
+        "there is no export format \"xyz\": use one of json, csv, lsdyna, radioss, calculix, adams",
     );
-    t(&["export", "m"], "name the format with --to (json, csv, lsdyna, onnx)");
+    t(&["export", "m"], "name the format with --to (json, csv, lsdyna, radioss, ");
     t(&["histories", "f", "--id", "x"], "\"x\" is not an id: write for example 900001 or 3:surfa");
     t(&["histories", "f", "-o", "a.parquet"], "histories are written as .csv, .h5 or .hdf5");
     t(&["train", "d", "--group", "g", "-o", "m", "--paper", "--trees", "3"], "cannot be used with");

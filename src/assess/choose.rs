@@ -22,7 +22,7 @@ const TIE: f64 = 0.10;
 /// force and in velocity error, those within 10 % of the smallest force error tie, and the
 /// simplest of them is taken. If none keeps to all baselines, the one whose worst ratio to
 /// them is smallest.
-pub fn choose(means: &[Means]) -> Option<(String, String)> {
+pub(crate) fn choose(means: &[Means]) -> Option<(String, String)> {
     let entry = |m: &Means| MODELS.iter().find(|entry| entry.name == m.model);
     let baselines = || means.iter().filter(|m| entry(m).is_some_and(|e| e.baseline));
     let least = |of: fn(&Means) -> f64| baselines().map(of).fold(f64::INFINITY, f64::min);
@@ -54,12 +54,14 @@ pub fn choose(means: &[Means]) -> Option<(String, String)> {
 /// The speed whose FE run would help most.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NextRun {
+    /// The speed to run, in m/s.
     pub speed_m_per_s: f64,
     /// Training speeds that it lies between.
     pub between_m_per_s: (f64, f64),
     /// Force error expected there now, from the errors at the speeds that were left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_force_l1: Option<f64>,
+    /// Why this one, in a sentence.
     pub reason: String,
 }
 

@@ -9,7 +9,7 @@ use super::left_out::LeftOutCase;
 use super::methods;
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
-use super::settings::Settings;
+use super::settings::ComparisonSettings;
 use crate::curve::Case;
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::nsdm::{self, Identifiability, Start};
@@ -18,9 +18,13 @@ use crate::unit::{SpeedKind, km_per_h};
 /// Errors of every method at one left-out speed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
+    /// Name of the group.
     pub group: String,
+    /// Name of the case that is left out.
     pub case: String,
+    /// Its speed, in m/s.
     pub speed_m_per_s: f64,
+    /// What that speed is measured against.
     pub speed_kind: SpeedKind,
     /// Whether the other cases lie on both sides of the speed.
     pub inner: bool,
@@ -28,22 +32,29 @@ pub struct Comparison {
     pub mass_kg: f64,
     /// From contact to 30 ms after FE's largest deflection, as far as the record reaches.
     pub window_s: f64,
+    /// Largest force of FE's record, in N.
     #[serde(rename = "reference_peak_force_N")]
     pub reference_peak_force_n: f64,
+    /// Largest deflection of FE's record, in m.
     pub reference_max_crush_m: f64,
     /// Time by the clock that FE took for this run, in s; null where its case file is missing.
     pub fe_time_s: Option<f64>,
     /// The same of the runs that the curves were made from.
     pub training_time_s: Option<f64>,
+    /// One row per method.
     pub rows: Vec<Row>,
+    /// What the fits of the spring and damper are worth; null if none was made.
     pub nsdm: Option<NsdmReport>,
 }
 
 /// What the fits of the spring and damper are worth.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NsdmReport {
+    /// Name of the case that they are fitted to.
     pub fitted_to: String,
+    /// Its speed, in m/s.
     pub fitted_at_m_per_s: f64,
+    /// What the search begins with.
     pub start: String,
     /// Of each seed: errors at the speed it was fitted at, and here.
     pub fits: Vec<NsdmFit>,
@@ -55,11 +66,17 @@ pub struct NsdmReport {
 /// One fit of the spring and damper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NsdmFit {
+    /// Seed of its random draws.
     pub seed: u64,
+    /// Ratio of the errors of the velocity at the speed it was fitted at.
     pub own_velocity_l1: f64,
+    /// The same of the acceleration.
     pub own_acceleration_l1: f64,
+    /// Ratio of the errors of the velocity at the speed that is left out.
     pub velocity_l1: f64,
+    /// The same of the acceleration.
     pub acceleration_l1: f64,
+    /// Time the fit took, in s.
     pub fit_time_s: f64,
 }
 
@@ -89,7 +106,7 @@ pub fn compare(
     group: &str,
     cases: &[Case],
     speed_m_per_s: f64,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
     let near = |v: f64| is_same_speed(v, speed_m_per_s);
@@ -169,7 +186,7 @@ fn fixed_case<'a>(
     group: &str,
     rest: &'a TrainingSet,
     left_out_m_per_s: f64,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<&'a TrainingCase, CompareError> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
         let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
@@ -187,7 +204,7 @@ fn nsdm_report(
     fitted: &methods::FittedNsdm,
     fixed: &Case,
     reference: &Reference,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<NsdmReport, CompareError> {
     let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, CompareError> {
         let motion = fit.model.run(at.mass_kg(), at.speed_m_per_s(), at.time_s())?;

@@ -17,16 +17,22 @@ use crate::surrogate::predict::PredictError;
 /// Why there is no validation or no model.
 #[derive(Debug, thiserror::Error)]
 pub enum ValidateError {
+    /// The cases are no training set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// A model cannot be fitted.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A model gives no curve.
     #[error(transparent)]
     Predict(#[from] PredictError),
+    /// A motion cannot be compared.
     #[error(transparent)]
     Motion(#[from] MotionError),
+    /// No model can be fitted without this speed; the text says why.
     #[error("without this speed: {0}")]
     NotFitted(String),
+    /// An error against FE is no finite number.
     #[error("its errors against FE are no finite numbers")]
     NotFinite,
 }
@@ -60,22 +66,47 @@ pub enum NotLeftOut {
 /// Why there is no comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
+    /// The group has no case at the speed that is asked for.
     #[error("group \"{group}\" has no case at {asked}: it has {known}")]
-    NoCase { group: String, asked: String, known: String },
+    NoCase {
+        /// Name of the group.
+        group: String,
+        /// The speed, as text.
+        asked: String,
+        /// The speeds it has, as a list.
+        known: String,
+    },
+    /// Too few cases would remain.
     #[error("leaving out one of {cases} cases leaves too few: a comparison needs at least 3")]
-    TooFew { cases: usize },
+    TooFew {
+        /// How many cases there are.
+        cases: usize,
+    },
+    /// The record of the case ended while loading.
     #[error("case \"{case}\" ended while loading: it is no reference; compare at another speed")]
-    Truncated { case: String },
+    Truncated {
+        /// Name of the case.
+        case: String,
+    },
+    /// The fixed curve of FDRM is that of the speed that is left out.
     #[error("the fixed curve is that of {asked}, the speed that is left out: choose another one")]
-    FixedIsLeftOut { asked: String },
+    FixedIsLeftOut {
+        /// The speed, as text.
+        asked: String,
+    },
+    /// The models cannot be validated.
     #[error(transparent)]
     Validate(#[from] ValidateError),
+    /// No spring and damper can be fitted.
     #[error(transparent)]
     Nsdm(#[from] NsdmError),
+    /// The signals cannot be compared.
     #[error(transparent)]
     Signal(#[from] SignalError),
+    /// The train cannot be compared.
     #[error(transparent)]
     Train(#[from] TrainError),
+    /// The case cannot be left out.
     #[error(transparent)]
     NotLeftOut(#[from] NotLeftOut),
 }
@@ -107,34 +138,87 @@ impl From<SimulationError> for CompareError {
 /// Why a train cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
+    /// A curve of the scenario does not come from a database.
     #[error(
         "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\""
     )]
-    NotACase { curve: String },
+    NotACase {
+        /// Its name in the scenario.
+        curve: String,
+    },
+    /// `[reference]` names a vehicle that the scenario does not have.
     #[error("the scenario has no vehicle \"{name}\": its vehicles are {known}")]
-    NoVehicle { name: String, known: String },
+    NoVehicle {
+        /// The name.
+        name: String,
+        /// The scenario's vehicles, as a list.
+        known: String,
+    },
+    /// FE's record is too short.
     #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
-    TooShort { states: usize, until_s: f64 },
+    TooShort {
+        /// Number of its states.
+        states: usize,
+        /// End of the comparison that is asked for, in s.
+        until_s: f64,
+    },
+    /// The multi-body run ends before what it is compared with.
     #[error(
         "{path}: the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
     )]
-    RunTooShort { path: PathBuf, duration_s: f64, until_s: f64 },
+    RunTooShort {
+        /// The scenario.
+        path: PathBuf,
+        /// End of the run, in s.
+        duration_s: f64,
+        /// End of the comparison, in s.
+        until_s: f64,
+    },
+    /// `[reference]` names no node of any vehicle.
     #[error("{path}: [reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
-    NoNodes { path: PathBuf },
+    NoNodes {
+        /// The scenario.
+        path: PathBuf,
+    },
+    /// FE's vehicle begins at another speed than the scenario's.
     #[error(
         "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
     )]
-    OtherSpeed { path: PathBuf, vehicle: String, fe_m_per_s: f64, m_per_s: f64 },
+    OtherSpeed {
+        /// The scenario.
+        path: PathBuf,
+        /// Name of the vehicle.
+        vehicle: String,
+        /// Speed in FE's record, in m/s.
+        fe_m_per_s: f64,
+        /// Speed in the scenario, in m/s.
+        m_per_s: f64,
+    },
+    /// The scenario names no FE run.
     #[error("{path}: the scenario has no [reference]: add one that names FE's run of the train")]
-    NoReference { path: PathBuf },
+    NoReference {
+        /// The scenario.
+        path: PathBuf,
+    },
+    /// FE's record lacks a history, or part of it.
     #[error(
         "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
     )]
-    NoHistory { path: PathBuf, node: i64, component: String },
+    NoHistory {
+        /// The record.
+        path: PathBuf,
+        /// Number of the node.
+        node: i64,
+        /// Name of the component.
+        component: String,
+    },
+    /// FE's record cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// The scenario cannot be run.
     #[error(transparent)]
     Scenario(#[from] Box<ScenarioError>),
+    /// The database cannot be read.
     #[error(transparent)]
     Database(#[from] DatabaseError),
 }

@@ -20,7 +20,7 @@ use crate::unit::km_per_h;
 const STEPS: usize = 400;
 
 /// What to ask a model of this group's so that it predicts the case.
-pub fn query_of(case: &Case, model: &Model) -> Query {
+pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
     let mut parameters = case.parameters.clone();
     // What all training cases share is no parameter of the model.
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
@@ -37,7 +37,7 @@ pub fn query_of(case: &Case, model: &Model) -> Query {
 }
 
 /// A case that is left out, and what is left.
-pub struct LeftOutCase<'a> {
+pub(crate) struct LeftOutCase<'a> {
     /// As the training set has it.
     pub own: &'a TrainingCase,
     /// As the database has it.
@@ -57,7 +57,11 @@ impl<'a> LeftOutCase<'a> {
     ///
     /// # Errors
     /// [`NotLeftOut`] if it cannot be compared with.
-    pub fn new(set: &'a TrainingSet, cases: &'a [Case], index: usize) -> Result<Self, NotLeftOut> {
+    pub(crate) fn new(
+        set: &'a TrainingSet,
+        cases: &'a [Case],
+        index: usize,
+    ) -> Result<Self, NotLeftOut> {
         let own = &set.cases[index];
         let case = cases
             .iter()
@@ -92,7 +96,7 @@ impl<'a> LeftOutCase<'a> {
     ///
     /// # Errors
     /// [`MotionError`] if a curve makes no run.
-    pub fn floors(&self) -> Result<Vec<Floor>, MotionError> {
+    pub(crate) fn floors(&self) -> Result<Vec<Floor>, MotionError> {
         let floor = |(kind, curve): (ForceKind, DrivingCurve)| {
             let errors = self.reference.errors_with(&curve)?;
             Ok(Floor {
@@ -222,25 +226,25 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    pub fn left_out(&self) -> LeftOutSpeeds {
+    pub(crate) fn left_out(&self) -> LeftOutSpeeds {
         LeftOutSpeeds::of(self.inner)
     }
 
-    pub fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
+    pub(crate) fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
         Some(self.judged(rule)?.residuals.clone())
     }
 
-    pub fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {
+    pub(crate) fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {
         self.predictions.get(&rule)?.as_ref().ok()
     }
 
     /// Why there is no row.
-    pub fn failure(&self, rule: MaxCrushRule) -> Option<String> {
+    pub(crate) fn failure(&self, rule: MaxCrushRule) -> Option<String> {
         let error = self.predictions.get(&rule)?.as_ref().err()?;
         Some(format!("{} at {}: no row: {error}", self.model, km_per_h(self.speed_m_per_s)))
     }
 
-    pub fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
+    pub(crate) fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
         let by_rule = self.judged(rule)?;
         let crush = |rule| Some((rule, self.judged(rule)?.max_crush_error));
         Some(LeftOut {

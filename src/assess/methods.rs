@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::error::CompareError;
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
-use super::settings::Settings;
+use super::settings::ComparisonSettings;
 use super::validate::{Choice, train};
 use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
@@ -95,14 +95,17 @@ pub(super) struct FittedNsdm {
 
 impl FittedNsdm {
     /// The fit with the least objective, as one who knows nothing of the new speed would choose.
-    pub fn best(&self) -> &nsdm::Fit {
+    pub(crate) fn best(&self) -> &nsdm::Fit {
         let fits = self.fits.iter().map(|(fit, _)| fit);
         fits.min_by(|a, b| a.objective.total_cmp(&b.objective)).expect("at least one seed")
     }
 }
 
 /// Fits the spring and damper with every seed of the settings.
-pub(super) fn fit_nsdm(fixed: &Case, settings: &Settings) -> Result<FittedNsdm, CompareError> {
+pub(super) fn fit_nsdm(
+    fixed: &Case,
+    settings: &ComparisonSettings,
+) -> Result<FittedNsdm, CompareError> {
     let reference = Reference::of(fixed)?;
     let target = nsdm_target(&reference)?;
     let choices = nsdm::FitSettings { start: settings.nsdm_start, ..nsdm::FitSettings::default() };

@@ -4,13 +4,13 @@
 pub mod choose;
 pub mod compare;
 pub mod error;
-pub mod left_out;
+pub(crate) mod left_out;
 mod methods;
 pub mod reference;
 mod row;
-pub mod settings;
+pub(crate) mod settings;
 pub mod train;
 pub mod validate;
 
 pub use row::Row;
-pub use settings::Settings;
+pub use settings::ComparisonSettings;

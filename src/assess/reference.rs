@@ -37,14 +37,27 @@ pub struct Reference {
 /// Why a motion cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
+    /// Too few states lie in the window of the comparison.
     #[error("case \"{case}\": only {states} states lie in the window: at least 3 are needed")]
-    TooShort { case: String, states: usize },
+    TooShort {
+        /// Name of the case.
+        case: String,
+        /// How many do.
+        states: usize,
+    },
+    /// An error against FE is no finite number.
     #[error("its errors against FE are no finite numbers")]
     NotFinite,
+    /// The multi-body run ends within the window.
     #[error("case \"{case}\": the multi-body run is shorter than the window")]
-    RunTooShort { case: String },
+    RunTooShort {
+        /// Name of the case.
+        case: String,
+    },
+    /// The one-mass model is no chain.
     #[error(transparent)]
     Chain(#[from] ChainError),
+    /// The run of the one-mass model failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
 }
@@ -53,6 +66,7 @@ pub enum MotionError {
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionErrors {
+    /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
     /// CFC 60 on both sides.
     pub acceleration_l1: f64,
@@ -86,7 +100,7 @@ impl Reference {
     }
 
     /// Length of the window in s.
-    pub fn window_s(&self) -> f64 {
+    pub(crate) fn window_s(&self) -> f64 {
         self.time_s[self.inside - 1]
     }
 
@@ -109,7 +123,7 @@ impl Reference {
     ///
     /// # Errors
     /// [`MotionError`] if the curve makes no run, or one whose errors are no finite numbers.
-    pub fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, MotionError> {
+    pub(crate) fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, MotionError> {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
         let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];
@@ -120,36 +134,36 @@ impl Reference {
     }
 
     /// Times of the states that are compared and a little more, in s.
-    pub fn time_s(&self) -> &[f64] {
+    pub(crate) fn time_s(&self) -> &[f64] {
         &self.time_s
     }
 
     /// States inside the window of the comparison.
-    pub fn inside(&self) -> usize {
+    pub(crate) fn inside(&self) -> usize {
         self.inside
     }
 
     /// FE's closing speed at [`time_s`](Self::time_s), in m/s.
-    pub fn velocity(&self) -> &[f64] {
+    pub(crate) fn velocity(&self) -> &[f64] {
         &self.velocity
     }
 
     /// Its central differences, in m/s².
-    pub fn acceleration(&self) -> &[f64] {
+    pub(crate) fn acceleration(&self) -> &[f64] {
         &self.acceleration
     }
 
-    pub fn mass_kg(&self) -> f64 {
+    pub(crate) fn mass_kg(&self) -> f64 {
         self.mass_kg
     }
 
-    pub fn speed_m_per_s(&self) -> f64 {
+    pub(crate) fn speed_m_per_s(&self) -> f64 {
         self.speed_m_per_s
     }
 
     /// FE's and another motion's accelerations inside the window, CFC 60, from speeds at
     /// [`time_s`](Self::time_s).
-    pub fn filtered_accelerations(&self, velocity: &[f64]) -> (&[f64], Vec<f64>) {
+    pub(crate) fn filtered_accelerations(&self, velocity: &[f64]) -> (&[f64], Vec<f64>) {
         let mut smooth = filtered(&self.time_s, derivative(&self.time_s, velocity));
         smooth.truncate(self.inside);
         (&self.acceleration_filtered[..self.inside], smooth)
@@ -159,7 +173,7 @@ impl Reference {
     ///
     /// # Errors
     /// [`MotionError::RunTooShort`] if the run ends before the window.
-    pub fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, MotionError> {
+    pub(crate) fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, MotionError> {
         interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s)
             .map_err(|_| MotionError::RunTooShort { case: self.case.clone() })
     }
@@ -173,7 +187,7 @@ impl Reference {
     }
 
     /// Errors of speeds at [`time_s`](Self::time_s).
-    pub fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
+    pub(crate) fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
         let acceleration = derivative(&self.time_s, velocity);
         let smooth = filtered(&self.time_s, acceleration.clone());
         let inside =

@@ -9,7 +9,7 @@ use crate::curve::ForceKind;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::rating::{Quantity, Rating, Settings, Signal, rate};
+use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
 
 /// One method.
@@ -23,6 +23,7 @@ pub struct Row {
     pub driven_by: Option<ForceKind>,
     /// What its curve was made from.
     pub curve: String,
+    /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
     /// Accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
@@ -31,8 +32,10 @@ pub struct Row {
     /// Force of the method's curve along FE's crush, of the same kind of force; null for a
     /// spring and damper.
     pub force_l1: Option<f64>,
+    /// Largest force at the interface, in N; of a spring and damper mass times deceleration.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
+    /// Largest deflection of the run, in m.
     pub max_crush_m: f64,
     /// Time to fit, from the training cases on.
     pub fit_time_s: f64,
@@ -70,7 +73,7 @@ struct Motion<'a> {
 
 impl RowBuilder<'_> {
     /// The row of a method with a curve.
-    pub fn row(&self, method: Method) -> Result<Row, CompareError> {
+    pub(crate) fn row(&self, method: Method) -> Result<Row, CompareError> {
         let Method { name, made_from, curve, forces: (truth, ours), times } = method;
         let start = Instant::now();
         let run = self.reference.run(&curve)?;
@@ -89,7 +92,7 @@ impl RowBuilder<'_> {
     }
 
     /// The row of a spring and damper.
-    pub fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
+    pub(crate) fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
         let reference = self.reference;
         let start = Instant::now();
         let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
@@ -125,7 +128,7 @@ impl RowBuilder<'_> {
         let rated = |fe: &[f64], ours: &[f64], quantity| -> Result<Rating, CompareError> {
             let time_s = &reference.time_s()[..inside];
             let signal = |name, values: &[f64]| Signal::new(name, time_s.to_vec(), values.to_vec());
-            let settings = Settings { quantity, ..Settings::default() };
+            let settings = RatingSettings { quantity, ..RatingSettings::default() };
             Ok(rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)?)
         };
         let own_s = times.predict_s + simulation_s;

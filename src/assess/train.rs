@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::error::{CompareError, TrainError};
 use super::methods::{ddtcm_model, fit_nsdm};
-use super::settings::Settings;
+use super::settings::ComparisonSettings;
 use super::validate::{self, Choice};
 use crate::curve::body::filtered;
 use crate::curve::{Case, DrivingCurve};
@@ -19,7 +19,8 @@ use crate::file;
 use crate::history::EntityId;
 use crate::multibody::simulate;
 use crate::scenario::{
-    self, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario, Source, Sources,
+    self, CurveSource, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
+    Sources,
 };
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
@@ -28,7 +29,7 @@ use crate::solver::{self, Selection, WantedId};
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FeTrain {
+pub(crate) struct FeTrain {
     pub time_s: Vec<f64>,
     /// Vehicle, as the scenario names it, and its speed in m/s at each time.
     pub velocities: Vec<(String, Vec<f64>)>,
@@ -41,7 +42,7 @@ impl FeTrain {
     ///
     /// # Errors
     /// [`TrainError`] names the file, node or component.
-    pub fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
+    pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(&reference.file);
         let selection = Selection {
@@ -89,10 +90,13 @@ impl FeTrain {
 pub struct TrainComparison {
     /// Compared from 0 to here.
     pub until_s: f64,
+    /// Times of the comparison, in s.
     pub time_s: Vec<f64>,
     /// FE's speeds in m/s.
     pub fe: BTreeMap<String, Vec<f64>>,
+    /// Time by the clock that FE took for the train, in s, if the run's folder tells.
     pub fe_time_s: Option<f64>,
+    /// One row per method.
     pub rows: Vec<TrainRow>,
 }
 
@@ -107,13 +111,17 @@ pub struct TrainRow {
     pub driven_by: String,
     /// Means over the vehicles of the two below.
     pub mean_velocity_l1: f64,
+    /// Of the acceleration, filtered with CFC 60.
     pub mean_acceleration_l1: f64,
+    /// Errors of each vehicle.
     pub vehicles: Vec<VehicleErrors>,
     /// Speed each interface's curve is for, in m/s; null where no speed belongs to it.
     pub interface_speeds_m_per_s: BTreeMap<String, Option<f64>>,
+    /// Time to fit, in s.
     pub fit_time_s: f64,
     /// Curves and run.
     pub simulation_time_s: f64,
+    /// What a user should know about its curves.
     pub warnings: Vec<String>,
     /// Speeds in m/s at the times of the comparison.
     pub velocities: BTreeMap<String, Vec<f64>>,
@@ -122,7 +130,9 @@ pub struct TrainRow {
 /// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct VehicleErrors {
+    /// Name of the vehicle.
     pub vehicle: String,
+    /// Of the velocity.
     pub velocity_l1: f64,
     /// CFC 60 on both sides.
     pub acceleration_l1: f64,
@@ -148,7 +158,7 @@ struct Method<'a> {
 pub fn compare_train(
     path: &Path,
     scenario: &Scenario,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<TrainComparison, CompareError> {
     let reference =
         scenario.reference.as_ref().ok_or_else(|| TrainError::NoReference { path: path.into() })?;
@@ -210,7 +220,7 @@ fn methods<'a>(
     path: &Path,
     scenario: &Scenario,
     sources: &Sources,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<Vec<Method<'a>>, CompareError> {
     let groups = groups(path, scenario)?;
     // Every curve with the body's force, or with the recipe's.
@@ -244,7 +254,7 @@ fn methods<'a>(
     for (name, (case, cases)) in &groups {
         // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
         let model = ddtcm_model(&TrainingSet::new(&case.group, cases)?, settings.seed)?;
-        forests.replace(name, Source::Model(Box::new(model)));
+        forests.replace(name, CurveSource::Model(Box::new(model)));
     }
     let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
@@ -255,7 +265,7 @@ fn methods<'a>(
     for (name, (case, cases)) in &groups {
         let choice = Choice::Auto { seed: settings.seed, trees: None };
         let model = validate::train(&case.group, cases, choice)?;
-        best.replace(name, Source::Model(Box::new(model)));
+        best.replace(name, CurveSource::Model(Box::new(model)));
     }
     let fit_s = start.elapsed().as_secs_f64();
     for (name, speed) in
@@ -273,7 +283,7 @@ fn with_nsdm(
     scenario: &Scenario,
     sources: &Sources,
     groups: &BTreeMap<String, (Case, Vec<Case>)>,
-    settings: &Settings,
+    settings: &ComparisonSettings,
 ) -> Result<(Scenario, Sources), CompareError> {
     let (mut changed, mut springs) = (scenario.clone(), sources.clone());
     for (name, (case, _)) in groups {
@@ -287,7 +297,7 @@ fn with_nsdm(
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
         });
         let curve = DrivingCurve::of_body(fit.model.envelope()?);
-        springs.replace(name, Source::Curve(Box::new(curve)));
+        springs.replace(name, CurveSource::Curve(Box::new(curve)));
     }
     Ok((changed, springs))
 }

@@ -33,15 +33,20 @@ pub struct Report {
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum GroupReport {
+    /// The table of a group.
     Validated {
+        /// Every model at every speed that was left out.
         #[serde(flatten)]
         validation: Box<Validation>,
         /// Absent if it was not asked for, or if there is no gap to run in.
         #[serde(skip_serializing_if = "Option::is_none")]
         next_run: Option<NextRun>,
     },
+    /// There is no table.
     Failed {
+        /// Name of the group.
         group: String,
+        /// Why, in a sentence.
         error: String,
     },
 }
@@ -283,7 +288,9 @@ pub fn add_nested(
             let predictions = train(&group, &others, Choice::Auto { seed, trees: None })
                 .and_then(|model| {
                     let curve = predict(&model, &query_of(held.case, &model))?;
-                    Ok((curve.provenance.max_crush_rule, held.judged(curve)?))
+                    let rule = curve.provenance.max_crush_rule;
+                    let rule = rule.expect("a prediction says its rule");
+                    Ok((rule, held.judged(curve)?))
                 })
                 .map_or_else(
                     |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::assess::compare::{self, Comparison, NsdmReport};
 use crumple::assess::train::{TrainComparison, compare_train};
-use crumple::assess::{Row, Settings};
+use crumple::assess::{ComparisonSettings, Row};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::nsdm::Start;
@@ -93,7 +93,7 @@ struct Mean {
 }
 
 pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let settings = Settings {
+    let settings = ComparisonSettings {
         seed: args.seed,
         fixed_speed_m_per_s: args.fixed_speed,
         nsdm_seeds: args.nsdm_seeds,
@@ -305,7 +305,7 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
 }
 
 /// `compare --train`.
-fn train(path: &Path, settings: &Settings, options: GlobalOptions) -> CommandResult {
+fn train(path: &Path, settings: &ComparisonSettings, options: GlobalOptions) -> CommandResult {
     let scenario = scenario::read(path)?;
     let bar = Bar::new(options, "comparing in the train");
     let comparison = compare_train(path, &scenario, settings)?;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::curve::{Case, Parameter, Source};
+use crumple::curve::{Case, Parameter, SourceFile};
 use crumple::database::Database;
 use crumple::database::check::{self, Checked};
 use crumple::dataset::of_one_kind;
@@ -165,7 +165,7 @@ struct FullCase<'a> {
     closing_speed_m_per_s: &'a [f64],
     original: Columns<'a>,
     recipe: serde_json::Value,
-    sources: &'a [Source],
+    sources: &'a [SourceFile],
     fingerprint: &'a str,
 }
 

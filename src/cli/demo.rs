@@ -6,14 +6,15 @@ use std::time::Instant;
 
 use crumple::assess::validate::{train_chosen, validate};
 use crumple::build::{self, RunOutcome};
-use crumple::curve::{Case, ForceKind};
+use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::file::{WriteError, write_at, write_whole};
-use crumple::formats;
+use crumple::formats::{self, ExportInput};
 use crumple::multibody::{Run, simulate};
 use crumple::scenario;
 use crumple::surrogate::leave_one_out::Validation;
-use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
+use crumple::surrogate::predict::predict_beyond;
+use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crumple::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
@@ -195,19 +196,16 @@ impl Flow<'_> {
     }
 
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
-        let curve = predict(model, &Query::at(SPEED_M_PER_S))?;
+        let (curve, beyond) = predict_beyond(model, &Query::at(SPEED_M_PER_S))?;
+        let input = [ExportInput { curve, beyond: Some(beyond) }];
         for name in ["lead50.json", "lead50.csv", "lead50.k"] {
             let path = self.path(name);
             let format = formats::by_extension(&path)?;
-            let bytes = match format.holds_both_forces() {
-                true => format.encode(&curve, &formats::Options::default())?,
-                false => {
-                    let body = curve.of_force(ForceKind::Body)?;
-                    format.encode(&body, &formats::Options::default())?
-                }
-            };
-            write_whole(&path, &bytes)?;
+            for (_, bytes) in format.export(&input, &formats::Options::default())?.files {
+                write_whole(&path, &bytes)?;
+            }
         }
+        let [ExportInput { curve, .. }] = input;
         Ok(curve)
     }
 

@@ -1,42 +1,74 @@
-//! `crumple export`: one curve or model as a file for another tool.
+//! `crumple export`: curves, models and recorded cases as files for other tools.
 
 use std::path::{Path, PathBuf};
 
 use crumple::curve::ForceKind;
-use crumple::file::write_whole;
-use crumple::formats::{self, ExportError, FORMATS, Format, Options};
+use crumple::formats::{self, ExportError, Exported, FORMATS, Format, Material, Options, Tail};
+use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::PredictError;
-use crumple::surrogate::{Model, PredictedCurve};
 use crumple::unit::UnitSystem;
 use serde::Serialize;
 
-use super::arguments::one_of;
+use super::arguments::{self, MAX_CRUSH_RULES, one_of};
+use super::export_input::{Chosen, Input};
+use super::export_output::Destination;
 use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
 
-/// Write a predicted curve, or a forest model, for another tool
+/// Write curves, recorded cases or a model for another tool
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
   crumple export lead50.json --to csv
-  crumple export lead50.json --to lsdyna --force contact -o lead50-wall.k
+  crumple export lead.model --speed 36km/h,50km/h --to modelica -o lead.mo
+  crumple export curves.h5 --group lead-car-wall --to lsdyna -o lead-car-wall.k
+  crumple export lead.model --to table -o lead-table.h5
   crumple export ddtcm.model --to onnx -o ddtcm.onnx
   crumple export --list
+
+Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model tells them,
+else at the level of the curve's last tenth to 1.5 times the maximal crush, and then rising with the
+unloading stiffness. --tail changes that.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
 parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
 pub struct Args {
-    /// Predicted curve (JSON made by crumple predict); for onnx a model (made by crumple train)
+    /// Predicted curve (JSON of crumple predict), model (of crumple train) or curve database
     #[arg(required_unless_present = "list")]
     input: Option<PathBuf>,
     /// List the formats
     #[arg(long)]
     list: bool,
-    /// File to write (default: standard output)
+    /// File to write, or folder for several (default: standard output)
     #[arg(short, long)]
     output: Option<PathBuf>,
     #[command(flatten)]
+    which: Which,
+    #[command(flatten)]
     target: Target,
+}
+
+/// Which curves of a model or database.
+#[derive(clap::Args)]
+struct Which {
+    /// Speeds of a model's curves, or of a database's cases, with units; repeated or after commas
+    #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
+    speed: Vec<f64>,
+    /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
+    #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
+    mass: Option<f64>,
+    /// Rule for a model's maximal crush [default: the model's own]
+    #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
+    max_crush: Option<MaxCrushRule>,
+    /// Answer further outside a model's training speeds than a third of their range
+    #[arg(long)]
+    extrapolate: bool,
+    /// Group of a database (default: the only one)
+    #[arg(long)]
+    group: Option<String>,
+    /// Case of the group (default: all); may be repeated
+    #[arg(long)]
+    case: Vec<String>,
 }
 
 /// The target's format and what it leaves open.
@@ -45,19 +77,31 @@ pub struct Target {
     /// Format, if not told by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
-    /// Units of the file, such as mm-t-s (default: LS-DYNA the study's, csv SI)
+    /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
     /// Which force [default: body; a JSON file of crumple predict holds both]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
-    /// Number of the curve in the target's deck
-    #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_999))]
+    /// Number of the first curve in the target's deck
+    #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
     curve_id: u32,
+    /// What the curve does beyond the maximal crush [default: bottom for multi-body tools]
+    #[arg(long, value_parser = one_of(TAILS))]
+    tail: Option<Tail>,
+    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy
+    #[arg(long)]
+    soften: bool,
+    /// Spring material of LS-DYNA [default: s08]
+    #[arg(long, value_parser = one_of(MATERIALS))]
+    material: Option<Material>,
+    /// Write a complete input of one mass on the spring (lsdyna, radioss, calculix)
+    #[arg(long)]
+    deck: bool,
 }
 
 /// Forces of a curve.
-const FORCES: &[(&str, ForceKind, &str)] = &[
+pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
     ("body", ForceKind::Body, "The force that moves a body of one mass"),
     (
         "contact",
@@ -66,7 +110,25 @@ const FORCES: &[(&str, ForceKind, &str)] = &[
     ),
 ];
 
-fn units(text: &str) -> Result<UnitSystem, String> {
+/// What a curve does beyond its maximal crush.
+const TAILS: &[(&str, Tail, &str)] = &[
+    ("none", Tail::None, "Nothing: the last point is the maximal crush"),
+    ("hold", Tail::Hold, "Goes on along faster runs, or at the level of its last tenth"),
+    ("bottom", Tail::Bottom, "The same, and then rises with the unloading stiffness"),
+];
+
+/// Spring materials of LS-DYNA.
+const MATERIALS: &[(&str, Material, &str)] = &[
+    ("s08", Material::S08, "*MAT_SPRING_INELASTIC: unloads with KU, at least the steepest rise"),
+    (
+        "mat121",
+        Material::Mat121,
+        "Discrete beam of one degree of freedom: unloads with its own stiffness",
+    ),
+    ("s06", Material::S06, "*MAT_SPRING_GENERAL_NONLINEAR: unloads along a curve"),
+];
+
+pub(super) fn units(text: &str) -> Result<UnitSystem, String> {
     UnitSystem::parse(text).map_err(|e| e.to_string())
 }
 
@@ -77,41 +139,125 @@ impl Target {
             (Some(name), _) => formats::by_name(name),
             (None, Some(path)) => formats::by_extension(path),
             (None, None) => {
-                let names: Vec<&str> = FORMATS.iter().map(|f| f.name).collect();
                 return Err(Failure::Usage(format!(
                     "name the format with --to ({}) or by the extension of -o",
-                    names.join(", ")
+                    formats::names()
                 )));
             }
         };
         found.map_err(|e: ExportError| Failure::Usage(e.to_string()))
     }
 
-    /// The file's bytes of the force that was asked for, or of the body's.
-    pub fn encode(&self, format: &Format, curve: &PredictedCurve) -> Result<Vec<u8>, Failure> {
-        let options = Options { units: self.units, id: self.curve_id };
-        let kind = self.force.unwrap_or(ForceKind::Body);
-        let alone = curve.of_force(kind).map_err(|error| match (error, self.force) {
-            (PredictError::NoBodyForce, None) => Failure::Usage(
-                "the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into(),
-            ),
-            (error, _) => error.into(),
-        })?;
-        Ok(format.encode(&alone, &options)?)
-    }
-
-    /// As [`encode`](Self::encode), but with both forces where the format holds them and none
-    /// was asked for.
-    pub fn encode_whole(
-        &self,
-        format: &Format,
-        curve: &PredictedCurve,
-    ) -> Result<Vec<u8>, Failure> {
-        match format.holds_both_forces() && self.force.is_none() {
-            true => Ok(format.encode(curve, &Options { units: self.units, id: self.curve_id })?),
-            false => self.encode(format, curve),
+    /// The options for a file at `path`.
+    fn options(&self, path: Option<&Path>) -> Options {
+        Options {
+            units: self.units,
+            id: self.curve_id,
+            force: self.force.unwrap_or(ForceKind::Body),
+            tail: self.tail,
+            soften: self.soften,
+            material: self.material.unwrap_or_default(),
+            deck: self.deck,
+            extension: path.and_then(Path::extension).and_then(|e| e.to_str()).map(Into::into),
+            speeds_m_per_s: Vec::new(),
         }
     }
+
+    /// The files of curves for `path`, of the force that was asked for or of the body's; of both where
+    /// the format holds both and none was asked for.
+    pub fn export(
+        &self,
+        format: &Format,
+        curves: &[formats::ExportInput],
+        path: Option<&Path>,
+    ) -> Result<Exported, Failure> {
+        let alone;
+        let mut curves = curves;
+        if let (true, Some(force)) = (format.holds_both_forces(), self.force) {
+            let one = |input: &formats::ExportInput| {
+                Ok(formats::ExportInput { curve: input.curve.of_force(force)?, beyond: None })
+            };
+            alone = curves.iter().map(one).collect::<Result<Vec<_>, PredictError>>()?;
+            curves = &alone;
+        }
+        format.export(curves, &self.options(path)).map_err(|error| match error {
+            ExportError::Predict(error)
+                if self.force.is_none() && matches!(*error, PredictError::NoBodyForce) =>
+            {
+                Failure::Usage("the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into())
+            }
+            error => error.into(),
+        })
+    }
+
+    /// Refuses what a whole model has no use for.
+    fn check_for_model(&self, format: &Format) -> Result<(), Failure> {
+        let of_curves = self.units.is_some() || self.soften || self.deck || self.material.is_some();
+        let forced = self.force.is_some() && format.name == "onnx";
+        match of_curves || forced {
+            true => Err(Failure::Usage(format!(
+                "{} holds a whole model in SI: remove --units, --soften, --material, --deck{}",
+                format.name,
+                if forced { " and --force: it is of the recipe's force" } else { "" }
+            ))),
+            false => Ok(()),
+        }
+    }
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let Some(path) = args.input.as_ref().filter(|_| !args.list) else {
+        return list(options);
+    };
+    let output = args.output.as_deref().filter(|path| !super::is_stdout(path));
+    let format = args.target.format(output)?;
+    if let Some(output) = output {
+        keep_input(path, output)?;
+    }
+    let input = Input::read(path)?;
+    let (exported, warnings) = export(args, format, &input, output)?;
+    for warning in &warnings {
+        options.warn(warning);
+    }
+    Destination { output, format }.write(exported, options)?;
+    Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+/// The files, and the warnings of the curves.
+fn export(
+    args: &Args,
+    format: &Format,
+    input: &Input,
+    output: Option<&Path>,
+) -> Result<(Exported, Vec<String>), Failure> {
+    let Which { speed, mass, max_crush, extrapolate, group, case } = &args.which;
+    let chosen = Chosen {
+        speeds_m_per_s: speed,
+        mass_kg: *mass,
+        rule: *max_crush,
+        extrapolate: *extrapolate,
+        group: group.as_deref(),
+        cases: case,
+    };
+    if format.takes_model() {
+        args.target.check_for_model(format)?;
+        let model = input.model(format.name)?;
+        let mut options = args.target.options(output);
+        options.speeds_m_per_s = speed.clone();
+        return Ok((format.export_model(model, &options)?, Vec::new()));
+    }
+    if format.takes_case() {
+        let cases = input.cases(&chosen, format.name)?;
+        return Ok((format.export_cases(&cases, &args.target.options(output))?, Vec::new()));
+    }
+    let curves = input.curves(&chosen)?;
+    let mut warnings: Vec<String> = Vec::new();
+    for warning in curves.iter().flat_map(|c| &c.curve.warnings).map(ToString::to_string) {
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
+    }
+    Ok((args.target.export(format, &curves, output)?, warnings))
 }
 
 #[derive(Serialize)]
@@ -126,64 +272,6 @@ struct Listed {
     description: &'static str,
 }
 
-/// A file that would go to standard output, within a JSON document.
-#[derive(Serialize)]
-struct Text {
-    format: &'static str,
-    text: String,
-}
-
-#[derive(Serialize)]
-struct Document {
-    format: &'static str,
-    bytes: usize,
-    output: String,
-}
-
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let Some(input) = args.input.as_ref().filter(|_| !args.list) else {
-        return list(options);
-    };
-    let format = args.target.format(args.output.as_deref())?;
-    let output = args.output.as_deref().filter(|path| !is_stdout(path));
-    if let Some(output) = output {
-        keep_input(input, output)?;
-    }
-    if format.takes_model() && (args.target.units.is_some() || args.target.force.is_some()) {
-        return Err(Failure::Usage(format!(
-            "{} holds a whole model in SI, of the recipe's force: remove --units and --force",
-            format.name
-        )));
-    }
-    let bytes = match format.takes_model() {
-        true => format.encode_model(&Model::read(input)?)?,
-        false => args.target.encode(format, &formats::read::json::predicted(input)?)?,
-    };
-    match output {
-        None if options.json && format.takes_model() => {
-            return Err(Failure::Usage(format!("{} is binary: name a file with -o", format.name)));
-        }
-        None if options.json => {
-            let text = String::from_utf8_lossy(&bytes).into_owned();
-            output::print_json(&Text { format: format.name, text })?;
-        }
-        None => output::print_data(|out| out.write_all(&bytes))?,
-        Some(path) => {
-            write_whole(path, &bytes)?;
-            if options.json {
-                output::print_json(&Document {
-                    format: format.name,
-                    bytes: bytes.len(),
-                    output: path.display().to_string(),
-                })?;
-            } else {
-                output::print(|out| writeln!(out, "wrote {}", path.display()))?;
-            }
-        }
-    }
-    Ok(Outcome::Clean)
-}
-
 fn list(options: GlobalOptions) -> CommandResult {
     if options.json {
         let listed = |f: &Format| Listed {
@@ -195,7 +283,7 @@ fn list(options: GlobalOptions) -> CommandResult {
     } else {
         output::print(|out| {
             FORMATS.iter().try_for_each(|f| {
-                writeln!(out, "{:<8} .{:<14} {}", f.name, f.extensions.join(" ."), f.description)
+                writeln!(out, "{:<9} .{:<14} {}", f.name, f.extensions.join(" ."), f.description)
             })
         })?;
     }

@@ -8,6 +8,8 @@ mod db_add;
 mod deck_report;
 mod demo;
 mod export;
+mod export_input;
+mod export_output;
 mod histories;
 mod inspect;
 mod output;

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 
 use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
+use crumple::formats::ExportInput;
 use crumple::surrogate::band::{Band, LeftOutSpeeds};
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{Model, PredictedCurve, Query, predict};
+use crumple::surrogate::predict::predict_beyond;
+use crumple::surrogate::{Model, PredictedCurve, Query};
 use crumple::unit::km_per_h;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
@@ -75,12 +77,25 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         energy_correct: args.energy_correct,
         extrapolate: args.extrapolate,
     };
-    let curve = predict(&model, &query)?;
+    let (curve, beyond) = predict_beyond(&model, &query)?;
+    let input = [ExportInput { curve, beyond: Some(beyond) }];
+    let curve = &input[0].curve;
     // All files are encoded before the first is written.
-    let files = formats
-        .iter()
-        .map(|format| args.target.encode_whole(format, &curve))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut files = Vec::new();
+    for (path, format) in args.output.iter().zip(formats) {
+        let exported = args.target.export(format, &input, Some(path))?;
+        let [(_, bytes)] = &exported.files[..] else {
+            return Err(Failure::Usage(format!(
+                "-o {}: this gives several files: crumple export --to {} -o FOLDER",
+                path.display(),
+                format.name
+            )));
+        };
+        files.push(bytes.clone());
+        if !options.quiet && !options.json {
+            exported.notes.iter().for_each(|note| output::say(&format!("note: {note}")));
+        }
+    }
     let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
@@ -90,10 +105,10 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some((_, bytes)) = printed.first() {
         output::print(|out| out.write_all(bytes))?;
     } else if options.json {
-        output::print_json(&curve)?;
+        output::print_json(curve)?;
     } else {
         output::print(|out| {
-            print(out, &curve)?;
+            print(out, curve)?;
             args.output.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
         })?;
     }
@@ -130,7 +145,7 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         out,
         "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
         curve.max_deflection_m,
-        provenance.max_crush_rule.name(),
+        provenance.max_crush_rule.map_or("recorded", |rule| rule.name()),
         metres(crush.spline_m),
         metres(crush.monotone_m),
         metres(crush.energy_m),

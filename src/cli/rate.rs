@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crumple::file;
 use crumple::rating::deceleration::Deceleration;
 use crumple::rating::magnitude_phase::MagnitudePhase;
-use crumple::rating::{self, Quantity, Rating, Settings, Signal, table};
+use crumple::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
 use crumple::solver::{self, ReadError, Selection, WantedId};
 use crumple::unit::TIME;
 
@@ -238,7 +238,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         None if named == [Quantity::Acceleration; 2] => Quantity::Acceleration,
         None => Quantity::Other,
     };
-    let settings = Settings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
+    let settings = RatingSettings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
     let rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
     for warning in &rating.warnings {
         options.warn(warning);

@@ -19,17 +19,13 @@ pub struct BodyMotion {
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
-impl BodyMotion {
-    /// Unloading stiffness from the end of the force that gives the rebound, in N/m.
-    pub fn end_stiffness_n_per_m(&self, mass_kg: f64) -> Option<f64> {
-        let top_n = self.force.force_at(self.force.end_m());
-        rebound_stiffness_n_per_m(top_n, mass_kg, self.rebound_speed_m_per_s?)
-    }
-}
-
 /// Stiffness in N/m of the straight line on which a body of `mass_kg` leaves a force of `top_n`
 /// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is no stiffness.
-pub fn rebound_stiffness_n_per_m(top_n: f64, mass_kg: f64, rebound_m_per_s: f64) -> Option<f64> {
+pub(crate) fn rebound_stiffness_n_per_m(
+    top_n: f64,
+    mass_kg: f64,
+    rebound_m_per_s: f64,
+) -> Option<f64> {
     let stiffness = top_n * top_n / (mass_kg * rebound_m_per_s * rebound_m_per_s);
     (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }
@@ -39,7 +35,7 @@ pub fn rebound_stiffness_n_per_m(top_n: f64, mass_kg: f64, rebound_m_per_s: f64)
 /// It differs from the contact force by the mass that the crush zone stops before the body
 /// (an impact's first spike is the nose being stopped). Filtered with CFC 60 unless the
 /// sampling is too coarse for it. `None` if the sampled states make no loading branch.
-pub fn body_motion(case: &Case) -> Option<BodyMotion> {
+pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     let sampled = &case.sampled;
     let speeds = &case.closing_speed_m_per_s;
     let mass = case.masses.effective_kg();
@@ -64,7 +60,7 @@ pub fn body_motion(case: &Case) -> Option<BodyMotion> {
 
 /// The force that moved the body as its speeds tell it, loading and unloading, not filtered.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RecordedForce {
+pub(crate) struct RecordedForce {
     /// Loading branch, in N.
     pub loading: Envelope,
     /// Unloading branch from the largest deflection to where the force is first zero.
@@ -86,7 +82,7 @@ const LAST_SHARE: f64 = 0.005;
 /// The mean force between two states from the change of kinetic energy over the change of
 /// deflection, `−m Δ(v²)/2Δd`: a body that runs on it has the recorded speeds at the recorded
 /// deflections. `None` if the sampled states make no loading branch.
-pub fn recorded_force(case: &Case) -> Option<RecordedForce> {
+pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
     let (t, d) = (case.sampled.time_s(), case.sampled.deflection_m());
     let v = &case.closing_speed_m_per_s;
     let mass = case.masses.effective_kg();
@@ -152,7 +148,7 @@ pub fn recorded_force(case: &Case) -> Option<RecordedForce> {
 }
 
 /// CFC 60 of values at `time_s`, as they are if their interval is too coarse for it.
-pub fn filtered(time_s: &[f64], values: Vec<f64>) -> Vec<f64> {
+pub(crate) fn filtered(time_s: &[f64], values: Vec<f64>) -> Vec<f64> {
     match cfc::filter(CLASS, time_s, &values) {
         Ok(filtered) => filtered.values,
         Err(_) => values,

@@ -16,13 +16,13 @@ const SMALL_SHARE: f64 = 1e-3;
 const NAMED: usize = 3;
 
 /// The force above which a record is in contact: 1 kN, or 0.5 % of its largest force.
-pub fn threshold_n(force_n: &[f64]) -> f64 {
+pub(crate) fn threshold_n(force_n: &[f64]) -> f64 {
     FORCE_N.max(SHARE_OF_LARGEST * force_n.iter().copied().fold(0.0, f64::max))
 }
 
 /// When contact begins, found from a force that is positive in compression.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Onset {
+pub(crate) struct Onset {
     /// Where the force crosses the threshold, in s, between two states.
     pub time_s: f64,
     /// Length of the output interval that holds the crossing, in s; `None` if the record
@@ -47,7 +47,7 @@ struct Spell {
 ///
 /// `time_s`: increasing, in s; `force_n`: as many values, in N, not filtered (a filter without
 /// phase shift begins ahead of the contact).
-pub fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option<Onset> {
+pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option<Onset> {
     let pieces = spells(time_s, force_n, threshold_n, 0.0);
     let spells = spells(time_s, force_n, threshold_n, PAUSE_S);
     let main = spells

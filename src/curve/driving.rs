@@ -43,7 +43,7 @@ pub enum CurveUnloading {
 
 /// Why a case has no curve of the force that was asked for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NoDrivingCurve {
+pub(crate) enum NoDrivingCurve {
     /// Its loading branch is no envelope.
     #[error("{0}")]
     Envelope(#[from] EnvelopeError),
@@ -54,7 +54,7 @@ pub enum NoDrivingCurve {
 
 impl DrivingCurve {
     /// A curve of which nothing else is known.
-    pub fn bare(loading: Envelope) -> Self {
+    pub(crate) fn bare(loading: Envelope) -> Self {
         Self {
             loading,
             beyond: None,
@@ -66,7 +66,7 @@ impl DrivingCurve {
     }
 
     /// A force that moves bodies of one mass, and of which nothing else is known.
-    pub fn of_body(loading: Envelope) -> Self {
+    pub(crate) fn of_body(loading: Envelope) -> Self {
         Self { force: Some(ForceKind::Body), ..Self::bare(loading) }
     }
 
@@ -96,7 +96,7 @@ impl DrivingCurve {
     ///
     /// # Errors
     /// [`NoDrivingCurve`] if the case has no such curve.
-    pub fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
+    pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
         if force == ForceKind::Body && case.force_kind == ForceKind::Contact {
             return Self::recorded(case).ok_or(NoDrivingCurve::NoMotion);
         }
@@ -111,7 +111,7 @@ impl DrivingCurve {
 
     /// The same with the unloading that lets a body of `mass_kg` rebound at `rebound_m_per_s`,
     /// or with `otherwise` in N/m where that speed is not known.
-    pub fn rebounding(
+    pub(crate) fn rebounding(
         self,
         mass_kg: f64,
         rebound_m_per_s: Option<f64>,
@@ -125,7 +125,7 @@ impl DrivingCurve {
     }
 
     /// The same with a known unloading stiffness in N/m.
-    pub fn unloading_with(self, stiffness_n_per_m: f64) -> Self {
+    pub(crate) fn unloading_with(self, stiffness_n_per_m: f64) -> Self {
         Self { unloading: CurveUnloading::Stiffness(stiffness_n_per_m), ..self }
     }
 
@@ -134,7 +134,7 @@ impl DrivingCurve {
     ///
     /// # Errors
     /// [`EnvelopeError`] if the two make no envelope.
-    pub fn continued(mut self) -> Result<Self, EnvelopeError> {
+    pub(crate) fn continued(mut self) -> Result<Self, EnvelopeError> {
         let Some(beyond) = self.beyond.take() else { return Ok(self) };
         let end = self.loading.end_m();
         let share = match beyond.force_at(end) {
@@ -157,7 +157,7 @@ impl DrivingCurve {
     ///
     /// # Errors
     /// [`EnvelopeError`] if the products are no finite numbers.
-    pub fn scaled(mut self, factor: f64) -> Result<Self, EnvelopeError> {
+    pub(crate) fn scaled(mut self, factor: f64) -> Result<Self, EnvelopeError> {
         let times = |e: &Envelope| {
             let force_n = e.force_n().iter().map(|f| f * factor).collect();
             Envelope::new(e.deflection_m().to_vec(), force_n)
@@ -178,7 +178,7 @@ impl DrivingCurve {
 
 impl CurveUnloading {
     /// A line of that stiffness in N/m, if it is known.
-    pub fn of(stiffness_n_per_m: Option<f64>) -> Self {
+    pub(crate) fn of(stiffness_n_per_m: Option<f64>) -> Self {
         stiffness_n_per_m.map_or(Self::Unknown, Self::Stiffness)
     }
 

@@ -22,9 +22,9 @@ fn work_to_end(curve: &Curve) -> f64 {
 }
 
 /// Energy or impulse outside these shares of what the impact asks for is an error of the input.
-pub const POSSIBLE: (f64, f64) = (0.67, 1.5);
+pub(crate) const POSSIBLE: (f64, f64) = (0.67, 1.5);
 /// Impulse that differs from the change of momentum by more than this deserves a warning.
-pub const IMPULSE_TOLERANCE: f64 = 0.05;
+pub(crate) const IMPULSE_TOLERANCE: f64 = 0.05;
 /// No vehicle is faster, in m/s, is crushed by more, in m, or in less time, in s.
 const FASTEST_M_PER_S: f64 = 340.0;
 const LONGEST_CRUSH_M: f64 = 100.0;
@@ -40,7 +40,7 @@ const NEAR_TWO: f64 = 1.2;
 
 /// What a run's record says of its energy and momentum.
 #[derive(Clone, Copy, Debug)]
-pub struct Claim<'a> {
+pub(crate) struct Claim<'a> {
     pub curve: &'a Curve,
     pub masses: Masses,
     pub speed: Speed,
@@ -57,7 +57,7 @@ pub struct Claim<'a> {
 
 /// What the record gives in ratio to what the impact asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Work of the loading branch over the kinetic energy that it stopped.
     pub work: Option<f64>,
     /// Impulse of the loading branch over the change of momentum.
@@ -76,7 +76,7 @@ pub struct Impossible {
 
 impl Impossible {
     /// What was found, without its cause.
-    pub fn found(&self) -> &str {
+    pub(crate) fn found(&self) -> &str {
         &self.found
     }
 
@@ -90,7 +90,7 @@ impl Claim<'_> {
     /// Work and impulse against the impact's, over the loading branch. A record that ends
     /// while loading is held against the speed that it has reached; without recorded speeds
     /// there is nothing to hold it against.
-    pub fn balance(&self) -> Balance {
+    pub(crate) fn balance(&self) -> Balance {
         let end = loading_end(self.curve);
         let mass = self.masses.effective_kg();
         let truncated = end + 1 == self.curve.time_s().len();
@@ -118,7 +118,7 @@ impl Claim<'_> {
     /// # Errors
     /// [`Impossible`] if work or impulse lie outside 0.67 to 1.5 of what the impact asks for, or
     /// speed or crush are those of no vehicle (domain: units, masses, speeds of another run).
-    pub fn check(&self) -> Result<Balance, Impossible> {
+    pub(crate) fn check(&self) -> Result<Balance, Impossible> {
         let balance = self.balance();
         let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);
         let fits = |ratio: Option<f64>| ratio.is_none_or(possible);

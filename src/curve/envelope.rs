@@ -14,18 +14,48 @@ pub struct Envelope {
 /// Why two columns are no envelope.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EnvelopeError {
+    /// Fewer than two points.
     #[error("an envelope needs at least 2 points, found {points}")]
-    TooShort { points: usize },
+    TooShort {
+        /// Number of points.
+        points: usize,
+    },
+    /// The columns differ in length.
     #[error("{deflections} deflections but {forces} forces")]
-    Lengths { deflections: usize, forces: usize },
+    Lengths {
+        /// Number of deflections.
+        deflections: usize,
+        /// Number of forces.
+        forces: usize,
+    },
+    /// A value is infinite or no number.
     #[error("point {point} is ({deflection_m} m, {force_n} N): expected finite numbers")]
-    NotFinite { point: usize, deflection_m: f64, force_n: f64 },
+    NotFinite {
+        /// The point, counted from 1.
+        point: usize,
+        /// Its deflection, in m.
+        deflection_m: f64,
+        /// Its force, in N.
+        force_n: f64,
+    },
+    /// The first deflection is not 0.
     #[error("the deflection must begin at 0, found {first_m} m")]
-    NotFromZero { first_m: f64 },
+    NotFromZero {
+        /// The first deflection, in m.
+        first_m: f64,
+    },
+    /// A deflection is not larger than the one before it.
     #[error(
         "the deflection must increase, found {deflection_m} m after {before_m} m at point {point}"
     )]
-    Order { point: usize, deflection_m: f64, before_m: f64 },
+    Order {
+        /// The later point, counted from 1.
+        point: usize,
+        /// Its deflection, in m.
+        deflection_m: f64,
+        /// The deflection before it, in m.
+        before_m: f64,
+    },
 }
 
 impl Envelope {
@@ -69,12 +99,12 @@ impl Envelope {
     }
 
     /// The first point whose force is below zero, counted from 1.
-    pub fn first_pulling_point(&self) -> Option<usize> {
+    pub(crate) fn first_pulling_point(&self) -> Option<usize> {
         self.force_n.iter().position(|&f| f < 0.0).map(|i| i + 1)
     }
 
     /// The envelope with forces below zero raised to zero.
-    pub fn pushing(mut self) -> Self {
+    pub(crate) fn pushing(mut self) -> Self {
         if self.first_pulling_point().is_some() {
             self.force_n.iter_mut().for_each(|f| *f = f.max(0.0));
             self.integrate();
@@ -82,16 +112,18 @@ impl Envelope {
         self
     }
 
+    /// Deflections in m, from 0, strictly increasing.
     pub fn deflection_m(&self) -> &[f64] {
         &self.deflection_m
     }
 
+    /// Forces in N, one per deflection.
     pub fn force_n(&self) -> &[f64] {
         &self.force_n
     }
 
     /// `∫F dd` from 0 to each point, in J.
-    pub fn work_j(&self) -> &[f64] {
+    pub(crate) fn work_j(&self) -> &[f64] {
         &self.work_j
     }
 
@@ -111,7 +143,7 @@ impl Envelope {
 
     /// `∫F dd` from 0 to `deflection_m`, exact for the piecewise linear force; beyond the
     /// end the last force is held. In J.
-    pub fn work_to(&self, deflection_m: f64) -> f64 {
+    pub(crate) fn work_to(&self, deflection_m: f64) -> f64 {
         let end = self.deflection_m.len() - 1;
         if deflection_m >= self.deflection_m[end] {
             return self.work_j[end] + self.force_n[end] * (deflection_m - self.deflection_m[end]);
@@ -122,13 +154,13 @@ impl Envelope {
     }
 
     /// `∫F dd` over the whole table, in J.
-    pub fn work(&self) -> f64 {
+    pub(crate) fn work(&self) -> f64 {
         self.work_j[self.work_j.len() - 1]
     }
 
     /// The deflection at which the envelope has taken up `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
-    pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
+    pub(crate) fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;
         match self.work_j.iter().position(|&w| w >= energy_j) {
             Some(0) => Some(0.0),
@@ -158,7 +190,7 @@ impl Envelope {
     }
 
     /// Largest force, in N.
-    pub fn peak_force_n(&self) -> f64 {
+    pub(crate) fn peak_force_n(&self) -> f64 {
         self.force_n.iter().copied().fold(0.0, f64::max)
     }
 

@@ -9,13 +9,14 @@ const MIN_ADVANCE: f64 = 1e-6;
 /// The loading branch of a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loading {
+    /// Force over deflection, from (0, 0) to the largest deflection.
     pub envelope: Envelope,
     /// Samples left out because the deflection did not advance.
     pub dropped: usize,
 }
 
 /// Index of the largest deflection: the end of the loading branch.
-pub fn loading_end(curve: &Curve) -> usize {
+pub(crate) fn loading_end(curve: &Curve) -> usize {
     let deflection = curve.deflection_m();
     (1..deflection.len()).fold(0, |best, i| if deflection[i] > deflection[best] { i } else { best })
 }
@@ -25,7 +26,7 @@ pub fn loading_end(curve: &Curve) -> usize {
 ///
 /// # Errors
 /// [`EnvelopeError`] if fewer than two samples remain.
-pub fn loading_branch(curve: &Curve) -> Result<Loading, EnvelopeError> {
+pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, EnvelopeError> {
     let end = loading_end(curve);
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let advance = MIN_ADVANCE * d[end];

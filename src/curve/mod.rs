@@ -2,11 +2,11 @@
 //!
 //! Deflection is positive in compression, force pushes the bodies apart; SI throughout.
 
-pub mod body;
-pub mod contact;
-pub mod driving;
+pub(crate) mod body;
+pub(crate) mod contact;
+pub(crate) mod driving;
 pub mod energy;
-pub mod envelope;
+pub(crate) mod envelope;
 pub mod extract;
 pub mod from_table;
 pub mod loading;
@@ -19,6 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
+pub use body::BodyMotion;
 pub use driving::{CurveUnloading, DrivingCurve};
 pub use envelope::{Envelope, EnvelopeError};
 
@@ -35,14 +36,42 @@ pub struct Curve {
 /// Why three columns are no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
+    /// Fewer than two states.
     #[error("a curve needs at least 2 states, found {states}")]
-    TooShort { states: usize },
+    TooShort {
+        /// Number of states.
+        states: usize,
+    },
+    /// The columns differ in length.
     #[error("columns differ in length: {time} times, {deflection} deflections, {force} forces")]
-    Lengths { time: usize, deflection: usize, force: usize },
+    Lengths {
+        /// Number of times.
+        time: usize,
+        /// Number of deflections.
+        deflection: usize,
+        /// Number of forces.
+        force: usize,
+    },
+    /// A value is infinite or no number.
     #[error("the {column} of state {state} is {value}: expected a finite number")]
-    NotFinite { column: &'static str, state: usize, value: f64 },
+    NotFinite {
+        /// The column: time, deflection or force.
+        column: &'static str,
+        /// Its state, counted from 1.
+        state: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A time is not later than the one before it.
     #[error("time does not increase at state {state}: {time_s} s follows {before_s} s")]
-    TimeOrder { state: usize, time_s: f64, before_s: f64 },
+    TimeOrder {
+        /// State of the later row, counted from 1.
+        state: usize,
+        /// Its time, in s.
+        time_s: f64,
+        /// The time before it, in s.
+        before_s: f64,
+    },
 }
 
 impl Curve {
@@ -75,14 +104,17 @@ impl Curve {
         Ok(Self { time_s, deflection_m, force_n })
     }
 
+    /// Times in s, strictly increasing; 0 is the first contact.
     pub fn time_s(&self) -> &[f64] {
         &self.time_s
     }
 
+    /// Deflections in m, positive in compression, one per time.
     pub fn deflection_m(&self) -> &[f64] {
         &self.deflection_m
     }
 
+    /// Forces in N, positive in compression, one per time.
     pub fn force_n(&self) -> &[f64] {
         &self.force_n
     }
@@ -99,6 +131,7 @@ pub enum ForceKind {
 }
 
 impl ForceKind {
+    /// The name in files: `contact` or `body`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
@@ -107,7 +140,7 @@ impl ForceKind {
     }
 
     /// The kind of that name.
-    pub fn parse(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Contact, Self::Body].into_iter().find(|kind| kind.name() == name)
     }
 
@@ -125,6 +158,7 @@ impl ForceKind {
 /// Masses of a case: one body against a wall, or two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Masses {
+    /// Mass of the body, or of the first body of a pair, in kg.
     pub body_kg: f64,
     /// The other body of a pair; `None` against a rigid wall.
     pub other_kg: Option<f64>,
@@ -141,22 +175,29 @@ impl Masses {
     }
 
     /// Kinetic energy that a stop at a common velocity takes up, in J.
-    pub fn kinetic_energy_j(&self, speed: Speed) -> f64 {
+    pub(crate) fn kinetic_energy_j(&self, speed: Speed) -> f64 {
         0.5 * self.effective_kg() * speed.m_per_s * speed.m_per_s
     }
 }
 
 /// A file a case was made from, so that a curve can be traced to its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Source {
+pub struct SourceFile {
     /// As found from the manifest: `25kmh/nodout`.
     pub path: String,
+    /// Size in bytes when it was read.
     pub size_bytes: u64,
+    /// BLAKE3 hash of its bytes, in hexadecimal.
     pub blake3: String,
+    /// Name of the file's format, such as `nodout`.
     pub format: String,
+    /// Solver that wrote it, if the file tells.
     pub solver: Option<String>,
+    /// Version of that solver, if the file tells.
     pub version: Option<String>,
+    /// Title of the run, if the file has one.
     pub title: Option<String>,
+    /// How many damaged places the reader found.
     pub problems: usize,
 }
 
@@ -165,7 +206,9 @@ pub struct Source {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Parameter {
+    /// A number, in the unit that the parameter's name ends with.
     Number(f64),
+    /// One of some names.
     Category(String),
 }
 
@@ -180,7 +223,7 @@ pub struct EnergyAudit {
 
 impl EnergyAudit {
     /// Imbalance over which a warning is due.
-    pub const TOLERANCE: f64 = 0.05;
+    pub(crate) const TOLERANCE: f64 = 0.05;
 
     /// `W/E`; 1 where the curve takes up exactly the impact's energy.
     pub fn ratio(&self) -> f64 {
@@ -191,13 +234,19 @@ impl EnergyAudit {
 /// One FE run as the database keeps it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
+    /// Name of the study that it comes from.
     pub study: String,
+    /// Group of cases that differ in speed and parameters alone.
     pub group: String,
+    /// Name of the case, unique in its group.
     pub name: String,
+    /// Speed before contact, and what it is measured against.
     pub speed: Speed,
+    /// The masses that meet.
     pub masses: Masses,
     /// What else distinguishes the case from others of its group, by name.
     pub parameters: BTreeMap<String, Parameter>,
+    /// Which force the curves hold.
     pub force_kind: ForceKind,
     /// At the common interval, from contact on.
     pub sampled: Curve,
@@ -212,12 +261,14 @@ pub struct Case {
     /// Secant of the unloading branch between 90 % and 10 % of its force, in N/m;
     /// `None` if the record ends before.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Work of the force against the kinetic energy.
     pub audit: EnergyAudit,
     /// The recipe and the run's entry, as JSON.
     pub recipe: String,
     /// Hash over recipe, entry and sources: equal hashes need no new extraction.
     pub fingerprint: String,
-    pub sources: Vec<Source>,
+    /// Files that it was made from.
+    pub sources: Vec<SourceFile>,
     /// What the extraction did that the manifest does not say.
     pub notes: Vec<String>,
     /// What the user should look at before trusting the case.
@@ -237,7 +288,7 @@ impl Case {
 
     /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
     /// versions.
-    pub fn units(&self) -> Option<UnitSystem> {
+    pub(crate) fn units(&self) -> Option<UnitSystem> {
         let recipe: serde_json::Value = serde_json::from_str(&self.recipe).ok()?;
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }

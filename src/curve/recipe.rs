@@ -9,14 +9,18 @@ use crate::history::Side;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
+    /// Where the deflection comes from.
     pub deflection: DeflectionSource,
+    /// Where the force comes from.
     pub force: ForceSource,
     /// Contact force that tells when contact begins, beside a body force: a body slows down
     /// some milliseconds after the first touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ForceSource>,
+    /// Filter of the force.
     #[serde(default)]
     pub filter: Filter,
+    /// Common times of all cases.
     #[serde(default)]
     pub sampling: Sampling,
 }
@@ -48,13 +52,16 @@ pub struct DeflectionSource {
 #[serde(rename_all = "snake_case")]
 #[allow(clippy::enum_variant_names, reason = "the names are the components' in the files")]
 pub enum DisplacementComponent {
+    /// Along x.
     XDisplacement,
+    /// Along y.
     YDisplacement,
+    /// Along z.
     ZDisplacement,
 }
 
 impl DisplacementComponent {
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::XDisplacement => "x_displacement",
             Self::YDisplacement => "y_displacement",
@@ -63,7 +70,7 @@ impl DisplacementComponent {
     }
 
     /// The component that holds its rate.
-    pub fn velocity(self) -> &'static str {
+    pub(crate) fn velocity(self) -> &'static str {
         match self {
             Self::XDisplacement => "x_velocity",
             Self::YDisplacement => "y_velocity",
@@ -78,14 +85,33 @@ impl DisplacementComponent {
 #[schemars(with = "ForceTable")]
 pub enum ForceSource {
     /// A contact force: rigid wall, side of an interface.
-    Contact { file: String, id: i64, side: Option<Side>, component: String },
+    Contact {
+        /// Name of the file in the run's folder.
+        file: String,
+        /// Number of the wall or interface.
+        id: i64,
+        /// Side of an interface; a wall has none.
+        side: Option<Side>,
+        /// Component of the force, such as `normal_force`.
+        component: String,
+    },
     /// Mass of the body times the acceleration of its node.
-    Body { file: String, node: i64, motion: BodyMotion, component: String },
+    Body {
+        /// Name of the file in the run's folder.
+        file: String,
+        /// Number of the node that moves with the body.
+        node: i64,
+        /// What the acceleration is made from.
+        motion: RecordedMotion,
+        /// Component of that motion, such as `x_acceleration`.
+        component: String,
+    },
 }
 
 /// What the acceleration of a body is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BodyMotion {
+pub enum RecordedMotion {
+    /// The acceleration that the solver wrote.
     Acceleration,
     /// Differentiated by central differences: a mean over two output intervals.
     Velocity,
@@ -138,9 +164,9 @@ impl TryFrom<ForceTable> for ForceSource {
             (None, Some(node), Some("mass")) => {
                 let motion = match component.as_str() {
                     "x_acceleration" | "y_acceleration" | "z_acceleration" => {
-                        BodyMotion::Acceleration
+                        RecordedMotion::Acceleration
                     }
-                    "x_velocity" | "y_velocity" | "z_velocity" => BodyMotion::Velocity,
+                    "x_velocity" | "y_velocity" | "z_velocity" => RecordedMotion::Velocity,
                     _ => {
                         return Err(format!(
                             "\"{component}\" times mass is no force: use x_acceleration, or x_velocity to differentiate it"
@@ -188,7 +214,9 @@ impl From<ForceSource> for ForceTable {
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub enum Filter {
+    /// No filter.
     None,
+    /// A channel frequency class of SAE J211, such as 60.
     Cfc(u32),
 }
 
@@ -227,7 +255,9 @@ impl From<Filter> for String {
 #[serde(try_from = "SamplingTable", into = "SamplingTable")]
 #[schemars(with = "SamplingTable")]
 pub struct Sampling {
+    /// Number of states, from contact on.
     pub states: usize,
+    /// Time between two of them, in s.
     pub interval_s: f64,
 }
 

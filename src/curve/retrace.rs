@@ -39,7 +39,7 @@ pub enum MotionError {
 
 /// States of a motion.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Motion {
+pub(super) struct Motion {
     pub time_s: Vec<f64>,
     pub deflection_m: Vec<f64>,
     pub force_n: Vec<f64>,
@@ -65,7 +65,11 @@ const SHORTEST: f64 = 1e-6;
 ///
 /// # Errors
 /// [`MotionError`] says what of the table tells none.
-pub fn retrace(table: &Table<'_>, impact: &Impact, interval_s: f64) -> Result<Motion, MotionError> {
+pub(super) fn retrace(
+    table: &Table<'_>,
+    impact: &Impact,
+    interval_s: f64,
+) -> Result<Motion, MotionError> {
     let (d, f) = (table.deflection_m, table.force_n);
     let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
     let moving = table.body_force_n.unwrap_or(f);

@@ -15,7 +15,7 @@ use crate::hdf5::{self, Dataset, File, FileAccessProperties, FileLocking, Group}
 
 /// Attributes, datasets, groups and types of a file that are not the layout's, as a message
 /// names them.
-pub fn found(opened: &Opened<'_>) -> Result<BTreeSet<String>, DatabaseError> {
+pub(crate) fn found(opened: &Opened<'_>) -> Result<BTreeSet<String>, DatabaseError> {
     let damaged = |e: hdf5::Error| DatabaseError::Damaged {
         path: opened.path.into(),
         place: "/".into(),
@@ -103,7 +103,7 @@ impl Foreign {
 ///
 /// # Errors
 /// [`DatabaseError::WouldDrop`] if something would be lost; the file is then unchanged.
-pub fn write_keeping(
+pub(crate) fn write_keeping(
     database: &Database,
     path: &Path,
     before: &BTreeSet<String>,

@@ -6,29 +6,29 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 use super::{Database, DatabaseError, damaged_curve};
-use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, Source};
+use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
 use crate::file;
 use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
-pub const FORMAT: &str = "crumple curve database";
+pub(crate) const FORMAT: &str = "crumple curve database";
 /// Layout version this program writes and reads.
-pub const VERSION: i64 = 2;
+pub(crate) const VERSION: i64 = 2;
 
 /// Attributes of the root that are this layout's.
-pub const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
+pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
 /// Attribute of a group that lists its cases in order of speed.
-pub const CASES: &str = "cases";
+pub(crate) const CASES: &str = "cases";
 /// Group of a case with the curve at the solver's rate.
-pub const ORIGINAL: &str = "original";
+pub(crate) const ORIGINAL: &str = "original";
 /// Attribute of a case with the BLAKE3 hashes of what it holds.
-pub const HASHES: &str = "hashes";
+pub(crate) const HASHES: &str = "hashes";
 /// Name, among the hashes, of the one over the attributes.
-pub const ATTRIBUTES: &str = "attributes";
+pub(crate) const ATTRIBUTES: &str = "attributes";
 
 /// Everything that is written of a case, before it is anywhere.
-pub struct Content<'a> {
+pub(crate) struct Content<'a> {
     /// In the order in which they are written and hashed.
     pub attributes: Vec<(&'static str, AttrValue)>,
     /// By their paths in the case.
@@ -36,7 +36,7 @@ pub struct Content<'a> {
 }
 
 /// Every attribute that a case can have; what else it has is others'.
-pub const CASE_ATTRIBUTES: [&str; 22] = [
+pub(crate) const CASE_ATTRIBUTES: [&str; 22] = [
     "study",
     "speed_m_per_s",
     "speed_kind",
@@ -62,7 +62,7 @@ pub const CASE_ATTRIBUTES: [&str; 22] = [
 ];
 
 impl<'a> Content<'a> {
-    pub fn of(case: &'a Case) -> Result<Self, DatabaseError> {
+    pub(crate) fn of(case: &'a Case) -> Result<Self, DatabaseError> {
         let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
         content.describe(case)?;
         content.curve("", &case.sampled);
@@ -126,7 +126,7 @@ impl<'a> Content<'a> {
 
     /// BLAKE3 of each dataset's values (doubles, little endian) by its path, and of all
     /// attributes: name, zero byte, value (text, or little endian), zero byte, each.
-    pub fn hashes(&self) -> BTreeMap<String, String> {
+    pub(crate) fn hashes(&self) -> BTreeMap<String, String> {
         let mut of_attributes = blake3::Hasher::new();
         for (name, value) in &self.attributes {
             of_attributes.update(name.as_bytes()).update(b"\0");
@@ -148,7 +148,7 @@ impl<'a> Content<'a> {
     }
 }
 
-pub fn hash_of(values: &[f64]) -> String {
+pub(crate) fn hash_of(values: &[f64]) -> String {
     let mut hasher = blake3::Hasher::new();
     for value in values {
         hasher.update(&value.to_le_bytes());
@@ -158,7 +158,10 @@ pub fn hash_of(values: &[f64]) -> String {
 
 /// The attributes of a case as they are written, its hashes among them: those it was read with
 /// if they are not its own, so that damage is not made good by writing it again.
-pub fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Content<'a>, DatabaseError> {
+pub(crate) fn with_hashes<'a>(
+    database: &Database,
+    case: &'a Case,
+) -> Result<Content<'a>, DatabaseError> {
     let mut content = Content::of(case)?;
     let key = (case.group.clone(), case.name.clone());
     let hashes = database.altered.get(&key).cloned().unwrap_or_else(|| content.hashes());
@@ -169,7 +172,7 @@ pub fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Content<'a
 }
 
 /// The root's attributes.
-pub fn root_attributes() -> [(&'static str, AttrValue); 3] {
+pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
     let written_by = concat!("crumple ", env!("CARGO_PKG_VERSION"));
     [
         ("format", AttrValue::VarLenString(FORMAT.into())),
@@ -179,12 +182,12 @@ pub fn root_attributes() -> [(&'static str, AttrValue); 3] {
 }
 
 /// The value of a group's attribute `cases`.
-pub fn case_names(cases: &[Case]) -> AttrValue {
+pub(crate) fn case_names(cases: &[Case]) -> AttrValue {
     AttrValue::VarLenStringArray(cases.iter().map(|c| c.name.clone()).collect())
 }
 
 /// Encodes a database as the bytes of an HDF5 file.
-pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
+pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     let mut file = FileBuilder::new();
     for (name, value) in root_attributes() {
         file.set_attr(name, value);
@@ -214,7 +217,7 @@ pub fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
 }
 
 /// A database file that was opened.
-pub struct Opened<'a> {
+pub(crate) struct Opened<'a> {
     pub path: &'a Path,
     pub file: File,
     /// Bytes of values that datasets may still declare.
@@ -230,7 +233,7 @@ const DECLARED_PER_BYTE: u64 = 32;
 ///
 /// # Errors
 /// [`DatabaseError`] if it is no file, not HDF5, not a curve database, or of another layout.
-pub fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
+pub(crate) fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
     let file = hdf5::open(path).map_err(|e| match e {
         OpenError::Io(source) => DatabaseError::Io { path: path.into(), source },
         other => DatabaseError::NotHdf5 { path: path.into(), detail: other.to_string() },
@@ -239,7 +242,7 @@ pub fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
 }
 
 /// A group that holds cases, as it is found in a file.
-pub struct FoundGroup {
+pub(crate) struct FoundGroup {
     pub name: String,
     /// The names that its attribute `cases` lists.
     pub listed: Option<Vec<String>>,
@@ -249,7 +252,7 @@ pub struct FoundGroup {
 }
 
 /// A case that was read, and what it was read from.
-pub struct FoundCase {
+pub(crate) struct FoundCase {
     pub case: Case,
     pub attributes: HashMap<String, AttrValue>,
     /// The hashes that are stored with it.
@@ -258,7 +261,7 @@ pub struct FoundCase {
 
 impl<'a> Opened<'a> {
     /// The database in an open file; `path` is for messages.
-    pub fn of(path: &'a Path, file: File) -> Result<Self, DatabaseError> {
+    pub(crate) fn of(path: &'a Path, file: File) -> Result<Self, DatabaseError> {
         let attrs = file.root().attrs().map_err(|e| DatabaseError::NotHdf5 {
             path: path.into(),
             detail: format!("this is no HDF5 file ({e})"),
@@ -283,7 +286,7 @@ impl<'a> Opened<'a> {
     }
 
     /// Groups that hold cases, with these. What others put beside them is none.
-    pub fn groups(&self) -> Result<Vec<FoundGroup>, DatabaseError> {
+    pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, DatabaseError> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
             let listed = self.listed(&name, &group)?;
@@ -318,7 +321,7 @@ impl<'a> Opened<'a> {
 
     /// The group of a case, found by name without looking at any other case; `None` if there is
     /// no such case, or if other names have to be known to tell.
-    pub fn find(&self, group: Option<&str>, case: &str) -> Option<(String, Group)> {
+    pub(crate) fn find(&self, group: Option<&str>, case: &str) -> Option<(String, Group)> {
         let root = self.file.root();
         let name = match group {
             Some(name) => name.to_string(),
@@ -334,7 +337,7 @@ impl<'a> Opened<'a> {
     }
 
     /// The values of one dataset of a case; why not, in words.
-    pub fn values(&self, case: &Group, path: &str) -> Result<Vec<f64>, String> {
+    pub(crate) fn values(&self, case: &Group, path: &str) -> Result<Vec<f64>, String> {
         let place = Location { opened: self, name: String::new() };
         numbers(case, path, &place).map_err(|e| match e {
             DatabaseError::Damaged { detail, .. } => detail,
@@ -343,20 +346,25 @@ impl<'a> Opened<'a> {
     }
 
     /// The hashes that are stored with a case, if they are there and can be read.
-    pub fn hashes(&self, case: &Group) -> Option<BTreeMap<String, String>> {
+    pub(crate) fn hashes(&self, case: &Group) -> Option<BTreeMap<String, String>> {
         let attributes = case.attrs().ok()?;
         serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
     }
 
     /// Reads one case from its group.
-    pub fn case(&self, group: &str, name: &str, case: &Group) -> Result<FoundCase, DatabaseError> {
+    pub(crate) fn case(
+        &self,
+        group: &str,
+        name: &str,
+        case: &Group,
+    ) -> Result<FoundCase, DatabaseError> {
         let place = Location { opened: self, name: format!("{group}/{name}") };
         decode_case(group, name, case, &place)
     }
 }
 
 /// Reads all cases of the file at `path`.
-pub fn decode(path: &Path) -> Result<Database, DatabaseError> {
+pub(crate) fn decode(path: &Path) -> Result<Database, DatabaseError> {
     let opened = open(path)?;
     decode_opened(&opened)
 }
@@ -471,7 +479,7 @@ fn decode_case(
     let original_place =
         Location { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
     let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
-    let sources: Vec<Source> = attrs.json("sources")?;
+    let sources: Vec<SourceFile> = attrs.json("sources")?;
     let case = Case {
         study: attrs.text("study")?.into(),
         group: group_name.into(),

@@ -117,10 +117,16 @@ pub enum DatabaseError {
         /// The file.
         path: PathBuf,
     },
+    /// Something of another program would be lost by writing.
     #[error(
         "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
     )]
-    WouldDrop { path: PathBuf, what: String },
+    WouldDrop {
+        /// The file.
+        path: PathBuf,
+        /// What would be lost, by its name in the file.
+        what: String,
+    },
     /// HDF5 cannot hold it.
     #[error("cannot encode the database: {detail}")]
     Encode {
@@ -146,8 +152,8 @@ impl Database {
     /// is.
     ///
     /// # Errors
-    /// [`DatabaseError`] as of [`Database::read`], [`Database::group_or_only`] and
-    /// [`Database::case`].
+    /// [`DatabaseError`] as of [`Database::read`] and [`Database::group_or_only`], and if the
+    /// group has no such case.
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, DatabaseError> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
@@ -176,7 +182,7 @@ impl Database {
     }
 
     /// Whether a case is not what it was when it was written: its hashes are of something else.
-    pub fn is_altered(&self, group: &str, case: &str) -> bool {
+    pub(crate) fn is_altered(&self, group: &str, case: &str) -> bool {
         self.altered.contains_key(&(group.to_string(), case.to_string()))
     }
 
@@ -233,7 +239,12 @@ impl Database {
     ///
     /// # Errors
     /// [`DatabaseError::NoGroup`] or [`DatabaseError::NoCase`], with the names there are.
-    pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, DatabaseError> {
+    pub(crate) fn case(
+        &self,
+        path: &Path,
+        group: &str,
+        name: &str,
+    ) -> Result<&Case, DatabaseError> {
         let cases = self.group(path, group)?;
         cases.iter().find(|c| c.name == name).ok_or_else(|| DatabaseError::NoCase {
             path: path.into(),
@@ -257,7 +268,10 @@ impl Database {
     /// # Errors
     /// [`DatabaseError::OtherStudy`] if a name is taken by another study; some cases may have been
     /// put by then.
-    pub fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), DatabaseError> {
+    pub(crate) fn put_all(
+        &mut self,
+        cases: impl IntoIterator<Item = Case>,
+    ) -> Result<(), DatabaseError> {
         let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
         for case in cases {
             let there = self.groups.entry(case.group.clone()).or_default();
@@ -287,7 +301,7 @@ impl Database {
     }
 
     /// Removes the cases of a group for which `keep` is false; returns their names.
-    pub fn retain(&mut self, group: &str, keep: impl Fn(&Case) -> bool) -> Vec<String> {
+    pub(crate) fn retain(&mut self, group: &str, keep: impl Fn(&Case) -> bool) -> Vec<String> {
         let Some(cases) = self.groups.get_mut(group) else { return Vec::new() };
         let removed: Vec<String> =
             cases.iter().filter(|c| !keep(c)).map(|c| c.name.clone()).collect();

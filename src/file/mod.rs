@@ -10,11 +10,12 @@ use std::io::{self, Read};
 use std::path::Path;
 
 pub use lock::{LockError, WriterLock};
-pub use write::{WriteError, write_all_whole, write_at, write_by_path, write_whole};
+pub(crate) use write::write_by_path;
+pub use write::{WriteError, write_all_whole, write_at, write_whole};
 
 /// What can be read at a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// It has a size, and can be read again.
     File,
     /// A named pipe or the output of another program: it can be read once and has no size.
@@ -25,7 +26,7 @@ pub enum Kind {
 ///
 /// # Errors
 /// Those of the operating system; for a folder, a device or a socket what it is.
-pub fn kind(path: &Path) -> io::Result<Kind> {
+pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
     let kind = fs::metadata(path)?.file_type();
     let refused = |what: &str| {
         Err(io::Error::new(io::ErrorKind::InvalidInput, format!("this is {what}: give a file")))
@@ -53,7 +54,7 @@ fn is_pipe(_: fs::FileType) -> bool {
 ///
 /// # Errors
 /// As of [`kind`], and for a pipe.
-pub fn open(path: &Path) -> io::Result<File> {
+pub(crate) fn open(path: &Path) -> io::Result<File> {
     match kind(path)? {
         Kind::File => File::open(path),
         Kind::Pipe => Err(io::Error::new(
@@ -66,7 +67,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Reads a file of `most` bytes at most.
 ///
 /// # Errors
-/// As of [`open`]; for a longer file its size and the bound.
+/// If it cannot be opened, or is no regular file or pipe; for a longer file its size and the bound.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let size = file.metadata()?.len();
@@ -92,7 +93,7 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As of [`read`], and for bytes that are not UTF-8.
-pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
+pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(read(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         let message = format!("byte {at} is not UTF-8: save the file as UTF-8 text");
@@ -101,7 +102,7 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
 }
 
 /// That so many bytes are not to be had.
-pub fn out_of_memory(bytes: u64) -> io::Error {
+pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
     let message = format!("there is no memory for its {bytes} bytes");
     io::Error::new(io::ErrorKind::OutOfMemory, message)
 }

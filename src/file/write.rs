@@ -91,7 +91,7 @@ pub fn write_at<T>(
 ///
 /// # Errors
 /// [`WriteError`] names the path, or of `fill`; nothing is replaced then.
-pub fn write_by_path<E: From<WriteError>>(
+pub(crate) fn write_by_path<E: From<WriteError>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,
 ) -> Result<(), E> {

@@ -4,7 +4,7 @@ use super::params::StopRule;
 
 /// Sums over the samples of a node; targets are centred on the training mean.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sums {
+pub(crate) struct Sums {
     pub weight: f64,
     pub target: f64,
     pub target_squared: f64,
@@ -12,28 +12,28 @@ pub struct Sums {
 
 impl Sums {
     #[inline]
-    pub fn add(&mut self, weight: f64, target: f64) {
+    pub(crate) fn add(&mut self, weight: f64, target: f64) {
         self.weight += weight;
         self.target += weight * target;
         self.target_squared += weight * target * target;
     }
 
     /// Difference of gains that is rounding and not gain.
-    pub fn rounding(&self) -> f64 {
+    pub(crate) fn rounding(&self) -> f64 {
         1e-13 * self.target_squared
     }
 
     /// Whether no split can gain more than rounding: none gains more than the squares about
     /// the mean.
-    pub fn is_pure(&self) -> bool {
+    pub(crate) fn is_pure(&self) -> bool {
         self.target_squared - self.target * self.target / self.weight <= self.rounding()
     }
 
-    pub fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         self.target / self.weight
     }
 
-    pub fn variance(&self) -> f64 {
+    pub(crate) fn variance(&self) -> f64 {
         (self.target_squared / self.weight - self.mean() * self.mean()).max(0.0)
     }
 
@@ -43,7 +43,7 @@ impl Sums {
     /// With `s`, `w` sums of targets and weights, `s_l²/w_l + s_r²/w_r − s²/w` is
     /// `(s_l w − s w_l)² / (w w_l w_r)`: no difference of large numbers is left.
     #[inline]
-    pub fn gain(&self, left_weight: f64, left_target: f64) -> f64 {
+    pub(crate) fn gain(&self, left_weight: f64, left_target: f64) -> f64 {
         let difference = left_target * self.weight - self.target * left_weight;
         difference * difference / (self.weight * left_weight * (self.weight - left_weight))
     }
@@ -51,7 +51,7 @@ impl Sums {
 
 /// Whether the stop rule keeps a node from being split. `offset` is the training mean
 /// that the targets are centred on. A mean of 0 counts as infinite variation.
-pub fn stops(rule: StopRule, sums: &Sums, offset: f64) -> bool {
+pub(crate) fn stops(rule: StopRule, sums: &Sums, offset: f64) -> bool {
     let mean = sums.mean() + offset;
     let below = |variation: f64, threshold: f64| mean != 0.0 && variation < threshold;
     match rule {

@@ -48,12 +48,12 @@ impl<F: Float> RegressionForest<F> {
     }
 
     /// Number of features that it was fitted to.
-    pub fn features(&self) -> usize {
+    pub(crate) fn features(&self) -> usize {
         self.features
     }
 
     /// The parameters that it was fitted with.
-    pub fn params(&self) -> &ForestValidParams<F> {
+    pub(crate) fn params(&self) -> &ForestValidParams<F> {
         &self.params
     }
 
@@ -84,7 +84,7 @@ impl<F: Float> RegressionForest<F> {
         self.members.as_ref().map_or(Ok(()), |members| members.check(&self.trees))
     }
 
-    /// Mean over the trees for one record of [`features`](Self::features) values.
+    /// Mean over the trees for one record: a value for each feature of the training samples.
     pub fn predict_one(&self, record: &ArrayView1<'_, F>) -> F {
         let sum = self.trees.iter().fold(F::zero(), |sum, tree| sum + tree.predict(record));
         sum / F::cast(self.trees.len())

@@ -24,7 +24,7 @@ use crate::stream::Stream;
 ///
 /// Samples are numbered by increasing value of the first feature, so that those of a node
 /// lie near each other in memory.
-pub struct Table<F> {
+pub(crate) struct Table<F> {
     /// By feature: its values in increasing order.
     pub columns: Vec<Vec<F>>,
     /// By feature: the samples of these values; of equal values the lower sample first.
@@ -75,7 +75,7 @@ struct Open {
 
 /// Grows a tree on samples drawn `times[sample]` times. Returns it and what its splits on
 /// each feature gained.
-pub fn grow<F: Float>(
+pub(crate) fn grow<F: Float>(
     table: &Table<F>,
     times: &[u32],
     params: &ForestValidParams<F>,

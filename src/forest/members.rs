@@ -9,7 +9,7 @@ use super::tree::{Tree, TreeError};
 
 /// The training samples of every leaf.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Members<F> {
+pub(crate) struct Members<F> {
     /// Training targets in increasing order.
     targets: Vec<F>,
     trees: Vec<Leaves>,
@@ -35,13 +35,13 @@ const ROUNDING: f64 = 1e-12;
 
 impl<F: Float> Members<F> {
     /// `targets` in increasing order; trees follow by [`push`](Self::push).
-    pub fn new(targets: Vec<F>) -> Self {
+    pub(crate) fn new(targets: Vec<F>) -> Self {
         Self { targets, trees: Vec::new() }
     }
 
     /// Adds a tree of `nodes` nodes. `drawn` gives leaf and number of draws of each sample,
     /// in the order of the targets; it is gone through twice.
-    pub fn push(&mut self, nodes: usize, drawn: impl Iterator<Item = (usize, u32)> + Clone) {
+    pub(crate) fn push(&mut self, nodes: usize, drawn: impl Iterator<Item = (usize, u32)> + Clone) {
         let mut first = vec![0u32; nodes + 1];
         for (leaf, times) in drawn.clone() {
             first[leaf + 1] += times;
@@ -61,7 +61,7 @@ impl<F: Float> Members<F> {
     }
 
     /// Checks members that were read from a file against the trees.
-    pub fn check(&self, trees: &[Tree<F>]) -> Result<(), TreeError> {
+    pub(crate) fn check(&self, trees: &[Tree<F>]) -> Result<(), TreeError> {
         let fits = |(leaves, tree): (&Leaves, &Tree<F>)| {
             leaves.first.len() == tree.nodes() + 1
                 && leaves.first[0] == 0
@@ -77,7 +77,7 @@ impl<F: Float> Members<F> {
     }
 
     /// One quantile per level for one record.
-    pub fn quantiles(
+    pub(crate) fn quantiles(
         &self,
         trees: &[Tree<F>],
         record: &ArrayView1<'_, F>,

@@ -32,8 +32,8 @@ mod tree;
 mod walk;
 
 pub use forest::{OutOfBag, RegressionForest};
-pub use onnx::{OnnxDescription, OnnxError};
-pub use params::{
-    FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds, Ties,
-};
+pub(crate) use onnx::OnnxDescription;
+pub use onnx::OnnxError;
+pub use params::ForestValidParams;
+pub use params::{FeaturesPerSplit, ForestError, ForestParams, StopRule, Thresholds, Ties};
 pub use tree::{Tree, TreeError};

@@ -7,7 +7,7 @@ use super::tree::Tree;
 
 /// What the model says of itself.
 #[derive(Clone, Copy, Debug)]
-pub struct OnnxDescription<'a> {
+pub(crate) struct OnnxDescription<'a> {
     /// Name of the graph.
     pub name: &'a str,
     /// For a reader of the model.
@@ -20,12 +20,21 @@ pub struct OnnxDescription<'a> {
 
 /// Why a forest cannot be an ONNX model.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum OnnxError {
+    /// There are not as many names as features.
     #[error("{named} features are named, the forest was fitted to {fitted}")]
-    Names { named: usize, fitted: usize },
+    Names {
+        /// Number of names.
+        named: usize,
+        /// Number of features that the forest was fitted with.
+        fitted: usize,
+    },
+    /// The file would be larger than protobuf allows.
     #[error("an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes")]
-    TooLarge { bytes: usize },
+    TooLarge {
+        /// Its size, in bytes.
+        bytes: usize,
+    },
 }
 
 /// Name of the model's input.
@@ -41,7 +50,7 @@ impl RegressionForest<f64> {
     ///
     /// # Errors
     /// [`OnnxError`] if the names do not fit the features or the file would be too large.
-    pub fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, OnnxError> {
+    pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, OnnxError> {
         let features = self.features();
         if description.features.len() != features {
             let named = description.features.len();

@@ -51,40 +51,92 @@ pub enum FeaturesPerSplit {
 
 /// Why a forest cannot be fitted, or asked for quantiles.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ForestError {
+    /// The number of trees is 0.
     #[error("a forest needs at least 1 tree, found 0")]
     NoTrees,
+    /// A leaf may be empty.
     #[error("min_samples_leaf must be at least 1, found 0")]
     MinSamplesLeaf,
+    /// The largest depth is 0.
     #[error("max_depth must be at least 1, found 0")]
     MaxDepth,
+    /// No feature is tried at a split.
     #[error("features per split must be at least 1, found 0")]
     FeaturesPerSplit,
+    /// The threshold at which a branch stops is below 0 or no number.
     #[error("the stop rule's threshold must be a finite number of at least 0, found {threshold}")]
-    StopThreshold { threshold: f64 },
+    StopThreshold {
+        /// The threshold.
+        threshold: f64,
+    },
+    /// An out-of-bag error is asked for, but every tree sees all samples.
     #[error("out-of-bag error needs bootstrap samples: set bootstrap(true)")]
     OutOfBagWithoutBootstrap,
+    /// More features are to be tried at a split than there are.
     #[error("features per split are {count}, but the records have {features} features")]
-    TooManyFeaturesPerSplit { count: usize, features: usize },
+    TooManyFeaturesPerSplit {
+        /// Number to be tried.
+        count: usize,
+        /// Number there are.
+        features: usize,
+    },
+    /// There is no sample.
     #[error("there are no samples to fit")]
     NoSamples,
+    /// There is no feature.
     #[error("there are no features to split on")]
     NoFeatures,
+    /// There are more samples than a node can number.
     #[error("{samples} samples are more than a forest can index ({most})", most = MOST_SAMPLES)]
-    TooManySamples { samples: usize },
+    TooManySamples {
+        /// Number of samples.
+        samples: usize,
+    },
+    /// Records and targets differ in number.
     #[error("{records} records but {targets} targets")]
-    Lengths { records: usize, targets: usize },
+    Lengths {
+        /// Number of records.
+        records: usize,
+        /// Number of targets.
+        targets: usize,
+    },
+    /// A value of a feature is infinite or no number.
     #[error("record {row}, feature {feature} is {value}: expected a finite number")]
-    RecordNotFinite { row: usize, feature: usize, value: f64 },
+    RecordNotFinite {
+        /// The sample, counted from 0.
+        row: usize,
+        /// The feature, counted from 0.
+        feature: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A target is infinite or no number.
     #[error("target {row} is {value}: expected a finite number")]
-    TargetNotFinite { row: usize, value: f64 },
+    TargetNotFinite {
+        /// The sample, counted from 0.
+        row: usize,
+        /// The value.
+        value: f64,
+    },
+    /// Quantiles are asked of a forest that has not kept the members of its leaves.
     #[error("the forest has not kept the samples of its leaves: fit it with quantiles(true)")]
     NoMembers,
+    /// The level of the quantiles is not between 0 and 1.
     #[error("the level of a quantile must be between 0 and 1, found {level}")]
-    Level { level: f64 },
+    Level {
+        /// The level.
+        level: f64,
+    },
+    /// A record has another number of features than the forest was fitted with.
     #[error("the records have {found} features, the forest was fitted to {fitted}")]
-    Features { found: usize, fitted: usize },
+    Features {
+        /// Number in the record.
+        found: usize,
+        /// Number that the forest was fitted with.
+        fitted: usize,
+    },
+    /// An error of linfa itself.
     #[error(transparent)]
     Linfa(#[from] linfa::Error),
 }
@@ -111,7 +163,7 @@ pub struct ForestValidParams<F> {
 
 impl<F> ForestValidParams<F> {
     /// How thresholds are chosen.
-    pub fn thresholds(&self) -> Thresholds {
+    pub(crate) fn thresholds(&self) -> Thresholds {
         self.thresholds
     }
 }

@@ -9,7 +9,7 @@ use crate::stream::Stream;
 /// A drawn sample in a feature's order. What a scan reads stands side by side, so that it
 /// goes through memory in one direction.
 #[derive(Clone, Copy, Debug)]
-pub struct Drawn<F> {
+pub(crate) struct Drawn<F> {
     /// Centred on the training mean.
     pub target: f64,
     /// The feature's value.
@@ -21,14 +21,14 @@ pub struct Drawn<F> {
 
 impl<F> Drawn<F> {
     #[inline]
-    pub fn weight(&self) -> f64 {
+    pub(crate) fn weight(&self) -> f64 {
         f64::from(self.times)
     }
 }
 
 /// A split: left if `value < threshold`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Split<F> {
+pub(crate) struct Split<F> {
     pub feature: usize,
     pub threshold: F,
     /// Distinct samples that go left: the first so many in the feature's order.
@@ -37,7 +37,7 @@ pub struct Split<F> {
 }
 
 /// What a split must keep to.
-pub struct Rules {
+pub(crate) struct Rules {
     thresholds: Thresholds,
     features: FeaturesPerSplit,
     ties: Ties,
@@ -45,7 +45,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    pub fn new<F>(params: &ForestValidParams<F>) -> Self {
+    pub(crate) fn new<F>(params: &ForestValidParams<F>) -> Self {
         Self {
             thresholds: params.thresholds,
             features: params.features_per_split,
@@ -74,14 +74,14 @@ impl<F: Float> Split<F> {
 
 /// Room that searches share.
 #[derive(Default)]
-pub struct Room {
+pub(crate) struct Room {
     untried: Vec<usize>,
     gains: Vec<f64>,
 }
 
 /// The best split of the node that owns the range `start..end` of every feature's order, or
 /// `None` if no split gains.
-pub fn best<F: Float>(
+pub(crate) fn best<F: Float>(
     orders: &[Vec<Drawn<F>>],
     (start, end): (usize, usize),
     node: &Sums,

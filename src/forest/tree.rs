@@ -5,7 +5,7 @@ use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
 
 /// Marks a leaf in [`Tree::feature`].
-pub const LEAF: i32 = -1;
+pub(crate) const LEAF: i32 = -1;
 
 /// A regression tree as flat arrays over its nodes; node 0 is the root.
 ///
@@ -24,18 +24,36 @@ pub struct Tree<F> {
 
 /// Why stored node arrays are no tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum TreeError {
+    /// The node arrays differ in length, or are empty.
     #[error("the node arrays differ in length or are empty")]
     Lengths,
+    /// A node splits on a feature that is not there.
     #[error("node {node} splits on feature {feature} of {features}")]
-    Feature { node: usize, feature: i32, features: usize },
+    Feature {
+        /// The node, counted from 0.
+        node: usize,
+        /// The feature, counted from 0.
+        feature: i32,
+        /// Number of features.
+        features: usize,
+    },
+    /// The children of a node do not stand side by side after it.
     #[error("node {node} has children that do not stand side by side after it")]
-    Child { node: usize },
+    Child {
+        /// The node, counted from 0.
+        node: usize,
+    },
+    /// A threshold or value is infinite or no number.
     #[error("node {node} holds a value that is not finite")]
-    NotFinite { node: usize },
+    NotFinite {
+        /// The node, counted from 0.
+        node: usize,
+    },
+    /// The members of the leaves do not fit the leaves.
     #[error("the samples of the leaves do not fit the trees")]
     Members,
+    /// The features' shares do not fit their number.
     #[error("the shares of the features do not fit their number")]
     Importance,
 }
@@ -102,7 +120,7 @@ impl<F: Float> Tree<F> {
     ///
     /// # Errors
     /// [`TreeError`] names the first node that breaks it.
-    pub fn check(&self, features: usize) -> Result<(), TreeError> {
+    pub(crate) fn check(&self, features: usize) -> Result<(), TreeError> {
         let nodes = self.nodes();
         let lengths = [self.feature.len(), self.threshold.len(), self.left.len(), self.right.len()];
         if nodes == 0 || lengths.iter().any(|&l| l != nodes) {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::tree::{LEAF, Tree};
 
 /// Rows handed to a thread together.
-pub const BATCH: usize = 1024;
+pub(crate) const BATCH: usize = 1024;
 
 /// Rows that walk in step, so that the memory of one is read while another's is awaited.
 const LANES: usize = 8;
@@ -19,7 +19,7 @@ const LANES: usize = 8;
 const GROUP: usize = 4 * LANES;
 
 /// Rows to walk: `features` values of each, row after row.
-pub struct Rows<'a, F> {
+pub(crate) struct Rows<'a, F> {
     values: &'a [F],
     features: usize,
     /// By group and feature: the lowest value, and the highest, or NaN if there is one.
@@ -27,7 +27,7 @@ pub struct Rows<'a, F> {
 }
 
 impl<'a, F: Float> Rows<'a, F> {
-    pub fn new(values: &'a [F], features: usize) -> Self {
+    pub(crate) fn new(values: &'a [F], features: usize) -> Self {
         let groups = values.chunks(GROUP * features);
         let mut ranges = vec![(F::infinity(), F::neg_infinity()); groups.len() * features];
         for (group, ranges) in groups.zip(ranges.chunks_exact_mut(features)) {
@@ -56,7 +56,7 @@ struct Node<F> {
 
 /// Trees packed for walking: as many as a second-level cache likes, or one. A packed forest
 /// beside the other would take more than half as much memory again.
-pub struct Walk<F> {
+pub(crate) struct Walk<F> {
     nodes: Vec<Node<F>>,
     /// What each node predicts.
     values: Vec<F>,
@@ -68,7 +68,7 @@ pub struct Walk<F> {
 const TOGETHER: usize = 1 << 16;
 
 /// The trees in groups to be packed together.
-pub fn groups<F: Float>(trees: &[Tree<F>]) -> impl Iterator<Item = &[Tree<F>]> {
+pub(crate) fn groups<F: Float>(trees: &[Tree<F>]) -> impl Iterator<Item = &[Tree<F>]> {
     let mut nodes = 0;
     trees.chunk_by(move |tree, next| {
         nodes += tree.nodes();
@@ -79,12 +79,12 @@ pub fn groups<F: Float>(trees: &[Tree<F>]) -> impl Iterator<Item = &[Tree<F>]> {
 }
 
 impl<F: Float> Walk<F> {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { nodes: Vec::new(), values: Vec::new(), roots: Vec::new() }
     }
 
     /// Packs trees in place of those before.
-    pub fn take(&mut self, trees: &[Tree<F>]) {
+    pub(crate) fn take(&mut self, trees: &[Tree<F>]) {
         self.nodes.clear();
         self.values.clear();
         self.roots.clear();
@@ -111,7 +111,7 @@ impl<F: Float> Walk<F> {
 
     /// Calls `found` with the leaf of each of `rows` (row after row, `features` values each)
     /// in each tree in turn and the row's own `out`, on all threads.
-    pub fn visit<T: Send>(
+    pub(crate) fn visit<T: Send>(
         &self,
         rows: &[F],
         features: usize,
@@ -129,7 +129,12 @@ impl<F: Float> Walk<F> {
 
     /// Calls `found` with number and leaf of each of `rows` in a tree of those taken. NaN is
     /// never below a threshold and goes right.
-    pub fn leaves(&self, tree: usize, rows: &Rows<'_, F>, mut found: impl FnMut(usize, usize)) {
+    pub(crate) fn leaves(
+        &self,
+        tree: usize,
+        rows: &Rows<'_, F>,
+        mut found: impl FnMut(usize, usize),
+    ) {
         let features = rows.features;
         let groups = rows.values.chunks(GROUP * features);
         let mut number = 0;
@@ -151,7 +156,7 @@ impl<F: Float> Walk<F> {
     }
 
     /// What a leaf predicts.
-    pub fn value(&self, leaf: usize) -> F {
+    pub(crate) fn value(&self, leaf: usize) -> F {
         self.values[leaf]
     }
 

@@ -1,33 +1,62 @@
-//! Exports: a predicted curve or a model as a file for another tool. One file per target.
-//! [`read`] takes curves back from such files.
+//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] takes them
+//! back.
+//!
+//! What all targets share stands once: the curve made ready ([`ExportCurve`]), its tail, thinning, softening, numbers and
+//! titles as text.
 
+mod adams;
+mod calculix;
 pub mod csv;
+mod export_curve;
+pub mod iso_mme;
 pub mod json;
 pub mod lsdyna;
+mod mat;
 pub mod onnx;
+mod radioss;
 pub mod read;
+mod table;
+mod tail;
+mod text;
+mod thin;
 
 use std::path::Path;
 
-use crate::curve::Parameter;
-use crate::dataset::OTHER_MASS;
+use crate::curve::{Case, EnvelopeError, ForceKind};
 use crate::forest::OnnxError;
-use crate::surrogate::{Model, PredictedCurve};
-use crate::unit::{SpeedKind, UnitSystem};
+use crate::surrogate::Model;
+use crate::surrogate::predict::PredictError;
+use crate::unit::UnitSystem;
+
+pub use export_curve::{ExportCurve, ExportInput, TargetUnloading};
+pub use lsdyna::Material;
+pub use tail::Tail;
 
 /// One target: its name, its file extensions, how it is written.
 pub struct Format {
+    /// As `--to` takes it.
     pub name: &'static str,
     /// Without the dot; the first is the usual one.
     pub extensions: &'static [&'static str],
+    /// One line for `export --list`.
     pub description: &'static str,
-    write: Write,
+    /// What its curves do beyond the maximal crush if nothing else is asked for.
+    pub tail: Tail,
+    writer: Writer,
 }
 
 /// What a target is made of.
-enum Write {
-    Curve(fn(&PredictedCurve, &Options) -> Result<Vec<u8>, ExportError>),
-    Model(fn(&Model) -> Result<Vec<u8>, ExportError>),
+enum Writer {
+    /// Curves, each with a file of its own.
+    Each(fn(&ExportCurve, &Options) -> Result<Exported, ExportError>),
+    /// Any number of curves in one file.
+    Together(fn(&[ExportCurve], &Options) -> Result<Exported, ExportError>),
+    /// A predicted or recorded curve with both forces.
+    Whole(fn(&ExportInput, &Options) -> Result<Exported, ExportError>),
+    /// A model.
+    Model(fn(&Model, &Options) -> Result<Exported, ExportError>),
+    /// A recorded case with its histories.
+    Case(fn(&Case, &Options) -> Result<Exported, ExportError>),
 }
 
 /// Every format we write. To add one: write its module, add its line here.
@@ -36,62 +65,191 @@ pub const FORMATS: &[Format] = &[
         name: "json",
         extensions: &["json"],
         description: "predicted curve with everything known of it, SI (master format)",
-        write: Write::Curve(json::write),
+        tail: Tail::None,
+        writer: Writer::Whole(json::write),
     },
     Format {
         name: "csv",
         extensions: &["csv"],
         description: "columns of deflection and force with # header lines, SI or --units",
-        write: Write::Curve(csv::write),
+        tail: Tail::Bottom,
+        writer: Writer::Each(csv::write),
     },
     Format {
         name: "lsdyna",
         extensions: &["k", "key", "dyn"],
-        description: "LS-DYNA *DEFINE_CURVE_TITLE, in the study's units or --units",
-        write: Write::Curve(lsdyna::write),
+        description: "LS-DYNA curves with a spring material, in the study's units or --units; --deck",
+        tail: Tail::Bottom,
+        writer: Writer::Together(lsdyna::write),
+    },
+    Format {
+        name: "radioss",
+        extensions: &["rad"],
+        description: "Radioss /FUNCT and /PROP/TYPE4, in the study's units or --units; --deck",
+        tail: Tail::Bottom,
+        writer: Writer::Together(radioss::write),
+    },
+    Format {
+        name: "calculix",
+        extensions: &["inp"],
+        description: "CalculiX or Abaqus *SPRING, NONLINEAR (elastic, at most 200 rows), SI or --units",
+        tail: Tail::Bottom,
+        writer: Writer::Together(calculix::write),
+    },
+    Format {
+        name: "adams",
+        extensions: &["cmd", "adm", "spr"],
+        description: "Adams spline: View command, Solver statement or spring property file",
+        tail: Tail::Bottom,
+        writer: Writer::Together(adams::write),
+    },
+    Format {
+        name: "mat",
+        extensions: &["mat"],
+        description: "MAT v4 matrices for MATLAB, Octave, scipy and Modelica, SI",
+        tail: Tail::Bottom,
+        writer: Writer::Together(mat::write),
+    },
+    Format {
+        name: "iso-mme",
+        extensions: &["mme"],
+        description: "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
+        tail: Tail::None,
+        writer: Writer::Case(iso_mme::write_case),
+    },
+    Format {
+        name: "table",
+        extensions: &["h5", "hdf5"],
+        description: "force over speed and deflection of a model, HDF5 or CSV, SI",
+        tail: Tail::Hold,
+        writer: Writer::Model(table::write),
     },
     Format {
         name: "onnx",
         extensions: &["onnx"],
         description: "forest model (of crumple train) as ONNX, SI; splits double, output float",
-        write: Write::Model(onnx::write),
+        tail: Tail::None,
+        writer: Writer::Model(onnx::write),
     },
 ];
 
 /// Choices that some targets take.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Units of the file; the target's usual ones if absent.
     pub units: Option<UnitSystem>,
-    /// Number of the curve in the target's deck.
+    /// Number of the first curve in the target's deck.
     pub id: u32,
+    /// Which force.
+    pub force: ForceKind,
+    /// What curves do beyond the maximal crush; the target's usual way if absent.
+    pub tail: Option<Tail>,
+    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy.
+    pub soften: bool,
+    /// Which spring material of LS-DYNA.
+    pub material: Material,
+    /// A complete input of one mass on the spring, not only the spring.
+    pub deck: bool,
+    /// Extension of the file that will be written, where a target has several kinds of file.
+    pub extension: Option<String>,
+    /// Speeds in m/s of a table over speeds; none for even steps over the training speeds.
+    pub speeds_m_per_s: Vec<f64>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { units: None, id: 101 }
+        Self {
+            units: None,
+            id: 101,
+            force: ForceKind::Body,
+            tail: None,
+            soften: false,
+            material: Material::default(),
+            deck: false,
+            extension: None,
+            speeds_m_per_s: Vec::new(),
+        }
+    }
+}
+
+/// What an export gives: one file, or several in a folder.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Exported {
+    /// Name and bytes of each file. A single file takes the name that the user gives; several
+    /// take theirs within the folder that the user names. Names may hold `/`.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What the user should know of what the target makes of the curves.
+    pub notes: Vec<String>,
+}
+
+impl Exported {
+    /// One file and nothing to say.
+    pub(crate) fn file(name: impl Into<String>, bytes: Vec<u8>) -> Self {
+        Self { files: vec![(name.into(), bytes)], notes: Vec::new() }
     }
 }
 
 /// Why a curve or a model cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
+    /// No format has that name.
     #[error("there is no export format \"{name}\": use one of {known}")]
-    NoSuchFormat { name: String, known: String },
+    NoSuchFormat {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// No format has that extension.
     #[error(
         "{path}: the extension does not name an export format: use one of {known}, or name the format"
     )]
-    NoSuchExtension { path: String, known: String },
+    NoSuchExtension {
+        /// The file.
+        path: String,
+        /// What there is.
+        known: String,
+    },
+    /// The target takes something else.
     #[error("{format} takes {needs}")]
-    Unfit { format: &'static str, needs: String },
+    Unfit {
+        /// The target.
+        format: &'static str,
+        /// What it takes.
+        needs: String,
+    },
+    /// The column names of a CSV file name their units.
     #[error("columns need units with names of their own: lengths in {lengths}, forces in {forces}")]
-    NoUnitNames { lengths: String, forces: String },
+    NoUnitNames {
+        /// Lengths that have names.
+        lengths: String,
+        /// Forces that have names.
+        forces: String,
+    },
+    /// The target has no units.
     #[error(
-        "{format} is always in SI: leave --units away, or take a format that has units (csv, lsdyna)"
+        "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)"
     )]
-    SiOnly { format: &'static str },
+    SiOnly {
+        /// The target.
+        format: &'static str,
+    },
+    /// The curve lacks the force, or is damaged.
+    #[error(transparent)]
+    Predict(Box<PredictError>),
+    /// What was made of the curve is none.
+    #[error("the curve cannot be prepared: {0}")]
+    Curve(#[from] EnvelopeError),
+    /// The forest has no ONNX form.
     #[error(transparent)]
     Onnx(#[from] OnnxError),
+    /// HDF5 cannot hold it.
+    #[error("cannot encode the table: {detail}")]
+    Hdf5 {
+        /// What is wrong, in the words of the library.
+        detail: String,
+    },
+    /// JSON cannot hold it.
     #[error("cannot encode the curve: {0}")]
     Encode(#[from] serde_json::Error),
 }
@@ -103,49 +261,116 @@ pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 pub const MIN_POINTS: usize = 4;
 
 impl Format {
-    /// Whether it is made of a model, not of a curve.
+    /// Whether it is made of a whole model, not of its curves.
     pub fn takes_model(&self) -> bool {
-        matches!(self.write, Write::Model(_))
+        matches!(self.writer, Writer::Model(_))
     }
 
-    /// The file's bytes, made of a model.
+    /// Whether it is made of recorded cases, not of curves.
+    pub fn takes_case(&self) -> bool {
+        matches!(self.writer, Writer::Case(_))
+    }
+
+    /// Whether one file holds both forces of a curve, each with its unloading.
+    pub fn holds_both_forces(&self) -> bool {
+        matches!(self.writer, Writer::Whole(_))
+    }
+
+    /// The files of a model.
     ///
     /// # Errors
     /// [`ExportError::Unfit`] if the target cannot take the model.
-    pub fn encode_model(&self, model: &Model) -> Result<Vec<u8>, ExportError> {
-        match self.write {
-            Write::Model(write) => write(model),
-            Write::Curve(_) => Err(self.unfit("a curve made by crumple predict")),
+    pub fn export_model(&self, model: &Model, options: &Options) -> Result<Exported, ExportError> {
+        match self.writer {
+            Writer::Model(write) => write(model, options),
+            _ => Err(self.unfit("a curve: name its speed with --speed")),
         }
+    }
+
+    /// The files of recorded cases, one set for each.
+    ///
+    /// # Errors
+    /// [`ExportError::Unfit`] if the target does not take cases.
+    pub fn export_cases(&self, cases: &[Case], options: &Options) -> Result<Exported, ExportError> {
+        let Writer::Case(write) = self.writer else {
+            return Err(self.unfit("curves: it has no histories"));
+        };
+        let all = cases.iter().map(|case| write(case, options)).collect::<Result<_, _>>()?;
+        Ok(joined(all))
+    }
+
+    /// The files of curves: of the force that the options name, or of both where one file holds both.
+    ///
+    /// # Errors
+    /// [`ExportError`] if the target cannot take them.
+    pub fn export(
+        &self,
+        inputs: &[ExportInput],
+        options: &Options,
+    ) -> Result<Exported, ExportError> {
+        for input in inputs {
+            let points = input.curve.deflection_m.len();
+            if points < MIN_POINTS {
+                return Err(self.unfit(format!("{MIN_POINTS} points or more, found {points}")));
+            }
+        }
+        let exported = match self.writer {
+            Writer::Model(_) => {
+                let how = format!("a model: crumple export MODEL --to {}", self.name);
+                return Err(self.unfit(how));
+            }
+            Writer::Case(_) => {
+                return Err(self.unfit(
+                    "histories over time: name a case of a database, which has them, or use crumple simulate -o",
+                ));
+            }
+            Writer::Whole(write) => {
+                joined(inputs.iter().map(|i| write(i, options)).collect::<Result<_, _>>()?)
+            }
+            Writer::Each(write) => {
+                let curves = options.ready(inputs, self.tail)?;
+                joined(curves.iter().map(|c| write(c, options)).collect::<Result<_, _>>()?)
+            }
+            Writer::Together(write) => write(&options.ready(inputs, self.tail)?, options)?,
+        };
+        Ok(with_names_of_their_own(exported))
     }
 
     fn unfit(&self, needs: impl Into<String>) -> ExportError {
         ExportError::Unfit { format: self.name, needs: needs.into() }
     }
+}
 
-    /// The file's bytes, made of a curve.
-    ///
-    /// # Errors
-    /// [`ExportError::Unfit`] if the target cannot take the curve.
-    pub fn encode(
-        &self,
-        curve: &PredictedCurve,
-        options: &Options,
-    ) -> Result<Vec<u8>, ExportError> {
-        let Write::Curve(write) = self.write else {
-            return Err(self.unfit("a model: crumple export MODEL --to onnx"));
-        };
-        let points = curve.deflection_m.len();
-        if points < MIN_POINTS {
-            return Err(self.unfit(format!("{MIN_POINTS} points or more, found {points}")));
+/// States that a deck's histories shall have, as in the reference data.
+const NUMBER_OF_STATES: f64 = 400.0;
+
+/// Time in s until a body on this curve has rebounded: a force that is even takes 2 d/v to stop it.
+fn run_time_s(curve: &ExportCurve) -> f64 {
+    4.0 * curve.max_crush_m() / curve.predicted.speed_m_per_s
+}
+
+fn joined(all: Vec<Exported>) -> Exported {
+    let mut whole = Exported::default();
+    for one in all {
+        whole.files.extend(one.files);
+        whole.notes.extend(one.notes);
+    }
+    whole
+}
+
+/// Curves of one speed would overwrite each other's files: the later ones are numbered.
+fn with_names_of_their_own(mut exported: Exported) -> Exported {
+    for i in 1..exported.files.len() {
+        let (before, rest) = exported.files.split_at_mut(i);
+        let name = rest[0].0.clone();
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
+        let mut number = 1;
+        while before.iter().any(|(other, _)| *other == rest[0].0) {
+            number += 1;
+            rest[0].0 = format!("{stem}-{number}.{extension}");
         }
-        write(curve, options)
     }
-
-    /// Whether one file holds both forces of a curve, each with its unloading.
-    pub fn holds_both_forces(&self) -> bool {
-        self.name == "json"
-    }
+    exported
 }
 
 /// The format of that name.
@@ -153,11 +378,15 @@ impl Format {
 /// # Errors
 /// [`ExportError::NoSuchFormat`] lists the names there are.
 pub fn by_name(name: &str) -> Result<&'static Format, ExportError> {
-    let known = || FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ");
     FORMATS
         .iter()
         .find(|f| f.name == name)
-        .ok_or_else(|| ExportError::NoSuchFormat { name: name.into(), known: known() })
+        .ok_or_else(|| ExportError::NoSuchFormat { name: name.into(), known: names() })
+}
+
+/// The names of all formats, for messages.
+pub fn names() -> String {
+    FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
 /// The format that the file's extension names.
@@ -174,95 +403,4 @@ pub fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
     FORMATS.iter().find(|f| f.extensions.contains(&extension)).ok_or_else(|| {
         ExportError::NoSuchExtension { path: path.display().to_string(), known: known() }
     })
-}
-
-/// What a curve is, in one line, for headers and titles.
-fn headline(curve: &PredictedCurve) -> String {
-    format!(
-        "{} {} ({})",
-        curve.provenance.group,
-        crate::unit::km_per_h(curve.speed_m_per_s),
-        curve.speed_kind.name()
-    )
-}
-
-/// What a curve is and what it may drive, as keys and values of a file's header; SI.
-fn facts(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
-    let kind = curve.provenance.force_kind;
-    let steepest = curve.envelope().map_or(0.0, |e| e.max_slope());
-    vec![
-        ("curve", headline(curve)),
-        ("force_kind", kind.name().into()),
-        ("drives", kind.drives().into()),
-        ("sign", "deflection and force positive in compression".into()),
-        ("speed_m_per_s", curve.speed_m_per_s.to_string()),
-        ("speed_kind", curve.speed_kind.name().into()),
-        ("mass_kg", curve.mass_kg.to_string()),
-        ("impact", impact(curve)),
-        ("energy_J", nine_digits(curve.energy_j)),
-        ("unloading_stiffness_N_per_m", nine_digits(curve.unloading_stiffness_n_per_m)),
-        ("unloading", unloading(curve, steepest).into()),
-        ("steepest_rise_N_per_m", nine_digits(steepest)),
-        ("model", curve.model.clone()),
-        ("training_hash", curve.provenance.training_hash.clone()),
-        ("written_by", curve.provenance.written_by.clone()),
-    ]
-}
-
-/// What the unloading stiffness gives.
-fn unloading(curve: &PredictedCurve, steepest_n_per_m: f64) -> &'static str {
-    let softer = curve.unloading_stiffness_n_per_m < steepest_n_per_m;
-    match (curve.rebound.is_some(), softer) {
-        (true, false) => "along this stiffness from the maximal crush it gives the rebound",
-        (true, true) => {
-            "along this stiffness from the maximal crush it gives the rebound; from a point of the steepest rise it would give energy"
-        }
-        (false, _) => {
-            "no run shows the rebound: at least the steepest rise, so that it gives no energy"
-        }
-    }
-}
-
-/// What hits what.
-fn impact(curve: &PredictedCurve) -> String {
-    match (curve.speed_kind, curve.provenance.parameters.get(OTHER_MASS)) {
-        (SpeedKind::Wall, _) => "one body of this mass against a rigid wall".into(),
-        (SpeedKind::Closing, Some(Parameter::Number(other))) => {
-            format!(
-                "two bodies, of this mass and of {other} kg; the speed is that of their closure"
-            )
-        }
-        (SpeedKind::Closing, _) => {
-            "two bodies of this mass each; the speed is that of their closure".into()
-        }
-    }
-}
-
-/// Nine significant digits in Fortran's form: `3.80000000E+06`.
-fn nine_digits(value: f64) -> String {
-    // A negative zero would only puzzle readers.
-    let text = format!("{:.8E}", value + 0.0);
-    match text.split_once('E') {
-        Some((mantissa, exponent)) => {
-            let (sign, digits) = match exponent.strip_prefix('-') {
-                Some(digits) => ('-', digits),
-                None => ('+', exponent),
-            };
-            format!("{mantissa}E{sign}{digits:0>2}")
-        }
-        None => text,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_nine_digits() {
-        assert_eq!(nine_digits(3.8e6), "3.80000000E+06");
-        assert_eq!(nine_digits(-1.0 / 3.0), "-3.33333333E-01");
-        assert_eq!(nine_digits(-0.0), "0.00000000E+00");
-        assert_eq!(nine_digits(1e-120), "1.00000000E-120");
-    }
 }

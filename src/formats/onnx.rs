@@ -1,11 +1,11 @@
 //! ONNX: a forest model for other programs' runtimes.
 
-use super::ExportError;
+use super::{ExportError, Exported, Options};
 use crate::forest::OnnxDescription;
 use crate::surrogate::Model;
 
 /// The model's forest: speed and deflection to force, in SI.
-pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
+pub fn write(model: &Model, _options: &Options) -> Result<Exported, ExportError> {
     let Some(forest) = model.forest() else {
         let needs =
             format!("models of --model forest or extra, this is of --model {}", model.name());
@@ -24,5 +24,5 @@ pub fn write(model: &Model) -> Result<Vec<u8>, ExportError> {
         .collect();
     let description =
         OnnxDescription { name: &model.group, text: &text, features: &features, target: "force_N" };
-    Ok(forest.forest().to_onnx(&description)?)
+    Ok(Exported::file("forest.onnx", forest.forest().to_onnx(&description)?))
 }

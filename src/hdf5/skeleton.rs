@@ -32,14 +32,14 @@ pub(crate) struct Skeleton {
 
 impl Skeleton {
     /// Gives a dataset of doubles its shape and its place.
-    pub fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
+    pub(crate) fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
         let shape = [rows as u64, columns as u64];
         self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
     }
 
     /// Gives a dataset of values of `size` bytes its shape and its place. Of fewer than 8 KiB the
     /// place is not found, and [`Skeleton::write`] gives `None`.
-    pub fn reserve_values(
+    pub(crate) fn reserve_values(
         &mut self,
         dataset: &mut DatasetBuilder,
         datatype: Datatype,
@@ -57,7 +57,7 @@ impl Skeleton {
 
     /// Writes everything but the values; where those of each dataset begin. `None` if the
     /// encoder did not hand all of them over in one piece.
-    pub fn write(&self, builder: FileBuilder, file: &File) -> io::Result<Option<Vec<u64>>> {
+    pub(crate) fn write(&self, builder: FileBuilder, file: &File) -> io::Result<Option<Vec<u64>>> {
         let mut offsets = vec![None; self.lengths.len()];
         let mut sink = Sink { lengths: &self.lengths, file, at: 0, offsets: &mut offsets };
         builder.finish_to(&mut sink).map_err(io::Error::other)?;

@@ -82,7 +82,7 @@ pub(crate) type Put<'a> = dyn FnMut(usize, u64, &[u8]) -> io::Result<()> + 'a;
 
 impl Values {
     /// Bytes of one value.
-    pub fn size(self) -> usize {
+    pub(crate) fn size(self) -> usize {
         match self {
             Self::Integer | Self::Real => 8,
             Self::Text { width } => width,
@@ -221,7 +221,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TableError`] if it is not HDF5, or no such table.
-    pub fn open(path: &Path, format: &str) -> Result<Self, TableError> {
+    pub(crate) fn open(path: &Path, format: &str) -> Result<Self, TableError> {
         let file =
             super::open(path).map_err(|source| TableError::Open { path: path.into(), source })?;
         let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
@@ -263,7 +263,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TableError::Damaged`] if attributes cannot be read.
-    pub fn attribute(&self, name: &str) -> Result<Option<Attribute>, TableError> {
+    pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, TableError> {
         let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
         Ok(match all.remove(name) {
             Some(AttrValue::VarLenString(text) | AttrValue::String(text)) => {
@@ -278,7 +278,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TableError::Damaged`] names the column.
-    pub fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, TableError> {
+    pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, TableError> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);
         if bytes > MAX_PIECE_BYTES {

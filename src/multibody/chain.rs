@@ -51,7 +51,7 @@ impl Resistance {
     }
 
     /// Force against the motion of `mass_kg` at `v_m_per_s`, with its sign, in N.
-    pub fn force_n(&self, mass_kg: f64, v_m_per_s: f64) -> f64 {
+    pub(crate) fn force_n(&self, mass_kg: f64, v_m_per_s: f64) -> f64 {
         let v = v_m_per_s.abs();
         let rate = self.constant_m_per_s2
             + self.linear_per_s * v
@@ -256,7 +256,7 @@ impl Chain {
     }
 
     /// Whether the row ends at a rigid wall.
-    pub fn has_wall(&self) -> bool {
+    pub(crate) fn has_wall(&self) -> bool {
         self.interfaces.len() == self.bodies.len()
     }
 

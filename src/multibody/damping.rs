@@ -72,7 +72,7 @@ impl Damping {
     }
 
     /// Coefficient in N s/m at a speed of either sign.
-    pub fn at(&self, speed_m_per_s: f64) -> f64 {
+    pub(crate) fn at(&self, speed_m_per_s: f64) -> f64 {
         let (v, c) = (&self.speed_m_per_s, &self.coefficient_n_s_per_m);
         let speed = speed_m_per_s.abs();
         match v.partition_point(|&v| v <= speed) {

@@ -5,7 +5,7 @@ use crate::curve::{CurveUnloading, DrivingCurve};
 
 /// How a curve unloads in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum UnloadingChoice {
+pub(crate) enum UnloadingChoice {
     /// As the curve knows it; with the steepest rise of its loading branch if it does not, and
     /// along the loading branch if that never rises.
     Own,
@@ -17,7 +17,11 @@ pub enum UnloadingChoice {
 
 impl ForceLaw {
     /// The law that follows a curve.
-    pub fn of_curve(curve: &DrivingCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    pub(crate) fn of_curve(
+        curve: &DrivingCurve,
+        unloading: UnloadingChoice,
+        end: EnvelopeEnd,
+    ) -> Self {
         let loading = curve.loading.clone();
         let memory = |stiffness_n_per_m: f64| match stiffness_n_per_m > 0.0 {
             true => Unloading::Memory { stiffness_n_per_m },

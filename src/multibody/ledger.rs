@@ -38,7 +38,7 @@ pub struct Ledger {
 
 impl Ledger {
     /// What is out of tolerance.
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.max_energy_error > ENERGY_TOLERANCE {
             warnings.push(format!(
@@ -81,7 +81,7 @@ pub(super) struct Account {
 }
 
 impl Account {
-    pub fn open(chain: &Chain) -> Self {
+    pub(crate) fn open(chain: &Chain) -> Self {
         let bodies = chain.bodies();
         let kinetic = |b: &super::Body| 0.5 * b.mass_kg * b.speed_m_per_s * b.speed_m_per_s;
         let ledger =
@@ -94,7 +94,7 @@ impl Account {
     }
 
     /// Audits an output.
-    pub fn audit(&mut self, now: &Balance) {
+    pub(crate) fn audit(&mut self, now: &Balance) {
         let ledger = &mut self.ledger;
         (ledger.kinetic_j, ledger.damped_j, ledger.resisted_j) =
             (now.kinetic_j, now.damped_j, now.resisted_j);
@@ -114,7 +114,7 @@ impl Account {
     }
 
     /// Stored and dissipated are those of the last output.
-    pub fn close(self, stored_j: f64, dissipated_j: f64) -> Ledger {
+    pub(crate) fn close(self, stored_j: f64, dissipated_j: f64) -> Ledger {
         Ledger { stored_j, dissipated_j, ..self.ledger }
     }
 }

@@ -16,16 +16,14 @@ mod reference;
 mod rows;
 mod run;
 
-pub use chain::{
-    Body, Chain, ChainError, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension,
-};
+pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2};
+pub use chain::{ChainError, Tension};
 pub use damping::{Damping, DampingError};
-pub use driven::UnloadingChoice;
+pub(crate) use driven::UnloadingChoice;
 pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 pub use ledger::Ledger;
-pub use run::{
-    BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError,
-};
+pub use run::InterfaceHistory;
+pub use run::{BodyHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError};
 
 use engine::Scheme;
 use run::Grid;

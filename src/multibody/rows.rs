@@ -26,17 +26,17 @@ pub(super) fn larger(a: Row, b: Row) -> Row {
 pub(super) struct Slot(usize);
 
 impl Slot {
-    pub fn new(row: usize, lane: usize) -> Self {
+    pub(crate) fn new(row: usize, lane: usize) -> Self {
         Self(row * LANES + lane)
     }
 
     #[inline(always)]
-    pub fn row(self) -> usize {
+    pub(crate) fn row(self) -> usize {
         self.0 / LANES
     }
 
     #[inline(always)]
-    pub fn lane(self) -> usize {
+    pub(crate) fn lane(self) -> usize {
         self.0 % LANES
     }
 }
@@ -47,7 +47,7 @@ pub(super) struct Layout(Vec<Slot>);
 
 impl Layout {
     /// Of as many bodies, and of a last one that never moves.
-    pub fn new(bodies: usize) -> Self {
+    pub(crate) fn new(bodies: usize) -> Self {
         let rows = bodies.div_ceil(LANES);
         // Without a body that is only a pad, the last one stands behind the end.
         let slot = |i: usize| match i < rows * LANES {
@@ -58,26 +58,26 @@ impl Layout {
     }
 
     #[inline(always)]
-    pub fn of(&self, i: usize) -> Slot {
+    pub(crate) fn of(&self, i: usize) -> Slot {
         self.0[i]
     }
 
     /// Rows that hold the bodies: `N`, or as many as there are if that is 0. With `N` the
     /// compiler unrolls the passes.
     #[inline(always)]
-    pub fn known<const N: usize>(&self) -> usize {
+    pub(crate) fn known<const N: usize>(&self) -> usize {
         if N > 0 { N } else { self.rows() }
     }
 
     /// Rows that hold the bodies.
     #[inline(always)]
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         (self.0.len() - 1).div_ceil(LANES)
     }
 
     /// What stands at a slot.
     #[inline(always)]
-    pub fn index(&self, slot: Slot) -> usize {
+    pub(crate) fn index(&self, slot: Slot) -> usize {
         slot.lane() * self.rows() + slot.row()
     }
 }
@@ -87,12 +87,12 @@ impl Layout {
 pub(super) struct Rows(Vec<Row>);
 
 impl Rows {
-    pub fn zeros(layout: &Layout) -> Self {
+    pub(crate) fn zeros(layout: &Layout) -> Self {
         Self(vec![[0.0; LANES]; layout.rows() + 1])
     }
 
     /// A value for each of the first `count` bodies.
-    pub fn of(layout: &Layout, count: usize, value: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn of(layout: &Layout, count: usize, value: impl Fn(usize) -> f64) -> Self {
         let mut rows = Self::zeros(layout);
         for i in 0..count {
             rows[layout.of(i)] = value(i);
@@ -101,18 +101,18 @@ impl Rows {
     }
 
     #[inline(always)]
-    pub fn values(&self, n: usize) -> &[Row] {
+    pub(crate) fn values(&self, n: usize) -> &[Row] {
         &self.0[..n]
     }
 
     #[inline(always)]
-    pub fn values_mut(&mut self, n: usize) -> &mut [Row] {
+    pub(crate) fn values_mut(&mut self, n: usize) -> &mut [Row] {
         &mut self.0[..n]
     }
 
     /// Sum of the first `n` rows.
     #[inline(always)]
-    pub fn sum(&self, n: usize) -> f64 {
+    pub(crate) fn sum(&self, n: usize) -> f64 {
         let mut lanes = [0.0; LANES];
         for row in self.values(n) {
             lanes = each(|j| lanes[j] + row[j]);

@@ -302,7 +302,7 @@ impl Grid {
     ///
     /// # Errors
     /// [`SimulationError`] for times that make no run, or one that is too long.
-    pub fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, SimulationError> {
+    pub(crate) fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, SimulationError> {
         let RunSettings { duration_s, output_interval_s, step_s, method, .. } = *settings;
         let times =
             [("duration", duration_s), ("output_interval", output_interval_s), ("step", step_s)];
@@ -333,12 +333,12 @@ impl Grid {
     }
 
     /// Time of an output.
-    pub fn output_s(&self, output: usize) -> f64 {
+    pub(crate) fn output_s(&self, output: usize) -> f64 {
         output as f64 * self.interval_s
     }
 
     /// Time of the steps between two outputs: the interval, with the rounding of the steps.
-    pub fn steps_s(&self) -> f64 {
+    pub(crate) fn steps_s(&self) -> f64 {
         self.step_s * self.steps_per_output as f64
     }
 }

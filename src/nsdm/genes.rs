@@ -39,7 +39,7 @@ pub(super) struct Nodes {
 
 impl Scales {
     /// Decodes: stiffness evenly in its logarithm, damping evenly, positions by their gaps.
-    pub fn nodes(&self, genes: &Genes) -> Nodes {
+    pub(crate) fn nodes(&self, genes: &Genes) -> Nodes {
         let (stiffness, rest) = genes.split_at(STIFFNESS_NODES);
         let (x_gaps, rest) = rest.split_at(STIFFNESS_NODES - 2);
         let (damping, v_gaps) = rest.split_at(DAMPING_NODES);
@@ -56,7 +56,7 @@ impl Scales {
     }
 
     /// Puts values into the genes, clipped into their bounds.
-    pub fn set_values(
+    pub(crate) fn set_values(
         genes: &mut Genes,
         stiffness: &[f64; STIFFNESS_NODES],
         damping: &[f64; DAMPING_NODES],
@@ -72,17 +72,17 @@ impl Scales {
     }
 
     /// Stiffness and damping in the middle of what is searched.
-    pub fn middle() -> (f64, f64) {
+    pub(crate) fn middle() -> (f64, f64) {
         let ([soft, stiff], [low, high]) = (STIFFNESS_N_PER_M, DAMPING_N_S_PER_M);
         ((soft * stiff).sqrt(), 0.5 * (low + high))
     }
 
-    pub fn laws(&self, genes: &Genes, mass_kg: f64) -> Laws {
+    pub(crate) fn laws(&self, genes: &Genes, mass_kg: f64) -> Laws {
         let nodes = self.nodes(genes);
         Laws::new(mass_kg, [&nodes.x_m, &nodes.v_m_per_s], [&nodes.stiffness, &nodes.damping])
     }
 
-    pub fn law(&self, genes: &Genes) -> Result<Nsdm, NsdmError> {
+    pub(crate) fn law(&self, genes: &Genes) -> Result<Nsdm, NsdmError> {
         let nodes = self.nodes(genes);
         Ok(Nsdm {
             stiffness: PiecewiseLinear::new(nodes.x_m.into(), nodes.stiffness.into())?,

@@ -37,7 +37,7 @@ impl PiecewiseLinear {
     }
 
     /// Magnitudes at the nodes.
-    pub fn nodes(&self) -> &[f64] {
+    pub(crate) fn nodes(&self) -> &[f64] {
         &self.nodes
     }
 
@@ -47,7 +47,7 @@ impl PiecewiseLinear {
     }
 
     /// Value at `|u|`; the last value beyond the last node.
-    pub fn at(&self, u: f64) -> f64 {
+    pub(crate) fn at(&self, u: f64) -> f64 {
         let u = u.abs();
         let i = self.nodes.partition_point(|&node| node <= u);
         if i >= self.nodes.len() {
@@ -118,12 +118,13 @@ impl From<Nsdm> for Columns {
 
 impl Nsdm {
     /// `k(|x|) x` in N, at `x` in m.
-    pub fn spring_force_n(&self, x_m: f64) -> f64 {
+    pub(crate) fn spring_force_n(&self, x_m: f64) -> f64 {
         self.stiffness.at(x_m) * x_m
     }
 
     /// `c(|x'|)` in N s/m, at a speed in m/s.
-    pub fn damping_n_s_per_m(&self, speed_m_per_s: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn damping_n_s_per_m(&self, speed_m_per_s: f64) -> f64 {
         self.damping.at(speed_m_per_s)
     }
 
@@ -190,7 +191,7 @@ impl Parabola {
 mod tests {
     use super::*;
 
-    pub fn law() -> Nsdm {
+    pub(crate) fn law() -> Nsdm {
         Nsdm {
             stiffness: PiecewiseLinear::new(vec![0.0, 0.1, 0.5, 1.0], vec![9e7, 1e7, 2e6, 3e6])
                 .unwrap(),

@@ -70,7 +70,7 @@ pub(super) struct Steps(Vec<(u32, f64)>);
 
 impl Steps {
     /// Equal steps between two times, none longer than [`STEP_S`].
-    pub fn new(time_s: &[f64]) -> Result<Self, NsdmError> {
+    pub(crate) fn new(time_s: &[f64]) -> Result<Self, NsdmError> {
         Self::over(time_s, STEP_S)
     }
 
@@ -137,7 +137,7 @@ pub(super) struct Laws {
 impl Laws {
     /// Nodes and values of the stiffness and of the damping, as [`super::PiecewiseLinear`]
     /// has them.
-    pub fn new(mass_kg: f64, nodes: [&[f64]; 2], values: [&[f64]; 2]) -> Self {
+    pub(crate) fn new(mass_kg: f64, nodes: [&[f64]; 2], values: [&[f64]; 2]) -> Self {
         let per_mass = 1.0 / mass_kg;
         Self {
             spring: Table::new(nodes[0], values[0], per_mass),
@@ -150,7 +150,7 @@ impl Laws {
     ///
     /// Nothing is checked on the way: a motion that diverges is visited with infinities and
     /// NaN.
-    pub fn integrate(
+    pub(crate) fn integrate(
         &self,
         speed_m_per_s: f64,
         steps: &Steps,

@@ -9,12 +9,12 @@ use crate::stream::{Stream, mix};
 const LEAST_SHARE: f64 = 1e-9;
 
 /// A key of two.
-pub fn key(seed: u64, number: u64) -> u64 {
+pub(crate) fn key(seed: u64, number: u64) -> u64 {
     mix(mix(seed).wrapping_add(mix(number.wrapping_add(1))))
 }
 
 /// Uniform in (0, 1), both excluded, for one variable of one item.
-pub fn unit(seed: u64, variable: u64, item: u64) -> f64 {
+pub(crate) fn unit(seed: u64, variable: u64, item: u64) -> f64 {
     let mut stream = Stream::new(key(seed, variable), item);
     // Moved by half a step of the 53 bits off 0; just below 1 this may round to 1.
     (stream.unit() + 0.5 / (1u64 << 53) as f64).min(1.0 - f64::EPSILON / 2.0)
@@ -24,7 +24,7 @@ pub fn unit(seed: u64, variable: u64, item: u64) -> f64 {
 ///
 /// A Feistel network is a bijection of a power of two at least as large as `n`; what falls
 /// beyond `n` is sent through again until it does not, which keeps it a bijection.
-pub fn permuted(k: u64, n: u64, key_of_order: u64) -> u64 {
+pub(crate) fn permuted(k: u64, n: u64, key_of_order: u64) -> u64 {
     let bits = (u64::BITS - n.saturating_sub(1).leading_zeros()).max(2);
     let half = bits.div_ceil(2);
     let mask = (1u64 << half) - 1;
@@ -66,7 +66,7 @@ pub enum DistributionError {
 
 /// A distribution by its quantile function.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Distribution {
+pub(crate) enum Distribution {
     /// Every value between the ends is equally likely.
     Uniform {
         /// Lower end.
@@ -93,7 +93,7 @@ pub enum Distribution {
 ///
 /// Bounds in the upper tail are mirrored into the lower one, where shares keep their digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truncated {
+pub(crate) struct Truncated {
     mean: f64,
     /// Below zero if mirrored.
     sd: f64,
@@ -128,7 +128,7 @@ impl Distribution {
     ///
     /// # Errors
     /// [`DistributionError`] if the ends are not in order.
-    pub fn uniform(from: f64, to: f64) -> Result<Self, DistributionError> {
+    pub(crate) fn uniform(from: f64, to: f64) -> Result<Self, DistributionError> {
         match from < to {
             true => Ok(Self::Uniform { from, to }),
             false => Err(DistributionError::Ends),
@@ -139,7 +139,7 @@ impl Distribution {
     ///
     /// # Errors
     /// [`DistributionError`] if the three are not in order.
-    pub fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, DistributionError> {
+    pub(crate) fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, DistributionError> {
         match from < to && from <= mode && mode <= to {
             true => Ok(Self::Triangular { from, mode, to }),
             false => Err(DistributionError::Triangle),
@@ -150,7 +150,12 @@ impl Distribution {
     ///
     /// # Errors
     /// [`DistributionError`] if the deviation is not above 0 or the bounds leave nothing.
-    pub fn normal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
+    pub(crate) fn normal(
+        mean: f64,
+        sd: f64,
+        min: f64,
+        max: f64,
+    ) -> Result<Self, DistributionError> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
@@ -161,7 +166,12 @@ impl Distribution {
     ///
     /// # Errors
     /// As of [`Distribution::normal`], and if mean or `max` is not above 0.
-    pub fn lognormal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
+    pub(crate) fn lognormal(
+        mean: f64,
+        sd: f64,
+        min: f64,
+        max: f64,
+    ) -> Result<Self, DistributionError> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
@@ -175,7 +185,7 @@ impl Distribution {
     }
 
     /// The value below which this share lies (`0 < share < 1`).
-    pub fn quantile(&self, share: f64) -> f64 {
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
         match self {
             Self::Uniform { from, to } => (from + share * (to - from)).clamp(*from, *to),
             Self::Triangular { from, mode, to } => {

@@ -3,7 +3,7 @@
 //! What the names in it refer to is the scenario's business; here numbers get their units and
 //! item `k` its values.
 
-pub mod draw;
+pub(crate) mod draw;
 mod error;
 
 use std::fmt;
@@ -13,10 +13,11 @@ use serde::Deserialize;
 
 use crate::unit::{LENGTH, MASS, SPEED};
 use draw::Distribution;
+pub use draw::DistributionError;
 pub use error::{PlanError, VaryError};
 
 /// More items than any cluster could run; keeps a mistyped number from passing.
-pub const MAX_ITEMS: u64 = 1_000_000_000_000;
+pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
 
 /// A `--plan` file: the `[sweep]` table by itself.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -83,7 +84,7 @@ pub enum ResultName {
 }
 
 /// All results, in the order of their columns.
-pub const RESULTS: [ResultName; 8] = [
+pub(crate) const RESULTS: [ResultName; 8] = [
     ResultName::PeakForce,
     ResultName::MaxDeflection,
     ResultName::MaxDeflectionTime,
@@ -159,7 +160,7 @@ pub enum What {
 
 impl What {
     /// Its name in a plan.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Speed => "speed",
             Self::Mass => "mass",
@@ -237,7 +238,7 @@ impl JsonSchema for Entry {
 
 /// The values of one variable, in SI.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Spread {
+pub(crate) enum Spread {
     /// These.
     List(Vec<f64>),
     /// Names, of which an item has one by its index.
@@ -257,7 +258,7 @@ pub enum Spread {
 
 impl Spread {
     /// Values along the grid; 1 of a distribution.
-    pub fn len(&self) -> u64 {
+    pub(crate) fn len(&self) -> u64 {
         match self {
             Self::List(values) => values.len() as u64,
             Self::Names(names) => names.len() as u64,
@@ -265,16 +266,11 @@ impl Spread {
             Self::Drawn(_) => 1,
         }
     }
-
-    /// Whether there is no value at all; a checked plan has none such.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
 }
 
 /// The variables of a checked plan, and how many items they make.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Design {
+pub(crate) struct Design {
     spreads: Vec<Spread>,
     samples: u64,
     items: u64,
@@ -287,7 +283,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`PlanError`] if `samples` is missing or without use, or the items are too many.
-    pub fn design(&self, spreads: Vec<Spread>) -> Result<Design, PlanError> {
+    pub(crate) fn design(&self, spreads: Vec<Spread>) -> Result<Design, PlanError> {
         let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
         let samples = match (self.samples, drawn) {
             (Some(0), _) => return Err(PlanError::NoSample),
@@ -314,19 +310,19 @@ impl Plan {
 
 impl Design {
     /// Number of items.
-    pub fn items(&self) -> u64 {
+    pub(crate) fn items(&self) -> u64 {
         self.items
     }
 
     /// The values of each variable.
-    pub fn spreads(&self) -> &[Spread] {
+    pub(crate) fn spreads(&self) -> &[Spread] {
         &self.spreads
     }
 
     /// Values of item `item` (`item < items`), one per variable in SI; of names the index.
     ///
     /// They depend on nothing but the plan and `item`.
-    pub fn values(&self, item: u64, values: &mut Vec<f64>) {
+    pub(crate) fn values(&self, item: u64, values: &mut Vec<f64>) {
         let (point, sample) = (item / self.samples, item % self.samples);
         values.clear();
         values.resize(self.spreads.len(), 0.0);
@@ -372,7 +368,7 @@ impl Vary {
     ///
     /// # Errors
     /// [`VaryError`] names the key.
-    pub fn spread(&self) -> Result<Spread, VaryError> {
+    pub(crate) fn spread(&self) -> Result<Spread, VaryError> {
         if let Some(name) = self.distribution {
             self.refuse("distribution", &["values", "steps"])?;
             return Ok(Spread::Drawn(self.drawn(name)?));

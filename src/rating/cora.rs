@@ -44,7 +44,7 @@ pub struct Cora {
 /// Equal lengths of 2 to [`MOST_SAMPLES`], samples at `interval_s`; `None` otherwise. Signals are
 /// shifted within the interval, and 80 % of it (INT_MIN) must overlap. A signal of zeros
 /// correlates with nothing: progression, size and phase are 0, unless both are zero.
-pub fn cora(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Cora> {
+pub(crate) fn cora(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Cora> {
     let n = reference.len();
     if !(2..=MOST_SAMPLES).contains(&n) || prediction.len() != n {
         return None;

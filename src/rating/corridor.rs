@@ -12,7 +12,7 @@ const EXPONENT: i32 = 2;
 ///
 /// Equal lengths, at least one. 0 to 1. Of a reference that is zero throughout the corridors
 /// have no width: samples that are zero as well count 1.
-pub fn corridor(reference: &[f64], prediction: &[f64]) -> f64 {
+pub(crate) fn corridor(reference: &[f64], prediction: &[f64]) -> f64 {
     let scale = reference.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
     let (inner, outer) = (INNER * scale, OUTER * scale);
     let score = |(r, p): (&f64, &f64)| {

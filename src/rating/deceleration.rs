@@ -33,7 +33,7 @@ impl Deceleration {
     ///
     /// Between samples −a is linear. EN 15227 limits the mean while the net contact force is
     /// above zero; of a signal without its force the deceleration itself tells begin and end.
-    pub fn of(time_s: &[f64], acceleration: &[f64]) -> Self {
+    pub(crate) fn of(time_s: &[f64], acceleration: &[f64]) -> Self {
         let deceleration: Vec<f64> = acceleration.iter().map(|a| -a).collect();
         let phase = phase(time_s, &deceleration);
         Self {

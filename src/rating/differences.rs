@@ -11,6 +11,7 @@ const CANCELS: f64 = 0.05;
 /// Mean of `|p − r|/|r|` over the samples where `|r|` is at least 5 % of its maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Pointwise {
+    /// The mean; 0 where the signals agree.
     pub mean: f64,
     /// Share of the samples that are left out.
     pub left_out: f64,
@@ -21,6 +22,7 @@ pub struct Pointwise {
 pub struct MaxAbs {
     /// `|p − r|`, in the unit of the signals.
     pub value: f64,
+    /// Where it is, in s.
     pub time_s: f64,
 }
 
@@ -35,21 +37,21 @@ fn pairs<'a>(r: &'a [f64], p: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + '
 }
 
 /// `‖p − r‖₂ / ‖r‖₂`; `None` if the reference is zero throughout. Equal lengths.
-pub fn rms_ratio(reference: &[f64], prediction: &[f64]) -> Option<f64> {
+pub(crate) fn rms_ratio(reference: &[f64], prediction: &[f64]) -> Option<f64> {
     let squares: f64 = reference.iter().map(|r| r * r).sum();
     let differences: f64 = pairs(reference, prediction).map(|(_, d)| d * d).sum();
     (squares > 0.0).then(|| (differences / squares).sqrt())
 }
 
 /// Mean of `|p − r|` over the largest `|r|`; `None` if that is zero. Equal lengths.
-pub fn peak_norm(reference: &[f64], prediction: &[f64]) -> Option<f64> {
+pub(crate) fn peak_norm(reference: &[f64], prediction: &[f64]) -> Option<f64> {
     let scale = largest(reference);
     let sum: f64 = pairs(reference, prediction).map(|(_, d)| d).sum();
     (scale > 0.0).then(|| sum / reference.len() as f64 / scale)
 }
 
 /// See [`Pointwise`]; `None` if the reference is zero throughout. Equal lengths.
-pub fn pointwise(reference: &[f64], prediction: &[f64]) -> Option<Pointwise> {
+pub(crate) fn pointwise(reference: &[f64], prediction: &[f64]) -> Option<Pointwise> {
     let least = SMALL * largest(reference);
     let kept = pairs(reference, prediction).filter(|(r, _)| r.abs() >= least && *r != 0.0);
     let errors: Vec<f64> = kept.map(|(r, d)| d / r.abs()).collect();
@@ -60,7 +62,7 @@ pub fn pointwise(reference: &[f64], prediction: &[f64]) -> Option<Pointwise> {
 }
 
 /// The largest difference and its time; equal lengths, at least one.
-pub fn max_abs(time_s: &[f64], reference: &[f64], prediction: &[f64]) -> MaxAbs {
+pub(crate) fn max_abs(time_s: &[f64], reference: &[f64], prediction: &[f64]) -> MaxAbs {
     let mut found = MaxAbs { value: 0.0, time_s: time_s[0] };
     for (&time_s, (_, value)) in time_s.iter().zip(pairs(reference, prediction)) {
         if value > found.value {
@@ -71,7 +73,7 @@ pub fn max_abs(time_s: &[f64], reference: &[f64], prediction: &[f64]) -> MaxAbs 
 }
 
 /// Trapezoid sum of `values` over `along`; equal lengths.
-pub fn integral(along: &[f64], values: &[f64]) -> f64 {
+pub(crate) fn integral(along: &[f64], values: &[f64]) -> f64 {
     let steps = along.windows(2).zip(values.windows(2));
     steps.map(|(x, v)| 0.5 * (v[0] + v[1]) * (x[1] - x[0])).sum()
 }
@@ -81,7 +83,7 @@ pub fn integral(along: &[f64], values: &[f64]) -> f64 {
 ///
 /// Equal lengths; `along` increasing. `None` where it makes no sense, as the reference's positive
 /// and negative parts nearly cancel (less than 5 % is left) or it is zero throughout.
-pub fn integral_error(along: &[f64], reference: &[f64], prediction: &[f64]) -> Option<f64> {
+pub(crate) fn integral_error(along: &[f64], reference: &[f64], prediction: &[f64]) -> Option<f64> {
     let magnitude: Vec<f64> = reference.iter().map(|r| r.abs()).collect();
     let of_reference = integral(along, reference);
     let of_magnitude = integral(along, &magnitude);

@@ -20,10 +20,10 @@ const WINDOW: usize = 10;
 const SMOOTHED: usize = 9;
 
 /// Fewest samples: what a shift leaves must hold a mean of nine.
-pub const LEAST_SAMPLES: usize = 12;
+pub(crate) const LEAST_SAMPLES: usize = 12;
 /// Most samples: the warping takes a fifth of their square in bytes, here 80 MB, and the
 /// search for the shift as many steps.
-pub const MOST_SAMPLES: usize = 20_000;
+pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -38,6 +38,7 @@ pub struct Iso18571 {
     pub slope: f64,
     /// `R = 0.4 Z + 0.2 (E_P + E_M + E_S)`.
     pub rating: f64,
+    /// The standard's word for this rating.
     pub grade: Grade,
     /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
     /// the interval; 0 if one of the signals is constant.
@@ -54,12 +55,13 @@ pub enum Grade {
     Good,
     /// Above 0.58.
     Fair,
+    /// All below.
     Poor,
 }
 
 impl Grade {
     /// Grade of a rating R.
-    pub fn of(rating: f64) -> Self {
+    pub(crate) fn of(rating: f64) -> Self {
         match rating {
             r if r > 0.94 => Self::Excellent,
             r if r > 0.80 => Self::Good,
@@ -68,6 +70,7 @@ impl Grade {
         }
     }
 
+    /// The word in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Excellent => "excellent",
@@ -86,7 +89,7 @@ impl Grade {
 /// A relative error over zeros counts as none if the prediction is zero there as well, else as
 /// the worst. Correlations that differ by less than 1e-12 count as equal, and the smaller shift
 /// is taken, as the standard has it for equal ones.
-pub fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
+pub(crate) fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
     let n = reference.len();
     if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n) || prediction.len() != n {
         return None;

@@ -12,6 +12,7 @@ pub struct MagnitudePhase {
     pub magnitude: f64,
     /// 0 to 1.
     pub phase: f64,
+    /// Of Sprague and Geers the root of the sum of the two squares; of Russell that, times √(π/4).
     pub combined: f64,
 }
 
@@ -38,7 +39,7 @@ fn norms_and_phase(reference: &[f64], prediction: &[f64]) -> Option<[f64; 3]> {
 /// Equal lengths. Sprague, Geers: A spectral-element method for modelling cavitation in
 /// transient fluid–structure interaction, Int. J. Numer. Meth. Eng. 60 (2004). `None` if one of
 /// the signals is zero throughout.
-pub fn sprague_geers(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
+pub(crate) fn sprague_geers(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
     let [of_r, of_p, phase] = norms_and_phase(reference, prediction)?;
     let magnitude = of_p / of_r - 1.0;
     Some(MagnitudePhase { magnitude, phase, combined: magnitude.hypot(phase) })
@@ -48,7 +49,7 @@ pub fn sprague_geers(reference: &[f64], prediction: &[f64]) -> Option<MagnitudeP
 ///
 /// Equal lengths. Russell: Error measures for comparing transient data, 68th Shock and
 /// Vibration Symposium (1997). `None` if one of the signals is zero throughout.
-pub fn russell(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
+pub(crate) fn russell(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
     let [of_r, of_p, phase] = norms_and_phase(reference, prediction)?;
     let m = of_p / of_r - of_r / of_p;
     let magnitude = (1.0 + m.abs()).log10().copysign(m);

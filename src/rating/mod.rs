@@ -12,28 +12,31 @@
 //! within 1e-12 are equal here. Of a reference of zeros it gives NaN. No public program computes CORA (pyisomme 1.1 has ISO/TS
 //! 18571 only, through the same package); the tests compute it a second way.
 
-pub mod cora;
-pub mod corridor;
+pub(crate) mod cora;
+pub(crate) mod corridor;
 pub mod deceleration;
-pub mod differences;
+pub(crate) mod differences;
 pub mod iso18571;
 pub mod magnitude_phase;
-pub mod shift;
+pub(crate) mod shift;
 mod signal;
 pub mod table;
-pub mod warping;
+pub(crate) mod warping;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-use cora::{Cora, cora};
+pub use cora::Cora;
+use cora::cora;
 use deceleration::Deceleration;
-use differences::{MaxAbs, Pointwise, integral_error, max_abs, peak_norm, pointwise, rms_ratio};
+pub use differences::{MaxAbs, Pointwise};
+use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
 use iso18571::{Iso18571, iso18571};
 use magnitude_phase::{MagnitudePhase, russell, sprague_geers};
-pub use signal::{INTERVAL_S, Pair, Signal, SignalError};
+pub(crate) use signal::{INTERVAL_S, Pair};
+pub use signal::{Signal, SignalError};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -41,6 +44,7 @@ pub use signal::{INTERVAL_S, Pair, Signal, SignalError};
 pub enum Quantity {
     /// Means of the deceleration are rated as well.
     Acceleration,
+    /// Anything else.
     #[default]
     Other,
 }
@@ -56,12 +60,14 @@ impl Quantity {
 
 /// How two signals are rated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Settings {
+pub struct RatingSettings {
+    /// What the signals are.
     pub quantity: Quantity,
     /// Class of a CFC filter for both, such as 60.
     pub cfc: Option<u32>,
     /// Begin and end of what is rated, in s; without them all common times.
     pub from_s: Option<f64>,
+    /// End of what is rated.
     pub to_s: Option<f64>,
 }
 
@@ -71,15 +77,21 @@ pub struct Settings {
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Rating {
+    /// The signal that is taken as right.
     pub reference: Rated,
+    /// The signal that is rated.
     pub prediction: Rated,
+    /// What the signals are.
     pub quantity: Quantity,
     /// Class of the filter on both signals, run over all their samples; null without one.
     pub cfc: Option<u32>,
     /// The common times: both signals are interpolated linearly at these.
     pub from_s: f64,
+    /// End of the common times, in s.
     pub to_s: f64,
+    /// Time between two of them, in s.
     pub interval_s: f64,
+    /// Number of common times.
     pub samples: usize,
     /// `Σ|p − r|/Σ|r|`, the headline.
     pub l1_ratio: Option<f64>,
@@ -87,7 +99,9 @@ pub struct Rating {
     pub rms_ratio: Option<f64>,
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
+    /// Relative differences sample by sample.
     pub pointwise: Option<Pointwise>,
+    /// The largest difference and its time.
     pub max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
@@ -95,7 +109,9 @@ pub struct Rating {
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
+    /// Measure of Sprague and Geers.
     pub sprague_geers: Option<MagnitudePhase>,
+    /// Measure of Russell.
     pub russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
     pub iso18571: Option<Iso18571>,
@@ -103,16 +119,20 @@ pub struct Rating {
     pub cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
     pub deceleration: Option<Decelerations>,
+    /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
 
 /// A signal that was rated.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Rated {
+    /// Name of its column.
     pub name: String,
     /// Its own samples, before anything is done to it.
     pub samples: usize,
+    /// Time of its first sample, in s.
     pub first_s: f64,
+    /// Time of its last sample, in s.
     pub last_s: f64,
 }
 
@@ -126,6 +146,7 @@ impl Rated {
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Peak {
+    /// Time of the reference's peak, in s.
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
     pub value: f64,
@@ -139,15 +160,17 @@ pub struct Peak {
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Decelerations {
+    /// Of the reference.
     pub reference: Deceleration,
+    /// Of the prediction.
     pub prediction: Deceleration,
 }
 
 /// Rates `prediction` against `reference`.
 ///
-/// Signals of other lengths and times are brought to common times, [`INTERVAL_S`] apart as
+/// Signals of other lengths and times are brought to common times, 0.1 ms apart as
 /// ISO/TS 18571 wants it, by linear interpolation where both have values; a filter comes before
-/// that. Over more than [`iso18571::MOST_SAMPLES`] samples ISO/TS 18571 and CORA are left out,
+/// that. Over more than 20 000 samples ISO/TS 18571 and CORA are left out,
 /// with a warning, as their time and memory grow with the square.
 ///
 /// # Errors
@@ -155,7 +178,7 @@ pub struct Decelerations {
 pub fn rate(
     reference: &Signal,
     prediction: &Signal,
-    settings: &Settings,
+    settings: &RatingSettings,
 ) -> Result<Rating, SignalError> {
     let filtered = |signal: &Signal| match settings.cfc {
         Some(class) => signal.filtered(class),
@@ -213,7 +236,7 @@ fn first_peaks(pair: &Pair) -> Vec<Peak> {
     matched.into_iter().filter(|peak| peak.reference.1 > 0.0).map(peak).collect()
 }
 
-fn warnings(rating: &Rating, reference: &[f64], settings: &Settings) -> Vec<String> {
+fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
     let (from_s, to_s) =
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
@@ -265,7 +288,7 @@ mod tests {
     }
 
     fn plain(reference: &Signal, prediction: &Signal) -> Rating {
-        rate(reference, prediction, &Settings::default()).unwrap()
+        rate(reference, prediction, &RatingSettings::default()).unwrap()
     }
 
     proptest! {
@@ -342,11 +365,12 @@ mod tests {
     #[test]
     fn a_filter_comes_before_the_cut() {
         let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
-        let beyond = Settings { to_s: Some(5.0), ..Settings::default() };
+        let beyond = RatingSettings { to_s: Some(5.0), ..RatingSettings::default() };
         let beyond = rate(&step, &step, &beyond).unwrap().warnings;
         assert!(beyond.iter().any(|w| w.contains("to 5 s was asked for")), "{beyond:?}");
-        let window = Settings { from_s: Some(0.052), cfc: Some(60), ..Settings::default() };
-        let whole = Settings { from_s: None, ..window };
+        let window =
+            RatingSettings { from_s: Some(0.052), cfc: Some(60), ..RatingSettings::default() };
+        let whole = RatingSettings { from_s: None, ..window };
         let zero = signal(vec![0.0; 200]);
         let cut = rate(&zero, &step, &window).unwrap();
         assert_eq!(cut.from_s, 0.052);

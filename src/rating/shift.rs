@@ -8,7 +8,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// A shift of the prediction against the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shift {
+pub(crate) struct Shift {
     /// Samples by which the prediction is late; negative if it is early.
     pub late: isize,
     /// Correlation of what overlaps.
@@ -24,7 +24,11 @@ impl Shift {
     }
 
     /// The parts of reference and prediction that overlap after the shift.
-    pub fn overlap<'a>(&self, reference: &'a [f64], prediction: &'a [f64]) -> [&'a [f64]; 2] {
+    pub(crate) fn overlap<'a>(
+        &self,
+        reference: &'a [f64],
+        prediction: &'a [f64],
+    ) -> [&'a [f64]; 2] {
         let (r, p) = Self::ranges(self.late, reference.len());
         [&reference[r], &prediction[p]]
     }
@@ -35,7 +39,7 @@ impl Shift {
 ///
 /// Equal lengths, at least two. `correlation` takes the two overlapping parts; where it is not
 /// defined it is not the largest. `None` if it is not defined without a shift.
-pub fn best(
+pub(crate) fn best(
     reference: &[f64],
     prediction: &[f64],
     correlation: fn(&[f64], &[f64]) -> Option<f64>,
@@ -55,7 +59,7 @@ pub fn best(
 }
 
 /// Correlation coefficient of Pearson; `None` if one is constant.
-pub fn centred(a: &[f64], b: &[f64]) -> Option<f64> {
+pub(crate) fn centred(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
     // A mean is rounded, and what a constant then leaves would correlate by chance.
@@ -65,7 +69,7 @@ pub fn centred(a: &[f64], b: &[f64]) -> Option<f64> {
 }
 
 /// Correlation of the values as they are; `None` if one is zero throughout.
-pub fn plain(a: &[f64], b: &[f64]) -> Option<f64> {
+pub(crate) fn plain(a: &[f64], b: &[f64]) -> Option<f64> {
     normalised(a.iter().zip(b).map(|(x, y)| (*x, *y)), [0.0; 2])
 }
 

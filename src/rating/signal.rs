@@ -4,7 +4,7 @@ use crate::signal::cfc::{self, CfcError};
 use crate::signal::resample::interpolate;
 
 /// Interval of ISO/TS 18571: 10 kHz.
-pub const INTERVAL_S: f64 = 1e-4;
+pub(crate) const INTERVAL_S: f64 = 1e-4;
 /// Fewest samples of a signal: fewer are points, not a history.
 const LEAST_SAMPLES: usize = 5;
 /// Most common samples: 500 s, far beyond any collision.
@@ -25,36 +25,96 @@ pub struct Signal {
 /// Why two columns are no signal, or two signals cannot be rated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SignalError {
+    /// Too few samples to be a history.
     #[error("{samples} samples are no history: at least {LEAST_SAMPLES} are needed")]
-    TooFew { samples: usize },
+    TooFew {
+        /// Number of samples.
+        samples: usize,
+    },
+    /// The columns differ in length.
     #[error("columns differ in length: {times} times, {values} values")]
-    Lengths { times: usize, values: usize },
+    Lengths {
+        /// Number of times.
+        times: usize,
+        /// Number of values.
+        values: usize,
+    },
+    /// A value is infinite, no number or beyond 1e100.
     #[error("sample {sample}: the value is {value}: expected a finite number up to 1e100")]
-    NotFinite { sample: usize, value: f64 },
+    NotFinite {
+        /// The sample, counted from 1.
+        sample: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A time is not later than the one before it.
     #[error(
         "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first"
     )]
-    TimeGoesBack { sample: usize, time_s: f64, before_s: f64 },
+    TimeGoesBack {
+        /// The later sample, counted from 1.
+        sample: usize,
+        /// Its time, in s.
+        time_s: f64,
+        /// The time before it, in s.
+        before_s: f64,
+    },
+    /// The signal cannot be filtered.
     #[error("{name}: {}", too_much(source))]
-    Filter { name: String, source: CfcError },
+    Filter {
+        /// Name of the signal.
+        name: String,
+        /// Why.
+        source: CfcError,
+    },
+    /// The signals have no common times.
     #[error(
         "there are no common times: the reference goes from {0} s to {1} s, the prediction from {2} s to {3} s; check the units of time",
         reference.0, reference.1, prediction.0, prediction.1
     )]
-    NoOverlap { reference: (f64, f64), prediction: (f64, f64) },
+    NoOverlap {
+        /// First and last time of the reference, in s.
+        reference: (f64, f64),
+        /// First and last time of the prediction, in s.
+        prediction: (f64, f64),
+    },
+    /// The interval that is asked for lies outside the common times.
     #[error(
         "what is asked for, from {0} s to {1} s, lies outside the common times from {2} s to {3} s",
         asked.0, asked.1, common.0, common.1
     )]
-    Outside { asked: (f64, f64), common: (f64, f64) },
+    Outside {
+        /// Its begin and end, in s.
+        asked: (f64, f64),
+        /// First and last common time, in s.
+        common: (f64, f64),
+    },
+    /// The common times hold too few samples.
     #[error(
         "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
     )]
-    TooShort { from_s: f64, to_s: f64, samples: usize, least: usize },
+    TooShort {
+        /// First common time, in s.
+        from_s: f64,
+        /// Last common time, in s.
+        to_s: f64,
+        /// Number of samples at 10 kHz.
+        samples: usize,
+        /// How many are needed.
+        least: usize,
+    },
+    /// The common times hold more samples than can be rated.
     #[error(
         "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
     )]
-    TooLong { from_s: f64, to_s: f64, samples: f64 },
+    TooLong {
+        /// First common time, in s.
+        from_s: f64,
+        /// Last common time, in s.
+        to_s: f64,
+        /// Number of samples at 10 kHz.
+        samples: f64,
+    },
 }
 
 /// What the filter cannot take. The filter's own words name the recipe's entry.
@@ -94,15 +154,11 @@ impl Signal {
         Ok(Self { name: name.into(), time_s, values })
     }
 
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    pub fn time_s(&self) -> &[f64] {
-        &self.time_s
-    }
-
-    pub fn values(&self) -> &[f64] {
+    pub(crate) fn values(&self) -> &[f64] {
         &self.values
     }
 
@@ -115,7 +171,7 @@ impl Signal {
     ///
     /// # Errors
     /// [`SignalError::Filter`] if its times are too coarse or too uneven.
-    pub fn filtered(&self, class: u32) -> Result<Self, SignalError> {
+    pub(crate) fn filtered(&self, class: u32) -> Result<Self, SignalError> {
         let filtered = cfc::filter(class, &self.time_s, &self.values)
             .map_err(|source| SignalError::Filter { name: self.name.clone(), source })?;
         Ok(Self { values: filtered.values, ..self.clone() })
@@ -124,7 +180,7 @@ impl Signal {
 
 /// Two signals at common times, [`INTERVAL_S`] apart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pair {
+pub(crate) struct Pair {
     pub time_s: Vec<f64>,
     pub reference: Vec<f64>,
     pub prediction: Vec<f64>,
@@ -135,7 +191,7 @@ impl Pair {
     ///
     /// # Errors
     /// [`SignalError`] if there are no common times, or fewer than `least` or too many samples.
-    pub fn new(
+    pub(crate) fn new(
         reference: &Signal,
         prediction: &Signal,
         (from_s, to_s): (Option<f64>, Option<f64>),

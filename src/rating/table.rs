@@ -7,43 +7,105 @@ use crate::table::{CsvTable, NoNumber};
 /// Columns of a table that hold a signal: its times as they stand, and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
+    /// Name of the time's column.
     pub time_name: String,
+    /// Name of the values' column.
     pub name: String,
+    /// Times in the table's unit, strictly increasing.
     pub time: Vec<f64>,
+    /// Values in the table's unit, one per time.
     pub values: Vec<f64>,
 }
 
 /// Why a table holds no signal. Lines and columns count from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
+    /// The text is no table.
     #[error("{0}")]
     Csv(#[from] csv::Error),
+    /// The text is empty.
     #[error("the table is empty: expected a header line, then a time and values in every line")]
     Empty,
+    /// The first line holds numbers.
     #[error(
         "line {line}: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"
     )]
-    NoHeader { line: u64 },
+    NoHeader {
+        /// Line in the file.
+        line: u64,
+    },
+    /// There is only one column.
     #[error(
         "line {line}: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"{found}\""
     )]
-    OneColumn { line: u64, found: String },
+    OneColumn {
+        /// Line in the file.
+        line: u64,
+        /// Its text.
+        found: String,
+    },
+    /// No column has the wanted name.
     #[error("there is no column \"{wanted}\": name one of {known}")]
-    NoColumn { wanted: String, known: String },
+    NoColumn {
+        /// The wanted name.
+        wanted: String,
+        /// The columns there are, as a list.
+        known: String,
+    },
+    /// Several columns have the wanted name.
     #[error("{count} columns are called \"{name}\": rename all but one")]
-    SameNames { name: String, count: usize },
+    SameNames {
+        /// The name.
+        name: String,
+        /// How many have it.
+        count: usize,
+    },
+    /// There are several columns, and none is named.
     #[error("there are several columns: name one of {known}")]
-    SeveralColumns { known: String },
+    SeveralColumns {
+        /// The columns there are, as a list.
+        known: String,
+    },
+    /// A field is no number.
     #[error("line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"")]
-    NotANumber { line: u64, column: usize, name: String, found: String },
+    NotANumber {
+        /// Line in the file.
+        line: u64,
+        /// Column in that line.
+        column: usize,
+        /// Name of the column.
+        name: String,
+        /// The field's text.
+        found: String,
+    },
+    /// A field is infinite, no number or empty.
     #[error(
         "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"
     )]
-    NotFinite { line: u64, column: usize, name: String, found: String },
+    NotFinite {
+        /// Line in the file.
+        line: u64,
+        /// Column in that line.
+        column: usize,
+        /// Name of the column.
+        name: String,
+        /// The field's text.
+        found: String,
+    },
+    /// A time is not later than the one before it.
     #[error(
         "line {line}, column 1 (\"{name}\"): time {found} does not come after {before}: times must rise strictly, so cut or sort the file first"
     )]
-    TimeGoesBack { line: u64, name: String, found: f64, before: f64 },
+    TimeGoesBack {
+        /// Line in the file.
+        line: u64,
+        /// Name of the time's column.
+        name: String,
+        /// The time, in the table's unit.
+        found: f64,
+        /// The time before it, in the table's unit.
+        before: f64,
+    },
 }
 
 /// Reads the first column and the one called `wanted`; without a name, the only other one.

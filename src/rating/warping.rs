@@ -11,7 +11,7 @@ const FROM_BOTH: u8 = 2;
 /// Equal lengths, at least one; pairs lie less than `window` samples apart (at least one).
 /// Of equal sums the step that stands first above is taken. Needs one byte for each cell of
 /// the window: `n (2 window − 1)`.
-pub fn path(first: &[f64], second: &[f64], window: usize) -> Vec<(usize, usize)> {
+pub(crate) fn path(first: &[f64], second: &[f64], window: usize) -> Vec<(usize, usize)> {
     let n = first.len();
     let reach = window - 1;
     let width = 2 * reach + 1;

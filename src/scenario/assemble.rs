@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::layout::{Layout, Role, Slot, layout};
 use super::spring::{SpringError, spring};
-use super::{CheckedScenario, LimitsTable, Prepared, ScenarioError, Source, Sources, Used};
+use super::{CheckedScenario, CurveSource, LimitsTable, Prepared, ScenarioError, Sources, Used};
 use crate::multibody::{
     Chain, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
 };
@@ -138,7 +138,7 @@ fn limited(scenario: &CheckedScenario<'_>, order: &[usize], limits: &LimitsTable
 ///
 /// # Errors
 /// [`ScenarioError`] as of [`assemble`](super::assemble); the chain is then not to be run.
-pub fn adjust(
+pub(crate) fn adjust(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     prepared: &mut Prepared,
@@ -190,7 +190,7 @@ impl Builder<'_> {
         let source = self.sources.curves.get(curve);
         let source =
             source.ok_or_else(|| self.failed(AssemblyError::NotRead { curve: curve.into() }))?;
-        let is_model = matches!(source, Source::Model(_));
+        let is_model = matches!(source, CurveSource::Model(_));
         let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
         let key = (
             slot.role == Role::Wall,

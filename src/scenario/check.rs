@@ -186,7 +186,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`CheckError`] names the key, vehicle or curve.
-    pub fn check(&self) -> Result<CheckedScenario<'_>, CheckError> {
+    pub(crate) fn check(&self) -> Result<CheckedScenario<'_>, CheckError> {
         check_shape(self)?;
         if let Some(limits) = &self.limits {
             check_limits(limits, &self.train)?;
@@ -209,12 +209,12 @@ impl Scenario {
 
 impl CheckedScenario<'_> {
     /// Speed at which the first train meets what is in front of it, in m/s; above 0.
-    pub fn meeting_m_per_s(&self) -> f64 {
+    pub(crate) fn meeting_m_per_s(&self) -> f64 {
         self.meeting_m_per_s
     }
 
     /// The same with tables of its own.
-    pub fn into_owned(self) -> CheckedScenario<'static> {
+    pub(crate) fn into_owned(self) -> CheckedScenario<'static> {
         CheckedScenario { tables: Cow::Owned(self.tables.into_owned()), ..self }
     }
 
@@ -223,7 +223,7 @@ impl CheckedScenario<'_> {
     ///
     /// # Errors
     /// [`CheckError`] as of [`Scenario::check`].
-    pub fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, CheckError> {
+    pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, CheckError> {
         check_values(varied)
     }
 }

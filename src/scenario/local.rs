@@ -11,7 +11,7 @@ use std::path::Path;
 
 use super::assemble::assemble_at;
 use super::layout::{Role, Slot, layout};
-use super::{CheckedScenario, InterfaceSpeed, Prepared, ScenarioError, Source, Sources};
+use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, ScenarioError, Sources};
 use crate::multibody::{Chain, Method, Run, simulate};
 use crate::signal::peaks::peaks;
 use crate::unit::km_per_h;
@@ -36,7 +36,7 @@ const SLOWEST_M_PER_S: f64 = 0.1;
 ///
 /// # Errors
 /// [`ScenarioError`] names the curve.
-pub fn assemble(
+pub(crate) fn assemble(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     sources: &Sources,
@@ -99,7 +99,8 @@ pub fn assemble(
 
 /// Whether a slot's curve depends on its own closing speed: between vehicles, from a model.
 fn is_local(slot: &Slot<'_>, sources: &Sources) -> bool {
-    slot.role == Role::Vehicles && matches!(sources.curves.get(slot.curve), Some(Source::Model(_)))
+    slot.role == Role::Vehicles
+        && matches!(sources.curves.get(slot.curve), Some(CurveSource::Model(_)))
 }
 
 /// Largest closing speed of interface `k` from its contact to the first maximum of its force;

@@ -10,10 +10,11 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-pub use assemble::{AssemblyError, adjust};
+pub use assemble::AssemblyError;
+pub(crate) use assemble::adjust;
 pub use check::{CheckError, CheckedScenario};
-pub use local::assemble;
-pub use sources::{Source, Sources};
+pub(crate) use local::assemble;
+pub(crate) use sources::{CurveSource, Sources};
 pub use tables::*;
 
 use crate::database::DatabaseError;
@@ -134,7 +135,7 @@ pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, Scenar
 ///
 /// # Errors
 /// [`ScenarioError::Check`] names the key.
-pub fn check<'a>(
+pub(crate) fn check<'a>(
     path: &Path,
     scenario: &'a Scenario,
 ) -> Result<CheckedScenario<'a>, ScenarioError> {

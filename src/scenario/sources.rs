@@ -11,13 +11,13 @@ use crate::surrogate::{Model, PredictedCurve};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
 #[derive(Clone, Debug)]
-pub struct Sources {
-    pub(super) curves: BTreeMap<String, Source>,
+pub(crate) struct Sources {
+    pub(super) curves: BTreeMap<String, CurveSource>,
 }
 
 /// What a curve is made of.
 #[derive(Clone, Debug)]
-pub enum Source {
+pub(crate) enum CurveSource {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
     /// Of a file.
@@ -33,7 +33,7 @@ const STEP_M: f64 = 1e-4;
 impl Scenario {
     /// Every place that names a curve, in a fixed order: the contact, the trains' inner curves, those
     /// behind vehicles, of crush zones, of tension.
-    pub fn curve_names_mut(&mut self) -> Vec<&mut String> {
+    pub(crate) fn curve_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = vec![&mut self.contact.curve];
         for train in &mut self.train {
             if train.vehicles.len() > 1 {
@@ -63,13 +63,13 @@ impl Sources {
     ///
     /// # Errors
     /// [`ScenarioError`] names the curve or file.
-    pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
+    pub(crate) fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut databases = BTreeMap::new();
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
             let source =
-                Source::read(table, name, folder, &mut databases).map_err(|e| match e {
+                CurveSource::read(table, name, folder, &mut databases).map_err(|e| match e {
                     ReadError::Message(message) => {
                         ScenarioError::Invalid { path: path.into(), message }
                     }
@@ -81,7 +81,7 @@ impl Sources {
     }
 
     /// Puts another source in place of a curve's.
-    pub fn replace(&mut self, curve: &str, source: Source) {
+    pub(crate) fn replace(&mut self, curve: &str, source: CurveSource) {
         self.curves.insert(curve.into(), source);
     }
 }
@@ -97,7 +97,7 @@ impl<E: Into<ScenarioError>> From<E> for ReadError {
     }
 }
 
-impl Source {
+impl CurveSource {
     fn read(
         table: &CurveTable,
         name: &str,

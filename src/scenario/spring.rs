@@ -1,7 +1,7 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
 use super::layout::{Role, Slot};
-use super::{CurveTable as Table, EndName, LawName, Source};
+use super::{CurveSource, CurveTable as Table, EndName, LawName};
 use crate::curve::driving::NoDrivingCurve;
 use crate::curve::{DrivingCurve, ForceKind};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
@@ -34,45 +34,46 @@ impl From<NoDrivingCurve> for SpringError {
 
 /// The curve of a source that the interface needs, at `speed_m_per_s` if a model gives it.
 pub(super) fn spring(
-    source: &Source,
+    source: &CurveSource,
     table: &Table,
     slot: &Slot<'_>,
     speed_m_per_s: f64,
 ) -> Result<Spring, SpringError> {
     let (declared, has_body) = match source {
-        Source::Model(model) => (Some(model.force_kind), model.has_body_force()),
-        Source::Predicted(curve) => {
+        CurveSource::Model(model) => (Some(model.force_kind), model.has_body_force()),
+        CurveSource::Predicted(curve) => {
             (Some(curve.provenance.force_kind), curve.body_force_n.is_some())
         }
-        Source::Case(case) => (Some(case.force_kind), case.force_kind == ForceKind::Contact),
-        Source::Curve(curve) => (curve.force, curve.force == Some(ForceKind::Body)),
-        Source::Stages(_) => (None, false),
+        CurveSource::Case(case) => (Some(case.force_kind), case.force_kind == ForceKind::Contact),
+        CurveSource::Curve(curve) => (curve.force, curve.force == Some(ForceKind::Body)),
+        CurveSource::Stages(_) => (None, false),
     };
     let force = which_force(table.force, slot, declared, has_body)?;
-    if table.band.is_some() && !matches!(source, Source::Model(_) | Source::Predicted(_)) {
+    if table.band.is_some() && !matches!(source, CurveSource::Model(_) | CurveSource::Predicted(_))
+    {
         return Err(SpringError::Message(
             "band needs a model or a predicted curve (.json), which has one".into(),
         ));
     }
     let Spring { mut curve, mut warnings } = match source {
-        Source::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
-        Source::Predicted(curve) => of_predicted(curve, table, force)?,
-        Source::Curve(curve) => Spring {
+        CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
+        CurveSource::Predicted(curve) => of_predicted(curve, table, force)?,
+        CurveSource::Curve(curve) => Spring {
             warnings: curve.force.is_none().then(|| UNKNOWN_FORCE.into()).into_iter().collect(),
             curve: (**curve).clone(),
         },
         // A device between two bodies moves these, and no mass is stopped in it.
-        Source::Stages(envelope) => {
+        CurveSource::Stages(envelope) => {
             Spring { curve: DrivingCurve::of_body(envelope.clone()), warnings: Vec::new() }
         }
-        Source::Case(case) => {
+        CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
             let curve = DrivingCurve::of_case(case, force.unwrap_or(case.force_kind))?;
             Spring { curve, warnings: truncated.into_iter().collect() }
         }
     };
     let only_contact = force != Some(ForceKind::Body) && curve.force == Some(ForceKind::Contact);
-    let stated = table.force.is_some() && !matches!(source, Source::Curve(_));
+    let stated = table.force.is_some() && !matches!(source, CurveSource::Curve(_));
     if only_contact && !stated && !slot.split && slot.role != Role::Within {
         warnings.push(ONLY_CONTACT.into());
     }
@@ -152,7 +153,7 @@ fn which_force(
 
 impl Spring {
     /// The force law that the curve's table asks for, with what must be said of it.
-    pub fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), String> {
+    pub(crate) fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), String> {
         let end = match table.end {
             EndName::Hold => EnvelopeEnd::Hold,
             EndName::Slope => EnvelopeEnd::Slope,

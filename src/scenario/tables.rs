@@ -271,13 +271,13 @@ pub struct VehicleTable {
 
 impl VehicleTable {
     /// Its crush zones by the end at which they are, `front` before `rear`.
-    pub fn zones(&self) -> impl Iterator<Item = (&'static str, &CrushZoneTable)> {
+    pub(crate) fn zones(&self) -> impl Iterator<Item = (&'static str, &CrushZoneTable)> {
         let front = self.front.as_ref().map(|zone| ("front", zone));
         front.into_iter().chain(self.rear.as_ref().map(|zone| ("rear", zone)))
     }
 
     /// Mass without the crush zones, in kg.
-    pub fn body_mass_kg(&self) -> f64 {
+    pub(crate) fn body_mass_kg(&self) -> f64 {
         self.mass.0 - self.zones().map(|(_, zone)| zone.mass.0).sum::<f64>()
     }
 }

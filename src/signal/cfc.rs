@@ -6,16 +6,27 @@ use super::resample::interpolate;
 
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum CfcError {
+    /// The samples are too far apart for the class.
     #[error(
         "the interval of {interval_s:e} s is too long for CFC{class}: at most {longest_s:e} s; use a lower class, filter = \"none\", or output at a higher rate"
     )]
-    TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
+    TooCoarse {
+        /// The class, such as 60.
+        class: u32,
+        /// Time between samples, in s.
+        interval_s: f64,
+        /// Longest time between samples that the class allows, in s.
+        longest_s: f64,
+    },
+    /// The samples are not evenly spaced.
     #[error(
         "the filter needs about equal intervals, but they differ by up to {spread_percent:.0} % of their mean: use filter = \"none\""
     )]
-    Uneven { spread_percent: f64 },
+    Uneven {
+        /// By how much the intervals differ, in % of their mean.
+        spread_percent: f64,
+    },
 }
 
 /// Largest deviation of an interval from the mean that still counts as equal.
@@ -27,7 +38,7 @@ const MAX_SPREAD: f64 = 0.6;
 
 /// A filtered history.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filtered {
+pub(crate) struct Filtered {
     /// In the unit of the input, one per time.
     pub values: Vec<f64>,
     /// Whether the intervals differed so much that it was filtered at their mean.
@@ -42,7 +53,7 @@ const PAD_SAMPLES: usize = 100;
 
 /// Coefficients of one pass: a two-pole Butterworth low-pass.
 #[derive(Debug, Clone, Copy)]
-pub struct Coefficients {
+pub(crate) struct Coefficients {
     /// Factor of the input.
     pub a0: f64,
     /// Factor of the input one step before.
@@ -58,7 +69,7 @@ pub struct Coefficients {
 impl Coefficients {
     /// `class`: CFC in Hz (60, 180, 600, 1000); `interval_s`: sampling interval.
     /// Formulas of SAE J211-1, appendix C.
-    pub fn new(class: u32, interval_s: f64) -> Self {
+    pub(crate) fn new(class: u32, interval_s: f64) -> Self {
         let w_d = 2.0 * PI * f64::from(class) * 2.0775;
         let w_a = (w_d * interval_s / 2.0).tan();
         let denominator = 1.0 + SQRT_2 * w_a + w_a * w_a;
@@ -92,7 +103,7 @@ impl Coefficients {
 ///
 /// # Errors
 /// [`CfcError`] if the interval is over `1/(10 CFC)` or the intervals differ.
-pub fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
+pub(crate) fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
     let n = values.len();
     if n < 2 {
         return Ok(Filtered { values: values.to_vec(), resampled: false, spread: 0.0 });

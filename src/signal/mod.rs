@@ -1,10 +1,11 @@
 //! Signal processing: arrays of values over time, of whatever quantity.
 
-pub mod cfc;
+pub(crate) mod cfc;
 mod derivative;
 mod l1;
-pub mod peaks;
-pub mod resample;
+pub(crate) mod peaks;
+pub(crate) mod resample;
 
+pub use cfc::CfcError;
 pub use derivative::derivative;
 pub use l1::l1_ratio;

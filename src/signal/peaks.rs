@@ -1,7 +1,7 @@
 //! Peaks of a signal by their prominence, and those of two signals that match.
 
 /// A peak counts if it stands out by this share of the largest value.
-pub const PROMINENCE: f64 = 0.1;
+pub(crate) const PROMINENCE: f64 = 0.1;
 /// Peaks of the reference that are looked for in the prediction.
 const PEAKS: usize = 2;
 /// A predicted peak matches if it lies no further off than this share of the range.
@@ -12,7 +12,7 @@ const MATCH: f64 = 0.1;
 /// Prominence is the height over the higher of the two lowest values that must be passed on
 /// the way to a larger maximum, or to the end. Of a plateau the first point counts; the
 /// ends count if the values fall from them. Takes a time in proportion to the number of values.
-pub fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
+pub(crate) fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
     let n = values.len();
     let left = saddles(values.iter());
     let mut right = saddles(values.iter().rev());
@@ -64,7 +64,7 @@ fn saddles<'a>(values: impl Iterator<Item = &'a f64>) -> Vec<Saddle> {
 
 /// A peak of a reference and the one of a prediction that matches it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MatchedPeak {
+pub(crate) struct MatchedPeak {
     /// Abscissa and value of the reference.
     pub reference: (f64, f64),
     /// Abscissa and value of the prediction; `None` if it has no peak there.
@@ -76,7 +76,11 @@ pub struct MatchedPeak {
 ///
 /// Equal lengths, at least one; `along` increasing. Prominence is a tenth of each one's
 /// largest value; a peak further off than a tenth of the range of `along` is missing.
-pub fn matched_peaks(along: &[f64], reference: &[f64], prediction: &[f64]) -> Vec<MatchedPeak> {
+pub(crate) fn matched_peaks(
+    along: &[f64],
+    reference: &[f64],
+    prediction: &[f64],
+) -> Vec<MatchedPeak> {
     let prominent =
         |values: &[f64]| peaks(values, PROMINENCE * values.iter().copied().fold(0.0, f64::max));
     let found = prominent(prediction);

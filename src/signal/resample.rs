@@ -3,7 +3,7 @@
 /// Why a history has no value at a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]
-pub struct OutOfRange {
+pub(crate) struct OutOfRange {
     /// The time that was asked for.
     pub time_s: f64,
     /// The first of the history.
@@ -19,7 +19,11 @@ pub struct OutOfRange {
 ///
 /// # Errors
 /// [`OutOfRange`] names the first time outside the history.
-pub fn interpolate(at_s: &[f64], values: &[f64], times_s: &[f64]) -> Result<Vec<f64>, OutOfRange> {
+pub(crate) fn interpolate(
+    at_s: &[f64],
+    values: &[f64],
+    times_s: &[f64],
+) -> Result<Vec<f64>, OutOfRange> {
     let (first_s, last_s) = (at_s[0], at_s[at_s.len() - 1]);
     let mut i = 0;
     times_s

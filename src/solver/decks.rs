@@ -41,7 +41,7 @@ pub fn read(path: &Path) -> Result<Deck, ReadError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError> {
+pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut included = Vec::new();

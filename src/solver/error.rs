@@ -7,36 +7,115 @@ use super::{Entity, NoDataReason, Selection, SolverFile, WantedId};
 
 /// Why a file could not be read at all, or not what was asked of it.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ReadError {
+    /// The file cannot be opened or read.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// No reader knows the file.
     #[error("{path}: {looks_like}: the readers take {known}")]
-    UnknownFormat { path: PathBuf, looks_like: String, known: String },
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// What it looks like.
+        looks_like: String,
+        /// The formats that can be read, as a list.
+        known: String,
+    },
+    /// The file is not of the format that was named.
     #[error("{path}: this is no {format}: it looks like a {looks_like}, read it as that")]
-    OtherFormat { path: PathBuf, format: String, looks_like: &'static str },
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// The format that was named.
+        format: String,
+        /// The format that it looks like.
+        looks_like: &'static str,
+    },
+    /// The path is a folder.
     #[error("{path}: this is a folder: name a file in it{files}")]
-    Folder { path: PathBuf, files: String },
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Files in it that can be read, as words; empty if there are none.
+        files: String,
+    },
+    /// The file is a keyword deck.
     #[error(
         "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"
     )]
-    Deck { path: PathBuf },
+    Deck {
+        /// The deck.
+        path: PathBuf,
+    },
+    /// The file has several sections, and none was selected.
     #[error(
         "{path}: it has several sections: select one of {known} (with --section; in a recipe the section's name is the file's)"
     )]
-    SeveralSections { path: PathBuf, known: String },
+    SeveralSections {
+        /// The file.
+        path: PathBuf,
+        /// Its sections, as a list.
+        known: String,
+    },
+    /// The file has no such section.
     #[error("{path}: it has no section \"{section}\": it has {known}")]
-    NoSuchSection { path: PathBuf, section: String, known: String },
+    NoSuchSection {
+        /// The file.
+        path: PathBuf,
+        /// The section that was asked for.
+        section: String,
+        /// Its sections, as a list.
+        known: String,
+    },
+    /// No reader has such a name.
     #[error("there is no format \"{name}\": the readers take {known}")]
-    NoSuchFormat { name: String, known: String },
+    NoSuchFormat {
+        /// The name that was given.
+        name: String,
+        /// The formats that can be read, as a list.
+        known: String,
+    },
+    /// The file has no such node, wall, interface or other entity.
     #[error("{path}: {format} has no {what} {id}: {near}", what = entity_word(format))]
-    NoSuchEntity { path: PathBuf, format: String, id: WantedId, near: String },
+    NoSuchEntity {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: String,
+        /// What was asked for.
+        id: WantedId,
+        /// What the file has instead, in words.
+        near: String,
+    },
+    /// The contact is of a kind that LS-DYNA prints no forces for.
     #[error(
         "{path}: interface {id} is a single-surface contact, for which LS-DYNA prints no resultants: ask for a two-sided contact or a force transducer ({with_data})"
     )]
-    SingleSurface { path: PathBuf, id: i64, with_data: String },
+    SingleSurface {
+        /// The file.
+        path: PathBuf,
+        /// Number of the interface.
+        id: i64,
+        /// Interfaces that have data, as a list.
+        with_data: String,
+    },
+    /// The file has no such component.
     #[error("{path}: {format} has no component \"{component}\": it has {known}")]
-    NoSuchComponent { path: PathBuf, format: String, component: String, known: String },
+    NoSuchComponent {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: String,
+        /// The component that was asked for.
+        component: String,
+        /// Its components, as a list.
+        known: String,
+    },
 }
 
 /// What an id of this format counts, for messages.

@@ -50,7 +50,7 @@ fn continuation(path: &Path, number: usize) -> PathBuf {
 const LOOKED_AHEAD: usize = 20;
 
 /// The first continuation that is missing although later ones are there, of any of the files.
-pub fn missing_continuation(path: &Path) -> Option<String> {
+pub(crate) fn missing_continuation(path: &Path) -> Option<String> {
     let first = |path: &Path| (1..).find(|&n| !continuation(path, n).is_file()).unwrap_or(1);
     let is_continuation =
         |part: &Path| part.file_name().is_some_and(|name| name.to_string_lossy().contains('%'));

@@ -106,7 +106,7 @@ impl Format {
 }
 
 /// The formats' names, for messages: `nodout, rcforc, …`.
-pub fn format_names() -> String {
+pub(crate) fn format_names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 

@@ -118,7 +118,7 @@ pub(in crate::solver) fn of_time(time: &[f64]) -> Vec<Problem> {
 
 /// Where a problem is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub(crate) struct Place {
     /// Counted from 1; 0 in a binary file.
     pub line: u64,
     pub byte: u64,
@@ -126,20 +126,20 @@ pub struct Place {
 
 impl Place {
     /// A place in a binary file, which has no lines.
-    pub fn at_byte(byte: u64) -> Self {
+    pub(crate) fn at_byte(byte: u64) -> Self {
         Self { line: 0, byte }
     }
 }
 
 /// Collects problems up to a bound.
 #[derive(Debug, Default)]
-pub struct Problems {
+pub(crate) struct Problems {
     kept: Vec<Problem>,
     dropped: usize,
 }
 
 impl Problems {
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         code: ProblemCode,
         place: Option<Place>,
@@ -149,7 +149,7 @@ impl Problems {
         self.push(Problem { columns, ..Problem::at(code, place, message) });
     }
 
-    pub fn push(&mut self, problem: Problem) {
+    pub(crate) fn push(&mut self, problem: Problem) {
         if self.kept.len() < MAX_KEPT {
             self.kept.push(problem);
         } else {
@@ -158,18 +158,18 @@ impl Problems {
     }
 
     /// A problem of a binary file, which has no lines.
-    pub fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
+    pub(crate) fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
         self.add(code, Some(Place::at_byte(byte)), None, message);
     }
 
     /// Adds the problems of another list behind these.
-    pub fn append(&mut self, other: Self) {
+    pub(crate) fn append(&mut self, other: Self) {
         let room = MAX_KEPT - self.kept.len();
         self.dropped += other.dropped + other.kept.len().saturating_sub(room);
         self.kept.extend(other.kept.into_iter().take(room));
     }
 
-    pub fn into_list(mut self) -> Vec<Problem> {
+    pub(crate) fn into_list(mut self) -> Vec<Problem> {
         if self.dropped > 0 {
             let message = format!("{} further problems are not listed", self.dropped);
             self.kept.push(Problem::new(ProblemCode::MoreProblems, message));

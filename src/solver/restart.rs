@@ -11,7 +11,7 @@ use super::problem::{Place, Problem, ProblemCode, Problems};
 /// `place`: where a state begins. `of`: what stands ahead of each message.
 ///
 /// Returns the indices, increasing, and what was left out or is out of order.
-pub fn resolve(
+pub(crate) fn resolve(
     time: &[f64],
     is_same: impl Fn(usize, usize) -> Option<bool>,
     place: impl Fn(usize) -> Option<Place>,

@@ -40,7 +40,7 @@ pub enum Access {
 ///
 /// # Errors
 /// Those of the operating system, and for a device, which may have no end.
-pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
+pub(crate) fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
     let kind = file::kind(path)?;
     let mut file = File::open(path)?;
     if kind == file::Kind::Pipe {
@@ -55,7 +55,7 @@ pub fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
 }
 
 /// A file with the size that it had when it was opened.
-pub struct Opened {
+pub(crate) struct Opened {
     file: File,
     size: u64,
 }
@@ -65,7 +65,7 @@ impl Opened {
     ///
     /// # Errors
     /// Those of the operating system.
-    pub fn new(file: File) -> io::Result<Self> {
+    pub(crate) fn new(file: File) -> io::Result<Self> {
         let size = file.metadata()?.len();
         Ok(Self { file, size })
     }
@@ -151,7 +151,7 @@ impl Source for Vec<u8> {
 }
 
 /// What a file is that begins so, and what to do, if it is compressed or no plain text.
-pub fn encoded(head: &[u8]) -> Option<&'static str> {
+pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
     const ENCODED: [(&[u8], &str); 7] = [
         (b"\x1f\x8b", "this is compressed by gzip, which gunzip undoes"),
         (b"BZh", "this is compressed by bzip2, which bunzip2 undoes"),
@@ -174,7 +174,7 @@ pub fn encoded(head: &[u8]) -> Option<&'static str> {
 const UTF_16: &str = "this is UTF-16 text, which iconv -f UTF-16 -t UTF-8 makes plain";
 
 /// Fills as much of `buffer` as the source has from `offset` on; returns how much.
-pub fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+pub(crate) fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < buffer.len() {
         match source.read_at(offset + filled as u64, &mut buffer[filled..]) {
@@ -200,7 +200,7 @@ pub(super) fn read_buffered(input: &mut impl BufRead, out: &mut [u8]) -> io::Res
 const STREAM_BUFFER: usize = 1 << 16;
 
 /// A source read from front to back, with jumps.
-pub struct Stream<'a> {
+pub(crate) struct Stream<'a> {
     source: &'a dyn Source,
     /// Position of the buffer's end.
     at: u64,
@@ -210,17 +210,17 @@ pub struct Stream<'a> {
 
 impl<'a> Stream<'a> {
     /// From the first byte on.
-    pub fn new(source: &'a dyn Source) -> Self {
+    pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, at: 0, buffer: Vec::new(), used: 0 }
     }
 
     /// Position of the next byte.
-    pub fn position(&self) -> u64 {
+    pub(crate) fn position(&self) -> u64 {
         self.at - (self.buffer.len() - self.used) as u64
     }
 
     /// Goes on at `position`; bytes that are in the buffer are not read again.
-    pub fn go_to(&mut self, position: u64) {
+    pub(crate) fn go_to(&mut self, position: u64) {
         let start = self.at - self.buffer.len() as u64;
         if (start..=self.at).contains(&position) {
             self.used = (position - start) as usize;
@@ -265,13 +265,18 @@ pub struct Window<'a> {
 
 impl<'a> Window<'a> {
     /// A window that holds nothing yet.
-    pub fn new(source: &'a dyn Source) -> Self {
+    pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, buffer: Vec::new(), start: 0 }
     }
 
     /// `length` bytes from `offset`, or `None` if the source ends before. Up to `ahead`
     /// further bytes are read in the same call.
-    pub fn get(&mut self, offset: u64, length: usize, ahead: usize) -> io::Result<Option<&[u8]>> {
+    pub(crate) fn get(
+        &mut self,
+        offset: u64,
+        length: usize,
+        ahead: usize,
+    ) -> io::Result<Option<&[u8]>> {
         if let Some(bytes) = self.source.bytes() {
             let from = usize::try_from(offset).unwrap_or(usize::MAX);
             let end = from.saturating_add(length);

@@ -30,7 +30,7 @@ const ENTITIES: usize = 3;
 
 /// Whether all components of an entity are needed to tell damage from a quantity that is
 /// zero for one state.
-pub fn may_vanish(section: &str) -> bool {
+pub(crate) fn may_vanish(section: &str) -> bool {
     MAY_VANISH.contains(&section)
 }
 
@@ -41,7 +41,7 @@ pub fn may_vanish(section: &str) -> bool {
 /// The last tells zeros that were written over values from a front that stands on a wall for
 /// one state. Forces may vanish together: there, another component of the entity must be
 /// there in that state, because a lost contact loses all.
-pub fn suspect(section: &str, histories: &[History]) -> Vec<Problem> {
+pub(crate) fn suspect(section: &str, histories: &[History]) -> Vec<Problem> {
     let mut found = runs_of_zeros(section, histories);
     found.sort_by_key(|run| run.state);
     found.iter().map(|run| run.problem(section, histories)).collect()

@@ -9,56 +9,109 @@ use crate::curve::recipe::{ForceSource, Recipe};
 
 /// What does not fit in a study manifest.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum InvalidStudy {
+    /// A pair whose recipe names one body only.
     #[error(
         "a pair needs the other body: deflection.minus_node = …, or half_model = true in [study] for one body against its symmetry plane"
     )]
     PairOfOne,
+    /// The deflection would be doubled twice.
     #[error(
         "half_model = true doubles the deflection, which a minus_node already makes whole: keep one of them"
     )]
     DoublyWhole,
+    /// `half_model` stands beside a wall.
     #[error("half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair")]
     HalfWall,
+    /// There is no run.
     #[error("there is no [[run]]")]
     NoRun,
+    /// The force that tells when contact begins is a body force.
     #[error(
         "recipe.contact must be a contact force (id = … of a wall or contact): a body slows down after the first touch"
     )]
     ContactOfBody,
+    /// A second contact force stands beside a contact force.
     #[error("recipe.contact is for a body force: contact is found in recipe.force itself")]
     ContactBesideContact,
+    /// A run states twice when contact begins.
     #[error("run \"{run}\": contact_time and gap both say when contact begins: keep one of them")]
-    TwoContacts { run: String },
+    TwoContacts {
+        /// Path of the run.
+        run: String,
+    },
+    /// A run has an empty path.
     #[error("a [[run]] has an empty path")]
     EmptyPath,
+    /// A run against a wall gives the mass of a second body.
     #[error("run \"{run}\": other_mass needs kind = \"pair\"")]
-    OtherMassOfWall { run: String },
+    OtherMassOfWall {
+        /// Path of the run.
+        run: String,
+    },
+    /// The path of a run gives no name for its case.
     #[error("run \"{run}\" gives no name for its case: add name = \"…\" to it", run = run.escape_debug())]
-    NoCaseName { run: String },
+    NoCaseName {
+        /// Path of the run.
+        run: String,
+    },
+    /// Two runs have the same name.
     #[error("two runs are named \"{name}\": give one of them a name = …")]
-    SameName { name: String },
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// The name of a parameter is empty, or has other characters than a name may have.
     #[error("run \"{run}\": parameter \"{name}\" is no name", name = name.escape_debug())]
-    ParameterName { run: String, name: String },
+    ParameterName {
+        /// Path of the run.
+        run: String,
+        /// Name of the parameter.
+        name: String,
+    },
+    /// A parameter has the name of a key that every run has.
     #[error(
         "run \"{run}\": parameter \"{name}\" has a key of its own: use speed or mass",
         name = name.escape_debug()
     )]
-    ParameterTaken { run: String, name: String },
+    ParameterTaken {
+        /// Path of the run.
+        run: String,
+        /// Name of the parameter.
+        name: String,
+    },
+    /// A parameter is infinite or no number.
     #[error("run \"{run}\": parameter \"{name}\" is not finite", name = name.escape_debug())]
-    ParameterNotFinite { run: String, name: String },
+    ParameterNotFinite {
+        /// Path of the run.
+        run: String,
+        /// Name of the parameter.
+        name: String,
+    },
+    /// The name of what comes from files.
     #[error(
         "study.name = \"{IMPORTED}\" is the name of the curves that crumple db add takes from files: give the study another"
     )]
     NameOfImported,
+    /// A name is empty or blank.
     #[error("{key} = \"{name}\" is no name", name = name.escape_debug())]
-    NoName { key: &'static str, name: String },
+    NoName {
+        /// The key that gives it.
+        key: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A name has characters that stand for something else in the database.
     #[error(
         "{key} = \"{name}\" may not contain \"/\" or control characters",
         name = name.escape_debug()
     )]
-    NameCharacters { key: &'static str, name: String },
+    NameCharacters {
+        /// The key that gives it.
+        key: &'static str,
+        /// The name.
+        name: String,
+    },
 }
 
 pub(super) fn check(manifest: &Manifest) -> Result<(), InvalidStudy> {

@@ -26,20 +26,48 @@ pub enum StudyError {
 
 /// Why one run gives no case.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum RunError {
+    /// The run's folder is not there.
     #[error("the run's folder {path} does not exist: check path in the manifest")]
-    NoFolder { path: PathBuf },
+    NoFolder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file that the recipe names is not there.
     #[error("the run's folder {folder} has no file \"{file}\": it has {found}")]
-    NoFile { folder: PathBuf, file: String, found: String },
+    NoFile {
+        /// The run's folder.
+        folder: PathBuf,
+        /// Name of the file.
+        file: String,
+        /// What the folder has, as a list.
+        found: String,
+    },
+    /// A file cannot be opened or hashed.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A solver's file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// The histories give no curve.
     #[error("{path}: {source}")]
-    Extract { path: PathBuf, source: ExtractError },
+    Extract {
+        /// The file that tells so.
+        path: PathBuf,
+        /// Why.
+        source: ExtractError,
+    },
+    /// Neither manifest nor deck say the units.
     #[error(
         "the manifest gives no units and {why}: add units = \"mm-t-s\" (or what they are) to [study]"
     )]
-    NoUnits { why: String },
+    NoUnits {
+        /// Why the deck does not.
+        why: String,
+    },
 }

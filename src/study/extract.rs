@@ -7,7 +7,7 @@ use super::read::{ReadFile, RunFiles};
 use super::twin::compare_twin;
 use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
 use crate::curve::recipe::ForceSource;
-use crate::curve::{Case, Source};
+use crate::curve::{Case, SourceFile};
 use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
@@ -15,7 +15,7 @@ impl LocatedRun<'_> {
     ///
     /// # Errors
     /// [`RunError`] names the file and what to change.
-    pub fn extract(&self) -> Result<Case, RunError> {
+    pub(crate) fn extract(&self) -> Result<Case, RunError> {
         let mut remarks = Remarks { notes: self.deck_notes.clone(), ..Remarks::default() };
         let units = remarks.take(self.units()?);
         let files = RunFiles::read(self, &self.study.manifest.recipe)?;
@@ -172,8 +172,8 @@ impl LocatedRun<'_> {
         })
     }
 
-    fn deck_source(&self, RunDeck { file: located, deck }: &RunDeck) -> Source {
-        Source {
+    fn deck_source(&self, RunDeck { file: located, deck }: &RunDeck) -> SourceFile {
+        SourceFile {
             path: located
                 .path
                 .strip_prefix(&self.study.folder)
@@ -190,8 +190,8 @@ impl LocatedRun<'_> {
         }
     }
 
-    fn source(&self, ReadFile { located, file }: &ReadFile<'_>) -> Source {
-        Source {
+    fn source(&self, ReadFile { located, file }: &ReadFile<'_>) -> SourceFile {
+        SourceFile {
             path: format!(
                 "{}/{}",
                 self.entry.path,

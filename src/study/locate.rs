@@ -22,7 +22,7 @@ pub(super) struct RunDeck {
 }
 
 /// A run whose files are found and hashed but not read.
-pub struct LocatedRun<'a> {
+pub(crate) struct LocatedRun<'a> {
     pub(super) study: &'a Study,
     pub(super) entry: &'a RunEntry,
     pub(super) files: Vec<Located>,
@@ -40,7 +40,7 @@ impl Study {
     ///
     /// # Errors
     /// [`RunError`] if the folder or a file is missing or unreadable.
-    pub fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, RunError> {
+    pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, RunError> {
         let folder = self.folder.join(&entry.path);
         if !folder.is_dir() {
             return Err(RunError::NoFolder { path: folder });
@@ -128,7 +128,7 @@ impl Study {
 
 impl LocatedRun<'_> {
     /// The problems of the run's files, found by reading all of them, each with its file's name.
-    pub fn problems(&self) -> Vec<String> {
+    pub(crate) fn problems(&self) -> Vec<String> {
         let mut found = Vec::new();
         for file in &self.files {
             let everything = Selection { section: file.section.clone(), ..Selection::nothing() };

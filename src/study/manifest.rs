@@ -115,7 +115,7 @@ impl TryFrom<i64> for Sign {
 
 impl RunEntry {
     /// Name of the run's case in the database.
-    pub fn case_name(&self) -> String {
+    pub(crate) fn case_name(&self) -> String {
         let name = self.name.as_deref().unwrap_or(&self.path);
         name.trim_start_matches("./").trim_matches('/').replace('/', "_")
     }

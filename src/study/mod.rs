@@ -1,7 +1,7 @@
 //! Studies: which runs there are, and how each becomes a case.
 //!
 //! A manifest as written ([`Manifest`]) is checked once ([`Study`]); the files of a run are found
-//! and hashed ([`LocatedRun`]); only where they changed are they read and the case extracted.
+//! and hashed (`LocatedRun`); only where they changed are they read and the case extracted.
 
 mod check;
 mod error;
@@ -20,7 +20,6 @@ use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub use check::InvalidStudy;
 pub use error::{RunError, StudyError};
-pub use locate::LocatedRun;
 pub use manifest::{Head, Manifest, RunEntry, Sign, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
@@ -35,14 +34,14 @@ pub struct Study {
 /// # Errors
 /// [`StudyError`] with line and columns for what TOML or a single value breaks, and without
 /// for what only the whole shows.
-pub fn load(path: &Path) -> Result<Study, StudyError> {
+pub(crate) fn load(path: &Path) -> Result<Study, StudyError> {
     checked(path, toml_file::load(path)?)
 }
 
 /// Parses and checks the text of a study manifest; `path` is for messages.
 ///
 /// # Errors
-/// [`StudyError`] as of [`load`].
+/// [`StudyError`] if the text is no manifest, or what it says makes no sense.
 pub fn parse(path: &Path, text: &str) -> Result<Study, StudyError> {
     checked(path, toml_file::parse(path, text)?)
 }
@@ -55,17 +54,17 @@ fn checked(path: &Path, manifest: Manifest) -> Result<Study, StudyError> {
 
 impl Study {
     /// Its name.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.manifest.study.name
     }
 
     /// Group of the curve database that its cases go to.
-    pub fn group(&self) -> &str {
+    pub(crate) fn group(&self) -> &str {
         &self.manifest.study.group
     }
 
     /// Its runs, in the order of the manifest.
-    pub fn runs(&self) -> &[RunEntry] {
+    pub(crate) fn runs(&self) -> &[RunEntry] {
         &self.manifest.run
     }
 

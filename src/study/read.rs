@@ -25,7 +25,7 @@ pub(super) struct RunFiles<'a> {
 }
 
 impl<'a> RunFiles<'a> {
-    pub fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, ReadError> {
+    pub(crate) fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, ReadError> {
         let read_force = |source: &ForceSource| {
             let located = run.file(force_file(source));
             Ok::<_, ReadError>(ReadFile { located, file: read_force(located, source)? })
@@ -40,7 +40,7 @@ impl<'a> RunFiles<'a> {
     }
 
     /// The histories for an extraction.
-    pub fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, ReadError> {
+    pub(crate) fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, ReadError> {
         let DeflectionSource { node, minus_node, component, .. } = self.recipe.deflection;
         let motion =
             |node: i64, name: &str| self.motion.file.history(Some(EntityId::new(node)), name);
@@ -65,11 +65,11 @@ impl<'a> RunFiles<'a> {
     }
 
     /// The history that the force is, or is made of.
-    pub fn force_history(&self) -> Result<&History, ReadError> {
+    pub(crate) fn force_history(&self) -> Result<&History, ReadError> {
         self.force.force_history(&self.recipe.force)
     }
 
-    pub fn force_kind(&self) -> ForceKind {
+    pub(crate) fn force_kind(&self) -> ForceKind {
         match self.recipe.force {
             ForceSource::Contact { .. } => ForceKind::Contact,
             ForceSource::Body { .. } => ForceKind::Body,
@@ -77,7 +77,7 @@ impl<'a> RunFiles<'a> {
     }
 
     /// Each file once.
-    pub fn each(&self) -> Vec<&ReadFile<'a>> {
+    pub(crate) fn each(&self) -> Vec<&ReadFile<'a>> {
         let mut each = vec![&self.motion];
         for read in [&self.force].into_iter().chain(&self.contact) {
             if each.iter().all(|known| known.located.file != read.located.file) {

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::dataset::is_same_speed;
 
 /// The level that bands are made for.
-pub const LEVEL: f64 = 0.9;
+pub(crate) const LEVEL: f64 = 0.9;
 /// Half width, as a share of the curve's end, over which the force's level is averaged.
 const WINDOW: f64 = 0.05;
 /// Between training speeds errors grow with this power of the gap.
@@ -42,7 +42,7 @@ pub enum LeftOutSpeeds {
 
 impl LeftOutSpeeds {
     /// Those of a speed that lies between others, or does not.
-    pub fn of(inner: bool) -> Self {
+    pub(crate) fn of(inner: bool) -> Self {
         if inner { Self::Inner } else { Self::Ends }
     }
 
@@ -92,14 +92,14 @@ pub struct Band {
 
 /// Residuals of one left-out curve in ratio to the local level of the prediction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Residuals {
+pub(crate) struct Residuals {
     /// Over which it was predicted, as of [`Band::span_m_per_s`].
     pub span_m_per_s: f64,
     pub ratios: Vec<f64>,
 }
 
 /// The ratios `(FE − prediction) / level` at even deflections.
-pub fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
+pub(crate) fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
     let ratio = |((r, p), level): ((&f64, &f64), f64)| (r - p) / level;
     reference_n.iter().zip(predicted_n).zip(level(predicted_n)).map(ratio).collect()
 }
@@ -109,7 +109,7 @@ pub fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
 ///
 /// At a training speed it is the wider of the gaps that end there: left-out speeds lie in the
 /// middle of their gaps and do not tell how fast the error falls towards the ends of one.
-pub fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
+pub(crate) fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
     let mut speeds = speeds.to_vec();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let gaps = || speeds.windows(2);
@@ -122,7 +122,7 @@ pub fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
 }
 
 /// How far `v` lies outside of training speeds, which do not fall; 0 between them.
-pub fn distance_outside_m_per_s(speeds: &[f64], v: f64) -> f64 {
+pub(crate) fn distance_outside_m_per_s(speeds: &[f64], v: f64) -> f64 {
     let (Some(&low), Some(&high)) = (speeds.first(), speeds.last()) else { return 0.0 };
     match is_same_speed(low, v) || is_same_speed(high, v) {
         true => 0.0,
@@ -145,7 +145,7 @@ fn level(force_n: &[f64]) -> Vec<f64> {
 
 impl Band {
     /// The band that left-out curves give; `None` without any.
-    pub fn of(left_out: LeftOutSpeeds, curves: &[Residuals]) -> Option<Self> {
+    pub(crate) fn of(left_out: LeftOutSpeeds, curves: &[Residuals]) -> Option<Self> {
         let mut band = Self::without_coverage(left_out, &curves.iter().collect::<Vec<_>>())
             .filter(Self::is_sound)?;
         let covered: Vec<f64> =
@@ -181,7 +181,7 @@ impl Band {
 
     /// The same band over another span; `None` if the scaled widths are no finite numbers, or if the band is
     /// of an earlier version, which does not say its own.
-    pub fn over(self, span_m_per_s: f64) -> Option<Self> {
+    pub(crate) fn over(self, span_m_per_s: f64) -> Option<Self> {
         let factor = (span_m_per_s / self.span_m_per_s?).powf(self.left_out.power());
         let band = Self {
             span_m_per_s: Some(span_m_per_s),
@@ -193,7 +193,7 @@ impl Band {
     }
 
     /// Whether its widths are numbers that a fit gives.
-    pub fn is_sound(&self) -> bool {
+    pub(crate) fn is_sound(&self) -> bool {
         let sound = |share: f64| (0.0..=WIDEST).contains(&share);
         sound(self.pointwise_share)
             && sound(self.simultaneous_share)
@@ -201,7 +201,7 @@ impl Band {
     }
 
     /// Lowest and highest force at each of a curve's even deflections, in N; never below 0.
-    pub fn around(&self, force_n: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    pub(crate) fn around(&self, force_n: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let widths = level(force_n).into_iter().map(|l| self.pointwise_share * l);
         force_n.iter().zip(widths).map(|(f, w)| ((f - w).max(0.0), f + w)).unzip()
     }
@@ -211,7 +211,7 @@ impl Band {
 ///
 /// Outside of them it is what the ends tell, growing with the distance, but never narrower than
 /// just inside; `None` where nothing that was left out tells of it.
-pub fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Option<Band> {
+pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Option<Band> {
     let inside = inner.zip(gap_m_per_s(speeds, v)).and_then(|(band, gap)| band.over(gap));
     let distance = distance_outside_m_per_s(speeds, v);
     if distance == 0.0 {
@@ -225,7 +225,7 @@ pub fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Op
 }
 
 /// Share of curve `i`'s points inside the band that the other curves give over its span.
-pub fn coverage(left_out: LeftOutSpeeds, curves: &[Residuals], i: usize) -> Option<f64> {
+pub(crate) fn coverage(left_out: LeftOutSpeeds, curves: &[Residuals], i: usize) -> Option<f64> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
     let Residuals { span_m_per_s, ratios } = &curves[i];

@@ -20,7 +20,7 @@ impl<T> PartialEq for Cached<T> {
 
 impl<T> Cached<T> {
     /// The value, computed now if it has not been before.
-    pub fn get_or_compute(&self, compute: impl FnOnce() -> T) -> &T {
+    pub(crate) fn get_or_compute(&self, compute: impl FnOnce() -> T) -> &T {
         self.0.get_or_init(compute)
     }
 }

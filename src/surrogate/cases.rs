@@ -16,13 +16,18 @@ const LARGEST_N: f64 = 1e15;
 /// 2 mm, and its ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelCase {
+    /// Name of the case.
     pub name: String,
+    /// Speed before contact, in m/s, of the model's kind.
     pub speed_m_per_s: f64,
     /// Values of the model's features.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub features: Vec<f64>,
+    /// Largest deflection, in m.
     pub max_deflection_m: f64,
+    /// Whether the record ended while loading, so that a larger deflection may follow.
     pub truncated: bool,
+    /// Measured unloading stiffness, in N/m, if the record reaches so far.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// Speed of separation when the body force has first fallen to zero.
@@ -31,11 +36,13 @@ pub struct ModelCase {
     /// Empty in files of version 1.
     #[serde(default)]
     pub deflection_m: Vec<f64>,
+    /// The declared force in N, one value per deflection.
     #[serde(rename = "force_N", default)]
     pub force_n: Vec<f64>,
     /// The force of the body's motion; empty where the declared force is one.
     #[serde(rename = "body_force_N", default)]
     pub body_force_n: Vec<f64>,
+    /// Closing speed in m/s along the deflections; empty in files of earlier versions.
     #[serde(default)]
     pub closing_speed_m_per_s: Vec<f64>,
 }
@@ -110,7 +117,7 @@ pub(super) struct Kink {
 }
 
 impl Curves {
-    pub fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
+    pub(crate) fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
         let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
             cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
         };

@@ -4,7 +4,7 @@ use crate::curve::{Envelope, EnvelopeError};
 
 /// One force of one training case over its loading branch.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CaseCurve {
+pub(crate) struct CaseCurve {
     pub speed_m_per_s: f64,
     /// Values of the further features.
     pub features: Vec<f64>,
@@ -16,7 +16,7 @@ pub struct CaseCurve {
 impl CaseCurve {
     /// # Errors
     /// [`EnvelopeError`] if the columns are no envelopes; closing speeds may be none.
-    pub fn new(
+    pub(crate) fn new(
         speed_m_per_s: f64,
         features: Vec<f64>,
         deflection_m: Vec<f64>,
@@ -31,26 +31,26 @@ impl CaseCurve {
         Ok(Self { speed_m_per_s, features, envelope, closing })
     }
 
-    pub fn envelope(&self) -> &Envelope {
+    pub(crate) fn envelope(&self) -> &Envelope {
         &self.envelope
     }
 
     /// Force in N; the last one beyond the end.
-    pub fn force_at(&self, deflection_m: f64) -> f64 {
+    pub(crate) fn force_at(&self, deflection_m: f64) -> f64 {
         self.envelope.force_at(deflection_m)
     }
 
     /// Largest deflection, in m.
-    pub fn end_m(&self) -> f64 {
+    pub(crate) fn end_m(&self) -> f64 {
         self.envelope.end_m()
     }
 
-    pub fn reaches(&self, deflection_m: f64) -> bool {
+    pub(crate) fn reaches(&self, deflection_m: f64) -> bool {
         deflection_m <= self.end_m()
     }
 
     /// Closing speed in m/s; 0 beyond the end, and the impact speed where it is not known.
-    pub fn closing_at(&self, deflection_m: f64) -> f64 {
+    pub(crate) fn closing_at(&self, deflection_m: f64) -> f64 {
         match &self.closing {
             None => self.speed_m_per_s,
             Some(_) if !self.reaches(deflection_m) => 0.0,
@@ -61,7 +61,7 @@ impl CaseCurve {
 
 /// The two neighbours of `v` among increasing speeds and the share of the second, 0 to 1:
 /// beyond the ends the outermost alone.
-pub fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
+pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
     let above = speeds.partition_point(|&s| s <= v);
     match above {
         0 => (0, 0, 0.0),
@@ -72,7 +72,7 @@ pub fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
 
 /// Linear interpolation over points of increasing abscissa, held beyond the ends; `None`
 /// without points.
-pub fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
+pub(crate) fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
     let (first, last) = (points.first()?, points.last()?);
     if x <= first.0 {
         return Some(first.1);
@@ -87,7 +87,7 @@ pub fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
 
 /// Coefficients of the polynomial of `degree` (0, 1 or 2) with the least squares, constant
 /// first, over centred and scaled abscissae; `None` if the points do not determine it.
-pub fn least_squares(points: &[(f64, f64)], degree: usize) -> Option<Polynomial> {
+pub(crate) fn least_squares(points: &[(f64, f64)], degree: usize) -> Option<Polynomial> {
     let n = points.len();
     if n <= degree || degree > 2 {
         return None;
@@ -130,14 +130,14 @@ pub fn least_squares(points: &[(f64, f64)], degree: usize) -> Option<Polynomial>
 
 /// A polynomial of up to second degree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polynomial {
+pub(crate) struct Polynomial {
     centre: f64,
     scale: f64,
     coefficients: [f64; 3],
 }
 
 impl Polynomial {
-    pub fn at(&self, x: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64) -> f64 {
         let t = (x - self.centre) / self.scale;
         let [a, b, c] = self.coefficients;
         a + t * (b + t * c)

@@ -53,7 +53,7 @@ pub(super) struct FitInput<'a> {
 
 impl FitInput<'_> {
     /// The forest's options.
-    pub fn forest_options(&self) -> &ForestOptions {
+    pub(crate) fn forest_options(&self) -> &ForestOptions {
         self.forest.expect("ModelKind gives options to each model with a forest")
     }
 }

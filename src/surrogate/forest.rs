@@ -9,7 +9,7 @@ use serde_json::value::RawValue;
 
 use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
-use super::{At, CaseCurve, Surrogate, Warning};
+use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 use crate::forest::{ForestError, RegressionForest, Thresholds};
@@ -47,7 +47,7 @@ impl ForestSurrogate {
     ///
     /// # Errors
     /// [`ForestError`] for options that make no forest.
-    pub fn fit(
+    pub(crate) fn fit(
         set: &TrainingSet,
         force: ForceKind,
         options: &ForestOptions,
@@ -59,15 +59,16 @@ impl ForestSurrogate {
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
 
+    /// The forest that was fitted, on speed, deflection and features.
     pub fn forest(&self) -> &RegressionForest<f64> {
         &self.forest
     }
 
     /// Lowest and highest force in N at each deflection between which the leaves' members lie
     /// with a weight of `level`; `None` if the leaves kept none.
-    pub fn quantiles(
+    pub(crate) fn quantiles(
         &self,
-        at: &At<'_>,
+        at: &QueryPoint<'_>,
         deflection_m: &[f64],
         level: f64,
     ) -> Option<(Vec<f64>, Vec<f64>)> {
@@ -99,12 +100,12 @@ impl Surrogate for ForestSurrogate {
         Some(self)
     }
 
-    fn force_n(&self, _: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    fn force_n(&self, _: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let force: Array1<f64> = self.forest.predict(&records(at, deflection_m));
         force.to_vec()
     }
 
-    fn warnings(&self, _: &[CaseCurve], at: &At<'_>) -> Vec<Warning> {
+    fn warnings(&self, _: &[CaseCurve], at: &QueryPoint<'_>) -> Vec<Warning> {
         let speed_m_per_s = at.speed_m_per_s;
         if self.forest.params().thresholds() == Thresholds::Random {
             return Vec::new();
@@ -123,7 +124,7 @@ impl Surrogate for ForestSurrogate {
 }
 
 /// One record per deflection, with the columns of the training table.
-fn records(at: &At<'_>, deflection_m: &[f64]) -> Array2<f64> {
+fn records(at: &QueryPoint<'_>, deflection_m: &[f64]) -> Array2<f64> {
     let shape = (deflection_m.len(), 2 + at.features.len());
     Array2::from_shape_fn(shape, |(i, k)| match k {
         0 => at.speed_m_per_s,

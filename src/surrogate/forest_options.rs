@@ -9,11 +9,17 @@ use crate::forest::{ForestError, ForestParams, StopRule, Thresholds};
 /// Choices of the forest surrogate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForestOptions {
+    /// Number of trees.
     pub trees: usize,
+    /// Seed of the random draws: the same seed gives the same bytes.
     pub seed: u64,
+    /// Where the thresholds of splits are tried.
     pub thresholds: Thresholds,
+    /// When a branch stops growing.
     pub stop: StopRule,
+    /// Fewest samples in a leaf.
     pub min_samples_leaf: usize,
+    /// Which points of the loading branches it learns from.
     pub table: TableKind,
     /// Whether each tree sees a sample drawn with replacement, or all points.
     #[serde(default = "yes")]
@@ -57,7 +63,7 @@ impl ForestOptions {
     ///
     /// # Errors
     /// [`ForestError`] names the option that is out of its range.
-    pub fn check(&self) -> Result<(), ForestError> {
+    pub(crate) fn check(&self) -> Result<(), ForestError> {
         self.params().check_ref().map(|_| ())
     }
 

@@ -21,7 +21,7 @@ const SLOPES: (f64, f64) = (0.25, 4.0);
 
 /// One landmark over the cases that have it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Track {
+pub(crate) struct Track {
     /// Case and deflection in m, in order of speed; at least two.
     positions: Vec<(usize, f64)>,
 }
@@ -50,7 +50,7 @@ fn nearest(among: &[usize], value: impl Fn(usize) -> f64) -> Option<usize> {
 
 /// Landmarks matched over the cases, and where they jump.
 #[derive(Clone, Debug, PartialEq, Default)]
-pub struct Landmarks {
+pub(crate) struct Landmarks {
     tracks: Vec<Track>,
     /// Pairs of neighbouring cases between which the collapse changes its mode.
     pub jumps: Vec<(usize, usize)>,
@@ -77,7 +77,7 @@ fn extrema(case: &CaseCurve) -> Vec<(bool, f64)> {
 impl Landmarks {
     /// Follows the landmarks of the fastest case down to the slowest. A landmark that a case
     /// should have, because it goes that far, but lacks is dropped for all cases.
-    pub fn of(cases: &[CaseCurve]) -> Self {
+    pub(crate) fn of(cases: &[CaseCurve]) -> Self {
         let Some(last) = cases.len().checked_sub(1) else { return Self::default() };
         let found: Vec<Vec<(bool, f64)>> = cases.iter().map(extrema).collect();
         let begin = |&(is_peak, d): &(bool, f64)| Trail {
@@ -166,7 +166,7 @@ impl Landmarks {
     }
 
     /// Where the landmarks lie at speed `v`, with their track, in order of deflection.
-    pub fn at(&self, cases: &[CaseCurve], v: f64) -> Vec<(usize, f64)> {
+    pub(crate) fn at(&self, cases: &[CaseCurve], v: f64) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = self
             .tracks
             .iter()
@@ -189,7 +189,7 @@ impl Landmarks {
     }
 
     /// Position of track `k` in a case, if it has it.
-    pub fn position(&self, k: usize, case: usize) -> Option<f64> {
+    pub(crate) fn position(&self, k: usize, case: usize) -> Option<f64> {
         self.tracks[k].positions.iter().find(|p| p.0 == case).map(|p| p.1)
     }
 }
@@ -197,14 +197,14 @@ impl Landmarks {
 /// A monotone piecewise linear map of deflections that keeps 0 and goes on with slope 1
 /// beyond its last landmark.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Warp {
+pub(crate) struct Warp {
     knots: Vec<(f64, f64)>,
 }
 
 impl Warp {
     /// From pairs of landmarks `(from, to)` in m, in order of `from`. A pair that would
     /// stretch or squeeze its neighbourhood by more than a factor of four is left out.
-    pub fn new(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn new(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut knots = vec![(0.0, 0.0)];
         for (from, to) in pairs {
             let (f0, t0) = knots[knots.len() - 1];
@@ -216,7 +216,7 @@ impl Warp {
         Self { knots }
     }
 
-    pub fn at(&self, d: f64) -> f64 {
+    pub(crate) fn at(&self, d: f64) -> f64 {
         let i = self.knots.partition_point(|k| k.0 <= d).max(1) - 1;
         let (f0, t0) = self.knots[i];
         match self.knots.get(i + 1) {

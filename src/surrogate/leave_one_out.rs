@@ -13,8 +13,11 @@ use super::max_crush::MaxCrushRule;
 /// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, less 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
+    /// Name of the model.
     pub model: String,
+    /// Name of the case that was left out.
     pub case: String,
+    /// Its speed, in m/s.
     pub speed_m_per_s: f64,
     /// Whether training speeds lie on both sides; else it is extrapolation.
     pub inner: bool,
@@ -38,6 +41,7 @@ pub struct LeftOut {
     /// The same run driven by the contact force, where that is another.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_velocity_l1: Option<f64>,
+    /// Accelerations of that run, filtered with CFC 60.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_acceleration_l1: Option<f64>,
     /// Share of the FE curve's points inside the band that the other left-out speeds give over
@@ -49,11 +53,14 @@ pub struct LeftOut {
 /// One peak of FE's curve and the predicted one that matches it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PeakError {
+    /// Deflection of FE's peak, in m.
     pub deflection_m: f64,
+    /// Force of FE's peak, in N.
     #[serde(rename = "force_N")]
     pub force_n: f64,
     /// `None`: the prediction has no peak there.
     pub force_error: Option<f64>,
+    /// By how much the predicted peak lies at a larger deflection, in m.
     pub shift_m: Option<f64>,
 }
 
@@ -64,41 +71,59 @@ pub struct PeakError {
 pub struct Floor {
     /// `contact` or `body`.
     pub force: String,
+    /// Name of the case.
     pub case: String,
+    /// Its speed, in m/s.
     pub speed_m_per_s: f64,
+    /// Whether other cases lie on both sides of its speed.
     pub inner: bool,
+    /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
+    /// The same of accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
+    /// The same of accelerations that are not filtered.
     pub acceleration_unfiltered_l1: f64,
 }
 
 /// Means of one model over the inner speeds; of magnitudes where errors have signs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Means {
+    /// Name of the model.
     pub model: String,
+    /// How many inner speeds the means are over.
     pub speeds: usize,
+    /// Of the declared force along FE's crush.
     pub force_l1: f64,
+    /// Magnitude of the error of the curve's energy.
     pub energy_error: f64,
     /// By the model's rule.
     pub max_crush_error: f64,
+    /// The rule that the model uses.
     pub max_crush_rule: MaxCrushRule,
     /// By every rule that has an answer at all inner speeds.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
+    /// Of the velocity.
     pub velocity_l1: f64,
+    /// Of accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
+    /// Of accelerations that are not filtered.
     pub acceleration_unfiltered_l1: f64,
 }
 
 /// Leave-one-speed-out of a group: what `crumple validate` prints and a model file keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Validation {
+    /// Name of the group.
     pub group: String,
     /// The model that `auto` takes.
     pub chosen: String,
     /// Why it is that one.
     pub reason: String,
+    /// Every model at every speed that was left out.
     pub rows: Vec<LeftOut>,
+    /// The means of each model.
     pub means: Vec<Means>,
+    /// FE's own curves in the same runs.
     pub floors: Vec<Floor>,
     /// Between training speeds, of the chosen model, from its residuals at the inner speeds.
     #[serde(skip_serializing_if = "Option::is_none")]

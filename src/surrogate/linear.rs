@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::curves::interpolate_held;
 use super::entry::ModelEntry;
 use super::max_crush::MaxCrushRule;
-use super::{At, CaseCurve, Surrogate};
+use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "linear",
@@ -22,10 +22,10 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 
 /// Interpolates over the cases that reach a deflection; holds the outermost beyond them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linear;
+pub(crate) struct Linear;
 
 impl Surrogate for Linear {
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let furthest = cases.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
         let at_deflection = |&d: &f64| {
             let d = d.min(furthest);

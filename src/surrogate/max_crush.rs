@@ -32,8 +32,10 @@ pub enum MaxCrushRule {
 }
 
 impl MaxCrushRule {
+    /// Every rule, in the order of tables.
     pub const ALL: [Self; 4] = [Self::Spline, Self::Monotone, Self::Energy, Self::Motion];
 
+    /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spline => "spline",
@@ -47,8 +49,11 @@ impl MaxCrushRule {
 /// The maximal crush by all rules, in m; `None` where a rule has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaxCrush {
+    /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,
+    /// By a cubic that never falls with the speed.
     pub monotone_m: Option<f64>,
+    /// Where the curve has taken up the impact's energy.
     pub energy_m: Option<f64>,
     /// Absent in files of earlier versions.
     #[serde(default)]
@@ -57,11 +62,17 @@ pub struct MaxCrush {
     pub spread_m: f64,
 }
 
+impl MaxCrush {
+    /// No rule has an answer.
+    pub(super) const NONE: Self =
+        Self { spline_m: None, monotone_m: None, energy_m: None, motion_m: None, spread_m: 0.0 };
+}
+
 /// Cubic spline through `points` (speed in m/s increasing, crush in m) at `v`.
 ///
 /// Natural ends, continued straight beyond them; through two points a straight line,
 /// through three a parabola. `None` for fewer than two points.
-pub fn spline(points: &[(f64, f64)], v: f64) -> Option<f64> {
+pub(crate) fn spline(points: &[(f64, f64)], v: f64) -> Option<f64> {
     match points {
         [] | [_] => None,
         [a, b] => Some(a.1 + (b.1 - a.1) / (b.0 - a.0) * (v - a.0)),
@@ -108,7 +119,7 @@ fn natural_spline(points: &[(f64, f64)], v: f64) -> f64 {
 
 /// Monotone cubic (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980) through (0, 0) and
 /// `points` at `v`; continued straight above the last point. `None` without points.
-pub fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
+pub(crate) fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
     if points.is_empty() {
         return None;
     }
@@ -153,7 +164,7 @@ pub fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
 
 /// The deflection at which `curve` has taken up `kinetic_j`; beyond its end the force
 /// holds its last value.
-pub fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
+pub(crate) fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)
 }
 
@@ -184,7 +195,7 @@ pub(super) fn by_all_rules(
 
 impl MaxCrush {
     /// The answer of one rule.
-    pub fn by(&self, rule: MaxCrushRule) -> Option<f64> {
+    pub(crate) fn by(&self, rule: MaxCrushRule) -> Option<f64> {
         match rule {
             MaxCrushRule::Spline => self.spline_m,
             MaxCrushRule::Monotone => self.monotone_m,

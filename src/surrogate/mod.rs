@@ -7,7 +7,7 @@
 pub mod band;
 mod cached;
 mod cases;
-pub mod curves;
+pub(crate) mod curves;
 mod entry;
 mod extra;
 pub mod forest;
@@ -18,31 +18,34 @@ mod linear;
 pub mod max_crush;
 mod model;
 mod model_file;
-pub mod models;
+pub(crate) mod models;
 mod nearest;
 pub mod predict;
 mod predict_error;
-pub mod predicted;
+pub(crate) mod predicted;
 mod query;
 mod rate;
+pub mod recorded;
 mod registered;
 mod spikes;
-pub mod warning;
+pub(crate) mod warning;
 
 use std::fmt::Debug;
 
 use serde_json::value::RawValue;
 
 pub use cases::ModelCase;
-pub use curves::CaseCurve;
+pub(crate) use curves::CaseCurve;
+pub use entry::ModelEntry;
 pub use model::{Model, ModelError};
 pub use models::{MODELS, ModelKind};
 pub use predict::{PredictedCurve, Query, predict};
-pub use warning::Warning;
+pub use predict_error::PredictError;
+pub use warning::{Warning, WarningCode};
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a> {
+pub struct QueryPoint<'a> {
     /// Impact speed, of the training cases' kind.
     pub speed_m_per_s: f64,
     /// Values of the training set's further features.
@@ -56,13 +59,13 @@ pub struct At<'a> {
 
 /// A model of the force at an interface over impact speed, deflection and whatever else
 /// distinguishes the cases it was fitted to.
-pub trait Surrogate: Debug + Send + Sync {
+pub(crate) trait Surrogate: Debug + Send + Sync {
     /// Forces in N at increasing deflections (m), one per deflection. `cases` are the
     /// curves it was fitted to, in order of speed.
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64>;
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64>;
 
     /// What a user must know about a query here, beyond what holds for all models.
-    fn warnings(&self, _cases: &[CaseCurve], _at: &At<'_>) -> Vec<Warning> {
+    fn warnings(&self, _cases: &[CaseCurve], _at: &QueryPoint<'_>) -> Vec<Warning> {
         Vec::new()
     }
 

@@ -12,7 +12,7 @@ use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::model_file::VERSION;
 use super::models::{MODELS, ModelKind};
-use super::{At, CaseCurve, Surrogate, Warning};
+use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};
 use crate::file::WriteError;
@@ -64,30 +64,78 @@ pub struct Model {
 /// Why a model cannot be fitted, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
+    /// The cases are no training set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// The forest cannot be fitted.
     #[error(transparent)]
     Forest(#[from] ForestError),
+    /// The group has fewer curves than the model needs.
     #[error(
         "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
     )]
-    TooFewCurves { model: &'static str, least: usize, found: usize },
+    TooFewCurves {
+        /// Name of the model.
+        model: &'static str,
+        /// How many it needs.
+        least: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The cases differ in more than the speed, which is all the model sees.
     #[error(
         "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone"
     )]
-    OneParameter { model: &'static str, features: String, others: String },
+    OneParameter {
+        /// Name of the model.
+        model: &'static str,
+        /// What else they differ in, as a list.
+        features: String,
+        /// Models that see it, as a list.
+        others: String,
+    },
+    /// The curve of a case is no envelope.
     #[error("{0}")]
     Curve(#[from] EnvelopeError),
+    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no model file.
     #[error(
         "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train"
     )]
-    NotAModel { path: PathBuf, line: usize, column: usize, detail: String },
+    NotAModel {
+        /// The file.
+        path: PathBuf,
+        /// Line in the file, counted from 1.
+        line: usize,
+        /// Column in that line, counted from 1.
+        column: usize,
+        /// What was expected there.
+        detail: String,
+    },
+    /// The file was written by a later or much earlier program.
     #[error("{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train", known = VERSION)]
-    Version { path: PathBuf, found: u32 },
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Version of its layout.
+        found: u32,
+    },
+    /// The file contradicts itself.
     #[error("{path}: the model is damaged: {detail}")]
-    Damaged { path: PathBuf, detail: String },
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// How.
+        detail: String,
+    },
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -144,7 +192,7 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError::TooFewCurves`] or [`ModelError::OneParameter`].
-    pub fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
+    pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
         let (model, entry) = (kind.name(), kind.entry());
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
@@ -171,7 +219,7 @@ impl Model {
     }
 
     /// Masses of the training runs.
-    pub fn masses(&self) -> Masses {
+    pub(crate) fn masses(&self) -> Masses {
         Masses { body_kg: self.mass_kg, other_kg: self.other_mass_kg }
     }
 
@@ -186,7 +234,7 @@ impl Model {
     }
 
     /// The band at a query's place, or why there is none although speeds were left out.
-    pub(super) fn band(&self, at: &At<'_>) -> Result<Option<Band>, Warning> {
+    pub(super) fn band(&self, at: &QueryPoint<'_>) -> Result<Option<Band>, Warning> {
         let Some(of) = &self.leave_one_out else { return Ok(None) };
         if of.band.or(of.band_outside).is_none() {
             return Ok(None);
@@ -211,7 +259,10 @@ impl Model {
 
     /// Numbers among the parameters that lie outside the training cases', as feature, value,
     /// lowest and highest.
-    fn features_outside(&self, at: &At<'_>) -> impl Iterator<Item = (&Feature, f64, f64, f64)> {
+    fn features_outside(
+        &self,
+        at: &QueryPoint<'_>,
+    ) -> impl Iterator<Item = (&Feature, f64, f64, f64)> {
         let numbers = self.features.iter().enumerate().filter(|(_, f)| f.category.is_none());
         numbers.filter_map(|(k, feature)| {
             let known = || self.cases.iter().map(|c| c.features[k]);
@@ -223,13 +274,13 @@ impl Model {
     }
 
     /// The declared forces in N at increasing deflections.
-    pub fn force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    pub fn force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         self.fitted.force_n(&self.curves.declared, at, deflection_m)
     }
 
     /// The forces in N that move the body: of its motion, or the declared ones if the model
     /// has no others.
-    pub fn body_force_n(&self, at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
             Some(body) => body.force_n(&self.curves.body, at, deflection_m),
             None => self.force_n(at, deflection_m),
@@ -242,7 +293,7 @@ impl Model {
     }
 
     /// The training curves: of the declared force, and of the body's where it is another.
-    pub fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
+    pub(crate) fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
         (&self.curves.declared, &self.curves.body)
     }
 
@@ -264,7 +315,7 @@ impl Model {
     }
 
     /// What a query here must say, for any mass and rule.
-    pub fn warnings(&self, at: &At<'_>) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, at: &QueryPoint<'_>) -> Vec<Warning> {
         let v = at.speed_m_per_s;
         let (low, high) = self.range_m_per_s();
         let mut warnings = Vec::new();

@@ -101,7 +101,7 @@ impl ModelKind {
     }
 
     /// Whether it is the reference method's forest (DDTCM), whatever its seed.
-    pub fn is_reference_method(&self) -> bool {
+    pub(crate) fn is_reference_method(&self) -> bool {
         let paper = |f: ForestOptions| ForestOptions { seed: f.seed, ..ForestOptions::paper() };
         self.name() == forest::ENTRY.name && self.forest.is_some_and(|f| f == paper(f))
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::entry::ModelEntry;
 use super::max_crush::MaxCrushRule;
-use super::{At, CaseCurve, Surrogate};
+use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "nearest",
@@ -21,10 +21,10 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 
 /// The measured curve that lies nearest answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest;
+pub(crate) struct Nearest;
 
 impl Surrogate for Nearest {
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match cases.get(nearest(cases, at)) {
             Some(case) => deflection_m.iter().map(|&d| case.force_at(d)).collect(),
             None => vec![f64::NAN; deflection_m.len()],
@@ -34,7 +34,7 @@ impl Surrogate for Nearest {
 
 /// Index of the case nearest in speed and features, each in ratio to its range; of equally
 /// near ones the first.
-fn nearest(cases: &[CaseCurve], at: &At<'_>) -> usize {
+fn nearest(cases: &[CaseCurve], at: &QueryPoint<'_>) -> usize {
     let value = |case: &CaseCurve, k: usize| match k {
         0 => case.speed_m_per_s,
         _ => case.features[k - 1],

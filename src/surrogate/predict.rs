@@ -20,7 +20,7 @@ use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predict_error::CORRECTION;
 use super::query::{Asked, over_speed};
 use super::spikes::without_spikes;
-use super::{At, Model, Warning};
+use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{grid, nearest};
 
@@ -75,6 +75,29 @@ pub fn predict_driving(
     Ok((DrivingCurve { beyond: Some(beyond), ..driving }, curve.warnings))
 }
 
+/// The forces of a prediction along deflections of which some lie beyond its maximal crush.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beyond {
+    /// What the recipe declares.
+    pub declared: Envelope,
+    /// What moves a body of one mass.
+    pub body: Envelope,
+}
+
+/// [`predict`], and how its forces go on beyond the maximal crush.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_beyond(
+    model: &Model,
+    query: &Query,
+) -> Result<(PredictedCurve, Beyond), PredictError> {
+    let prediction = Prediction::new(model, query)?;
+    let curve = prediction.curve(prediction.rule())?;
+    let Prediction { motion, declared, .. } = prediction;
+    Ok((curve, Beyond { declared, body: motion.body }))
+}
+
 /// The motion that the body's force gives, beyond any maximal crush.
 struct Motion<'a> {
     asked: Asked<'a>,
@@ -106,7 +129,7 @@ impl<'a> Motion<'a> {
         }
         let closing_at = |&d: &f64| (v * v - 2.0 * self.body.work_to(d) / mass_kg).max(0.0).sqrt();
         let closing: Vec<f64> = deflection_m.iter().map(closing_at).collect();
-        let at = At { closing_m_per_s: Some(&closing), ..self.asked.at() };
+        let at = QueryPoint { closing_m_per_s: Some(&closing), ..self.asked.at() };
         without_spikes(model, deflection_m, model.force_n(&at, deflection_m), false)
     }
 
@@ -138,7 +161,7 @@ impl<'a> Motion<'a> {
 
 /// What a prediction is before a rule for the maximal crush is chosen: the forces beyond any
 /// crush, and the crush by every rule. One such serves all rules.
-pub struct Prediction<'a> {
+pub(crate) struct Prediction<'a> {
     motion: Motion<'a>,
     /// Declared force over the same even deflections as the body's.
     declared: Envelope,
@@ -157,7 +180,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// As [`predict`].
-    pub fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
         Self::of(Motion::new(model, query)?)
     }
 
@@ -169,7 +192,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// The rule that the query asks for, or the model's own.
-    pub fn rule(&self) -> MaxCrushRule {
+    pub(crate) fn rule(&self) -> MaxCrushRule {
         self.motion.rule()
     }
 
@@ -177,7 +200,7 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// [`PredictError`] if the rule gives no crush, or the energy correction is out of bounds.
-    pub fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
+    pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
         let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;
@@ -294,7 +317,7 @@ fn provenance(
         in_range: (low..=high).contains(&v),
         nearest_training_speed_m_per_s: nearest,
         distance_to_nearest_m_per_s: (nearest - v).abs(),
-        max_crush_rule: rule,
+        max_crush_rule: Some(rule),
         max_crush: crush,
         kinetic_energy_j: asked.kinetic_energy_j,
         energy_over_kinetic: energy,

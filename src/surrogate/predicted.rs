@@ -17,11 +17,13 @@ use crate::unit::{SpeedKind, UnitSystem};
 pub struct PredictedCurve {
     /// Loading branch from (0, 0) to the maximal crush.
     pub deflection_m: Vec<f64>,
+    /// Force in N, one value per deflection; which force it is says `provenance.force_kind`.
     #[serde(rename = "force_N")]
     pub force_n: Vec<f64>,
     /// Band around the force, where the model gives one.
     #[serde(rename = "force_low_N", default, skip_serializing_if = "Option::is_none")]
     pub force_low_n: Option<Vec<f64>>,
+    /// Upper end of the band.
     #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub force_high_n: Option<Vec<f64>>,
     /// The force that moves the body, where `force_N` is what the obstacle feels: mass that
@@ -53,16 +55,22 @@ pub struct PredictedCurve {
     /// The rebound from the maximal crush.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound: Option<Rebound>,
+    /// Maximal crush, in m: the last deflection.
     pub max_deflection_m: f64,
+    /// Speed that the curve is for, in m/s.
     pub speed_m_per_s: f64,
+    /// What that speed is measured against.
     pub speed_kind: SpeedKind,
     /// Mass of the body, or of each body of a pair.
     pub mass_kg: f64,
     /// Integral of force over deflection.
     #[serde(rename = "energy_J")]
     pub energy_j: f64,
+    /// Name of the model.
     pub model: String,
+    /// What a user should know before using the curve.
     pub warnings: Vec<Warning>,
+    /// Where it comes from and how it was checked.
     pub provenance: Provenance,
 }
 
@@ -71,8 +79,10 @@ pub struct PredictedCurve {
 pub struct ForestQuantiles {
     /// Share of the members' weight between the two.
     pub level: f64,
+    /// Lower quantile in N, one value per deflection.
     #[serde(rename = "low_N")]
     pub low_n: Vec<f64>,
+    /// Upper quantile in N, one value per deflection.
     #[serde(rename = "high_N")]
     pub high_n: Vec<f64>,
 }
@@ -92,18 +102,29 @@ pub struct Rebound {
 /// Where a predicted curve comes from and how it was checked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Provenance {
+    /// Program and version.
     pub written_by: String,
+    /// Group of cases that the model was trained on.
     pub group: String,
+    /// Which force the recipe declares.
     pub force_kind: ForceKind,
+    /// Hash over the training cases.
     pub training_hash: String,
     /// Units of the training runs' files: what an export to their solver is written in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study_units: Option<UnitSystem>,
+    /// Speeds of the training cases, in m/s, rising.
     pub training_speeds_m_per_s: Vec<f64>,
+    /// Whether the speed lies within those of training.
     pub in_range: bool,
+    /// The training speed nearest to this one, in m/s.
     pub nearest_training_speed_m_per_s: f64,
+    /// Distance to it, in m/s.
     pub distance_to_nearest_m_per_s: f64,
-    pub max_crush_rule: MaxCrushRule,
+    /// How the maximal crush was found; absent for a recorded curve, which has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_crush_rule: Option<MaxCrushRule>,
+    /// The maximal crush by every rule.
     pub max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]
@@ -126,7 +147,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// [`PredictError`] if the curve was read from a file and breaks its promises.
-    pub fn envelope(&self) -> Result<Envelope, PredictError> {
+    pub(crate) fn envelope(&self) -> Result<Envelope, PredictError> {
         let stiffness = self.unloading_stiffness_n_per_m;
         if !(stiffness > 0.0 && stiffness.is_finite()) {
             return Err(PredictError::Damaged(format!(
@@ -162,7 +183,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
-    /// force, else as [`envelope`](Self::envelope).
+    /// force, else the error that its points are no envelope.
     pub fn of_force(&self, kind: ForceKind) -> Result<Self, PredictError> {
         match (kind, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => Err(PredictError::NoContactForce),
@@ -213,7 +234,7 @@ impl PredictedCurve {
 
     /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
     /// energy of the rebound is the same whichever force it comes from.
-    pub fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
+    pub(crate) fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
         let end = self.max_deflection_m;
         let driving = self.body_force_n.as_ref().unwrap_or(&self.force_n).last();
         let share = driving.map_or(1.0, |driving| envelope.force_at(end) / driving);
@@ -226,7 +247,7 @@ impl PredictedCurve {
     /// The curve of one force that drives an interface.
     ///
     /// # Errors
-    /// As [`driving_member`](Self::driving_member).
+    /// [`PredictError`] if the curve does not have that force, or its points are no envelope.
     pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, PredictError> {
         self.driving_member(force, None)
     }
@@ -237,7 +258,7 @@ impl PredictedCurve {
     /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] or
     /// [`PredictError::NoContactForce`] if it does not have that force; [`PredictError::Damaged`]
     /// for a member outside these bounds or a curve without a band.
-    pub fn driving_member(
+    pub(crate) fn driving_member(
         &self,
         force: ForceKind,
         member: Option<f64>,
@@ -283,7 +304,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] for a contact force alone.
-    pub fn driving_envelope(&self) -> Result<Envelope, PredictError> {
+    pub(crate) fn driving_envelope(&self) -> Result<Envelope, PredictError> {
         let declared = self.envelope()?;
         match &self.body_force_n {
             Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),

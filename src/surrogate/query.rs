@@ -8,7 +8,7 @@ use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predict_error::PredictError;
 use super::predicted::Rebound;
 use super::warning::{Warning, is_far_outside, outside_of};
-use super::{At, Model};
+use super::{Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
 use crate::dataset::{MASS, OTHER_MASS, feature_values};
@@ -20,6 +20,7 @@ const SAME_MASS: f64 = 1e-3;
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
+    /// Speed before contact in m/s, of the model's kind.
     pub speed_m_per_s: f64,
     /// Mass of the body, or of each body of a pair; the training runs' if absent.
     pub mass_kg: Option<f64>,
@@ -66,7 +67,7 @@ pub(super) struct Asked<'a> {
 }
 
 impl<'a> Asked<'a> {
-    pub fn new(model: &'a Model, query: &Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &Query) -> Result<Self, PredictError> {
         let v = query.speed_m_per_s;
         if !(v > 0.0 && v.is_finite()) {
             return Err(PredictError::Speed { speed_m_per_s: v });
@@ -118,8 +119,8 @@ impl<'a> Asked<'a> {
         Ok(Self { model, v, masses, mass_kg, same_mass, parameters, features, kinetic_energy_j })
     }
 
-    pub fn at(&self) -> At<'_> {
-        At {
+    pub(crate) fn at(&self) -> QueryPoint<'_> {
+        QueryPoint {
             speed_m_per_s: self.v,
             features: &self.features,
             mass_kg: self.mass_kg,
@@ -128,7 +129,7 @@ impl<'a> Asked<'a> {
     }
 
     /// The rule for the maximal crush.
-    pub fn rule(&self, query: &Query) -> MaxCrushRule {
+    pub(crate) fn rule(&self, query: &Query) -> MaxCrushRule {
         let (low, high) = self.model.range_m_per_s();
         query.rule.unwrap_or(match self.model.max_crush_rule {
             // Crush over speed is that of the trained mass and speeds; the motion knows both.
@@ -142,7 +143,7 @@ impl<'a> Asked<'a> {
     }
 
     /// The rebound after the body's force was `top_n` at the maximal crush.
-    pub fn rebound(&self, top_n: f64) -> Option<Rebound> {
+    pub(crate) fn rebound(&self, top_n: f64) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
         let speed = rebound_speed(self.model, self.v)?;
@@ -153,12 +154,12 @@ impl<'a> Asked<'a> {
     }
 
     /// The maximal crush by every rule.
-    pub fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
+    pub(crate) fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
         max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
     }
 
     /// What must be said of unloading, mass, and of an energy over the kinetic energy.
-    pub fn warnings(&self, unloading: Option<f64>, energy: f64) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, unloading: Option<f64>, energy: f64) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if unloading.is_none() {
             warnings.push(Warning::no_unloading());

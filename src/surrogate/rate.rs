@@ -20,7 +20,7 @@ use super::cached::Cached;
 use super::curves::neighbours;
 use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
-use super::{At, CaseCurve, Surrogate};
+use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "rate",
@@ -47,7 +47,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// Beyond the end of a slower neighbour, its Q is that of the next faster curve times a ratio that
 /// begins at their ratio there and decays to 1, so that the blend has no step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rate {
+pub(crate) struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
@@ -82,7 +82,7 @@ impl Rate {
     /// also differ in how they fold, and by what is stopped at the nose at impact speed,
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
     /// curves cannot tell the two causes apart.
-    pub fn fit(cases: &[CaseCurve]) -> Self {
+    pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
         let trial = |k: usize| MOST * k as f64 / STEPS as f64;
         let best = (0..=STEPS)
             .map(|k| (k, disagreement(cases, trial(k))))
@@ -172,7 +172,7 @@ impl Surrogate for Rate {
         }
     }
 
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         if speeds.is_empty() {
             return vec![f64::NAN; deflection_m.len()];
@@ -236,7 +236,8 @@ mod tests {
         let exact = Rate { sensitivity: 0.06, levels: Cached::default() };
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
-        let at = At { speed_m_per_s: 15.0, features: &[], mass_kg: 24e3, closing_m_per_s: None };
+        let at =
+            QueryPoint { speed_m_per_s: 15.0, features: &[], mass_kg: 24e3, closing_m_per_s: None };
         let force = exact.force_n(&cases, &at, d);
         // Not to the very end: there the speed falls to 0 within one step.
         for (i, f) in force.iter().enumerate().take(d.len() - 20) {
@@ -255,7 +256,7 @@ mod tests {
     fn given_speeds_are_used() {
         let cases: Vec<CaseCurve> = [8.0, 20.0].map(|v| made(v, 0.0, 24e3)).to_vec();
         let rate = Rate { sensitivity: 0.1, levels: Cached::default() };
-        let at = |closing| At {
+        let at = |closing| QueryPoint {
             speed_m_per_s: 8.0,
             features: &[],
             mass_kg: 24e3,

@@ -7,7 +7,7 @@ use super::entry::ModelEntry;
 use super::landmarks::{Landmarks, Warp};
 use super::linear::Linear;
 use super::max_crush::MaxCrushRule;
-use super::{At, CaseCurve, Surrogate};
+use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "registered",
@@ -26,10 +26,10 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// landmark, each case contributes the force of its own landmark. Only inside the training
 /// speeds; outside, the outermost curve as `linear` holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Registered;
+pub(crate) struct Registered;
 
 impl Surrogate for Registered {
-    fn force_n(&self, cases: &[CaseCurve], at: &At<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let v = at.speed_m_per_s;
         let (Some(first), Some(last)) = (cases.first(), cases.last()) else {
             return vec![f64::NAN; deflection_m.len()];

@@ -10,7 +10,9 @@ use crate::unit::km_per_h;
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
+    /// Its kind, the same for all curves.
     pub code: WarningCode,
+    /// What was found, with numbers, and what to do.
     pub message: String,
 }
 
@@ -96,7 +98,7 @@ impl fmt::Display for Warning {
 }
 
 impl Warning {
-    pub fn out_of_range(speed_m_per_s: f64, low: f64, high: f64) -> Self {
+    pub(crate) fn out_of_range(speed_m_per_s: f64, low: f64, high: f64) -> Self {
         let far = match is_far_outside(speed_m_per_s, low, high) {
             true => " by more than a third of the range",
             false => "",
@@ -110,11 +112,11 @@ impl Warning {
         }
     }
 
-    pub fn no_band(why: &str) -> Self {
+    pub(crate) fn no_band(why: &str) -> Self {
         Self { code: WarningCode::NoBand, message: format!("there is no band: {why}") }
     }
 
-    pub fn parameter_out_of_range(name: &str, asked: f64, low: f64, high: f64) -> Self {
+    pub(crate) fn parameter_out_of_range(name: &str, asked: f64, low: f64, high: f64) -> Self {
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
@@ -123,7 +125,7 @@ impl Warning {
         }
     }
 
-    pub fn near_split_midpoint(speed_m_per_s: f64, below: f64, above: f64) -> Self {
+    pub(crate) fn near_split_midpoint(speed_m_per_s: f64, below: f64, above: f64) -> Self {
         Self {
             code: WarningCode::NearSplitMidpoint,
             message: format!(
@@ -136,7 +138,7 @@ impl Warning {
         }
     }
 
-    pub fn far_from_training(speed_m_per_s: f64, nearest: f64) -> Self {
+    pub(crate) fn far_from_training(speed_m_per_s: f64, nearest: f64) -> Self {
         Self {
             code: WarningCode::FarFromTraining,
             message: format!(
@@ -148,7 +150,7 @@ impl Warning {
         }
     }
 
-    pub fn mode_switch(below: f64, above: f64) -> Self {
+    pub(crate) fn mode_switch(below: f64, above: f64) -> Self {
         Self {
             code: WarningCode::ModeSwitch,
             message: format!(
@@ -159,7 +161,7 @@ impl Warning {
         }
     }
 
-    pub fn too_few_curves(curves: usize) -> Self {
+    pub(crate) fn too_few_curves(curves: usize) -> Self {
         Self {
             code: WarningCode::TooFewCurves,
             message: format!(
@@ -169,7 +171,7 @@ impl Warning {
         }
     }
 
-    pub fn energy_corrected(factor: f64) -> Self {
+    pub(crate) fn energy_corrected(factor: f64) -> Self {
         Self {
             code: WarningCode::EnergyCorrected,
             message: format!(
@@ -178,7 +180,7 @@ impl Warning {
         }
     }
 
-    pub fn energy_mismatch(ratio: f64) -> Self {
+    pub(crate) fn energy_mismatch(ratio: f64) -> Self {
         Self {
             code: WarningCode::EnergyMismatch,
             message: format!(
@@ -188,7 +190,7 @@ impl Warning {
         }
     }
 
-    pub fn truncated_training_run(name: &str) -> Self {
+    pub(crate) fn truncated_training_run(name: &str) -> Self {
         Self {
             code: WarningCode::TruncatedTrainingRun,
             message: format!(
@@ -197,14 +199,14 @@ impl Warning {
         }
     }
 
-    pub fn no_unloading() -> Self {
+    pub(crate) fn no_unloading() -> Self {
         Self {
             code: WarningCode::NoUnloading,
             message: "no training run holds an unloading branch: the unloading stiffness is the steepest rise of the curve".into(),
         }
     }
 
-    pub fn other_mass(mass_kg: f64, trained_kg: f64) -> Self {
+    pub(crate) fn other_mass(mass_kg: f64, trained_kg: f64) -> Self {
         Self {
             code: WarningCode::OtherMass,
             message: format!(

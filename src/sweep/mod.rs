@@ -42,9 +42,8 @@ use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
 pub use journal::{WriteOptions, write, write_rows};
 pub use merge::{MergeError, merge};
-pub use row::{Head, Row, Status};
 pub use run::Chunk;
-pub use statistics::{ColumnStatistics, Statistics};
+pub use statistics::ColumnStatistics;
 use variables::Variable;
 pub use variables::{BindError, VariableError, VariableSummary};
 

@@ -3,12 +3,12 @@
 use super::{Shard, Sweep, SweepError};
 
 /// First line of every file.
-pub const FORMAT: &str = "crumple sweep";
-pub const LAYOUT: i64 = 1;
+pub(crate) const FORMAT: &str = "crumple sweep";
+pub(crate) const LAYOUT: i64 = 1;
 
 /// How an item ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
+pub(crate) enum Status {
     /// There is a result.
     Ok,
     /// There is a result, with a warning.
@@ -19,10 +19,10 @@ pub enum Status {
 
 impl Status {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Ok, Self::Warned, Self::Failed];
+    pub(crate) const ALL: [Self; 3] = [Self::Ok, Self::Warned, Self::Failed];
 
     /// Its name in the column `status`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
             Self::Warned => "warned",
@@ -33,7 +33,7 @@ impl Status {
 
 /// One item's row.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// The item.
     pub item: u64,
     /// Varied values, then results, in SI; NaN where there is none.
@@ -45,7 +45,7 @@ pub struct Row {
 }
 
 /// A value as it stands in a file: shortest digits that read back the same, a name, or nothing.
-pub fn text(value: f64, names: &[String]) -> String {
+pub(crate) fn text(value: f64, names: &[String]) -> String {
     let mut bytes = Vec::new();
     push(&mut bytes, value, names);
     String::from_utf8_lossy(&bytes).into_owned()
@@ -66,7 +66,7 @@ fn push(out: &mut Vec<u8>, value: f64, names: &[String]) {
 
 impl Row {
     /// Appends the row as a line. `names[k]` are those of value `k`, if it is an index.
-    pub fn write(&self, names: &[Vec<String>], out: &mut Vec<u8>) {
+    pub(crate) fn write(&self, names: &[Vec<String>], out: &mut Vec<u8>) {
         out.extend_from_slice(self.item.to_string().as_bytes());
         for (k, value) in self.values.iter().enumerate() {
             out.push(b',');
@@ -88,7 +88,7 @@ impl Row {
 
 /// A line of a file, taken apart; fields of varied values and results are not parsed yet.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line<'a> {
+pub(crate) struct Line<'a> {
     pub item: u64,
     pub values: Vec<&'a str>,
     pub status: Status,
@@ -97,7 +97,7 @@ pub struct Line<'a> {
 
 impl<'a> Line<'a> {
     /// Takes apart a line with its line feed; `None` if it is not whole.
-    pub fn parse(line: &'a [u8], columns: usize) -> Option<Self> {
+    pub(crate) fn parse(line: &'a [u8], columns: usize) -> Option<Self> {
         let text = std::str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
         // What a disk that lost power leaves in place of text.
         if text.contains('\0') {
@@ -117,7 +117,7 @@ impl<'a> Line<'a> {
     }
 
     /// Number of a field: NaN if it is empty, `None` if it is no number.
-    pub fn number(field: &str) -> Option<f64> {
+    pub(crate) fn number(field: &str) -> Option<f64> {
         if field.is_empty() {
             return Some(f64::NAN);
         }
@@ -127,7 +127,7 @@ impl<'a> Line<'a> {
 
 /// What stands above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Head {
+pub(crate) struct Head {
     /// Version of the program that wrote it.
     pub version: String,
     /// What tells the sweep from any other, see [`Sweep::hash`].
@@ -141,11 +141,11 @@ pub struct Head {
 }
 
 /// Bounds of a header, so that no other file is read for long.
-pub const MAX_HEAD_BYTES: usize = 1 << 24;
+pub(crate) const MAX_HEAD_BYTES: usize = 1 << 24;
 
 impl Head {
     /// The head of a shard of `sweep`.
-    pub fn of(sweep: &Sweep, shard: Shard) -> Self {
+    pub(crate) fn of(sweep: &Sweep, shard: Shard) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             hash: sweep.hash().into(),
@@ -156,18 +156,18 @@ impl Head {
     }
 
     /// Items whose rows follow.
-    pub fn rows(&self) -> std::ops::Range<u64> {
+    pub(crate) fn rows(&self) -> std::ops::Range<u64> {
         self.shard.items(self.items)
     }
 
     /// Whether the values of a column are text.
-    pub fn is_text(&self, column: usize) -> bool {
+    pub(crate) fn is_text(&self, column: usize) -> bool {
         let name = &self.columns[column];
         name.starts_with("curve[") || column + 2 >= self.columns.len()
     }
 
     /// The head as it stands above the rows.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let Shard { index, count } = self.shard;
         let rows = self.rows();
         format!(
@@ -183,7 +183,7 @@ impl Head {
 
     /// Reads a head; gives it back with its length in bytes. `None` if it is none of ours, or
     /// not whole.
-    pub fn read(input: &mut impl std::io::BufRead) -> std::io::Result<Option<(Self, u64)>> {
+    pub(crate) fn read(input: &mut impl std::io::BufRead) -> std::io::Result<Option<(Self, u64)>> {
         let mut text = String::new();
         let mut input = std::io::Read::take(input, MAX_HEAD_BYTES as u64);
         for _ in 0..8 {
@@ -220,7 +220,7 @@ impl Head {
     }
 
     /// Why rows under this head do not belong under `wanted`; `None` if they do.
-    pub fn differs_from(&self, wanted: &Self) -> Option<String> {
+    pub(crate) fn differs_from(&self, wanted: &Self) -> Option<String> {
         let shard = |s: Shard| format!("{}/{}", s.index, s.count);
         if self.version != wanted.version {
             let (found, this) = (&self.version, &wanted.version);
@@ -236,7 +236,7 @@ impl Head {
 }
 
 /// The error of a row that cannot be read.
-pub fn bad_row(path: &std::path::Path, item: u64) -> SweepError {
+pub(crate) fn bad_row(path: &std::path::Path, item: u64) -> SweepError {
     SweepError::Damaged {
         path: path.into(),
         message: format!(

@@ -36,13 +36,13 @@ const BLOCKS_PER_THREAD: usize = 4;
 const KEPT_CHAINS: usize = 16;
 
 /// A row with its line.
-pub struct Written {
+pub(crate) struct Written {
     pub row: Row,
     pub line: Vec<u8>,
 }
 
 /// Runs the items in pieces and hands on the rows of each piece in order, until `give` breaks.
-pub fn rows(
+pub(crate) fn rows(
     sweep: &Sweep,
     items: Range<u64>,
     chunk: Chunk,

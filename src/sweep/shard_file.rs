@@ -15,7 +15,7 @@ pub(super) struct ShardFile {
 
 impl ShardFile {
     /// Reads the head of a file; `None` if it is none of ours.
-    pub fn read_head(path: &Path) -> Result<Option<Self>, SweepError> {
+    pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, SweepError> {
         let io = |source| SweepError::Read { path: path.into(), source };
         let mut reader = BufReader::new(file::open(path).map_err(io)?);
         let head = Head::read(&mut reader).map_err(io)?;
@@ -27,7 +27,7 @@ impl ShardFile {
     ///
     /// # Errors
     /// [`SweepError::Damaged`] names the first row that is missing or not whole.
-    pub fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
+    pub(crate) fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
         let io = |source| SweepError::Read { path: self.path.clone(), source };
         let file = file::open(&self.path).map_err(io)?;
         let mut reader = BufReader::with_capacity(1 << 16, file);

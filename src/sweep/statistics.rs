@@ -34,7 +34,7 @@ pub struct ColumnStatistics {
 
 /// Follows columns of numbers.
 #[derive(Clone, Debug)]
-pub struct Statistics {
+pub(crate) struct Statistics {
     columns: Vec<Column>,
     /// An item is in the sample if its hash is not above this.
     threshold: u64,
@@ -52,7 +52,7 @@ struct Column {
 
 impl Statistics {
     /// Of these columns, over `rows` rows.
-    pub fn new(columns: &[String], rows: u64) -> Self {
+    pub(crate) fn new(columns: &[String], rows: u64) -> Self {
         let column = |name: &String| Column {
             name: name.clone(),
             count: 0,
@@ -69,7 +69,7 @@ impl Statistics {
     }
 
     /// Takes the numbers of a row, in order of the columns; NaN is none.
-    pub fn see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
+    pub(crate) fn see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
         let sampled = mix(item) <= self.threshold;
         for (column, value) in self.columns.iter_mut().zip(values) {
             if value.is_nan() {
@@ -86,7 +86,7 @@ impl Statistics {
     }
 
     /// The statistics so far.
-    pub fn close(self) -> Vec<ColumnStatistics> {
+    pub(crate) fn close(self) -> Vec<ColumnStatistics> {
         self.columns.into_iter().map(Column::close).collect()
     }
 }

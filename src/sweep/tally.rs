@@ -21,7 +21,7 @@ pub(super) struct Tally {
 const MESSAGES: usize = 3;
 
 impl Tally {
-    pub fn new(head: &Head) -> Self {
+    pub(crate) fn new(head: &Head) -> Self {
         let rows = head.rows().end - head.rows().start;
         let numbers: Vec<String> = (1..head.columns.len())
             .filter(|&c| !head.is_text(c))
@@ -40,7 +40,7 @@ impl Tally {
     }
 
     /// Takes a row that has just been run.
-    pub fn see(&mut self, Written { row, .. }: &Written) {
+    pub(crate) fn see(&mut self, Written { row, .. }: &Written) {
         let head = &self.head;
         let numbers = row.values.iter().enumerate().filter(|(k, _)| !head.is_text(k + 1));
         self.statistics.see(row.item, numbers.map(|(_, value)| *value));
@@ -48,11 +48,11 @@ impl Tally {
     }
 
     /// Takes the numbers of a row that is counted by itself.
-    pub fn statistics_see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
+    pub(crate) fn statistics_see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
         self.statistics.see(item, values);
     }
 
-    pub fn count(&mut self, item: u64, status: Status, message: &str) {
+    pub(crate) fn count(&mut self, item: u64, status: Status, message: &str) {
         self.done += 1;
         match status {
             Status::Ok => {}
@@ -67,7 +67,7 @@ impl Tally {
     }
 
     /// Takes a line that ought to be the next one; false if it is not, or is not whole.
-    pub fn see_line(&mut self, line: &[u8]) -> bool {
+    pub(crate) fn see_line(&mut self, line: &[u8]) -> bool {
         let head = &self.head;
         let next = head.rows().start + self.done;
         let parsed = Line::parse(line, head.columns.len())
@@ -81,7 +81,7 @@ impl Tally {
         true
     }
 
-    pub fn close(self) -> Report {
+    pub(crate) fn close(self) -> Report {
         Report {
             items: self.head.items,
             shard: self.head.shard,

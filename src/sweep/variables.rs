@@ -7,7 +7,7 @@ use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
-pub struct Variable {
+pub(crate) struct Variable {
     pub column: String,
     target: Target,
     /// Values multiply what is there.
@@ -174,7 +174,7 @@ pub enum VariableError {
 ///
 /// # Errors
 /// [`BindError`] names the variable and key.
-pub fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), BindError> {
+pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), BindError> {
     if plan.vary.is_empty() {
         return Err(BindError::Nothing);
     }
@@ -395,17 +395,17 @@ fn check_name(name: &str) -> Result<(), VariableError> {
 
 impl Variable {
     /// Names that its values are indices of; none if they are numbers.
-    pub fn names(&self) -> &[String] {
+    pub(crate) fn names(&self) -> &[String] {
         &self.names
     }
 
-    pub fn summary(&self, spread: &Spread) -> VariableSummary {
+    pub(crate) fn summary(&self, spread: &Spread) -> VariableSummary {
         let values = (!matches!(spread, Spread::Drawn(_))).then(|| spread.len());
         VariableSummary { column: self.column.clone(), values }
     }
 
     /// Whether force laws depend on it. Those of a model's curve depend on masses and speeds.
-    pub fn shapes_laws(&self, scenario: &Scenario) -> bool {
+    pub(crate) fn shapes_laws(&self, scenario: &Scenario) -> bool {
         match self.target {
             Target::Band(_) | Target::Force(_) | Target::Curve(_) => true,
             Target::Speed(_) | Target::Mass(_) => {
@@ -420,7 +420,7 @@ impl Variable {
     }
 
     /// Undoes what [`Variable::apply`] did: `scenario` has here what `base` has.
-    pub fn reset(&self, scenario: &mut Scenario, base: &Scenario) {
+    pub(crate) fn reset(&self, scenario: &mut Scenario, base: &Scenario) {
         match &self.target {
             Target::Speed(train) => scenario.train[*train].speed = base.train[*train].speed,
             Target::Mass(vehicles) => {
@@ -447,7 +447,7 @@ impl Variable {
     }
 
     /// Gives `scenario` the value, in SI; `base` is the scenario as written.
-    pub fn apply(&self, scenario: &mut Scenario, base: &Scenario, value: f64) {
+    pub(crate) fn apply(&self, scenario: &mut Scenario, base: &Scenario, value: f64) {
         let with = |old: f64| if self.factor { old * value } else { value };
         match &self.target {
             Target::Speed(train) => {

@@ -6,54 +6,109 @@ use crate::signal::cfc;
 
 /// Why a run gives no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "a variant is its message, a field what that says")]
 pub enum ExtractError {
+    /// A history has fewer than two states.
     #[error("{what} holds {states} states: at least 2 are needed")]
-    TooShort { origin: Origin, what: &'static str, states: usize },
+    TooShort {
+        /// Which file it comes from.
+        origin: Origin,
+        /// What it is of.
+        what: &'static str,
+        /// Number of its states.
+        states: usize,
+    },
+    /// A value is infinite or no number.
     #[error(
         "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
     )]
-    NotFinite { origin: Origin, what: String, state: usize, value: f64 },
+    NotFinite {
+        /// Which file it comes from.
+        origin: Origin,
+        /// What it is of.
+        what: String,
+        /// The state, counted from 1.
+        state: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The force never exceeds what counts as contact.
     #[error(
         "the force never exceeds {threshold_n:.0} N (its largest is {largest_n} N): there is no contact in this record; look at id, component, sign and units"
     )]
-    NoContact { threshold_n: f64, largest_n: f64 },
+    NoContact {
+        /// What counts as contact, in N.
+        threshold_n: f64,
+        /// Largest force of the record, in N.
+        largest_n: f64,
+    },
+    /// Deflection and force have no common times.
     #[error("the histories of deflection and force have no time in common")]
     NoOverlap,
+    /// A time of the manifest lies outside the record.
     #[error(
         "{key} = {at} lies outside the record, which goes from {first} to {last}",
         at = milliseconds(*time_s), first = milliseconds(*first_s), last = milliseconds(*last_s)
     )]
-    OutsideRecord { key: &'static str, time_s: f64, first_s: f64, last_s: f64 },
+    OutsideRecord {
+        /// Its key in the manifest.
+        key: &'static str,
+        /// The time, in s.
+        time_s: f64,
+        /// First time of the record, in s.
+        first_s: f64,
+        /// Last time of the record, in s.
+        last_s: f64,
+    },
+    /// The bodies never close the gap that the manifest states.
     #[error(
         "gap = {gap_mm} mm is never closed: the bodies move towards each other by {most_mm:.3} mm at most",
         gap_mm = gap_m * 1e3, most_mm = most_m * 1e3
     )]
-    GapStaysOpen { gap_m: f64, most_m: f64 },
+    GapStaysOpen {
+        /// The gap, in m.
+        gap_m: f64,
+        /// How far the bodies approach, in m.
+        most_m: f64,
+    },
+    /// The deflection never reaches the offset that the manifest states.
     #[error(
         "offset = {offset_mm} mm is never made up for: the deflection grows by {most_mm:.3} mm at most",
         offset_mm = offset_m * 1e3, most_mm = most_m * 1e3
     )]
-    OffsetTooLarge { offset_m: f64, most_m: f64 },
+    OffsetTooLarge {
+        /// The offset, in m.
+        offset_m: f64,
+        /// How far the deflection grows, in m.
+        most_m: f64,
+    },
+    /// No crash can have such a curve.
     #[error("{0}")]
     Impossible(#[from] energy::Impossible),
+    /// The deflection does not grow after contact.
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
+    /// Neither manifest nor file tell the speed.
     #[error(
         "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
     )]
-    NoSpeed { component: &'static str },
+    NoSpeed {
+        /// Component that would have told it.
+        component: &'static str,
+    },
+    /// The body does not move in the first state.
     #[error("the first state does not move: add speed = \"…km/h\" to the run")]
     Standing,
+    /// The force cannot be filtered.
     #[error("{0}")]
     Filter(#[from] cfc::CfcError),
+    /// The columns are no curve.
     #[error("{0}")]
     Curve(#[from] CurveError),
 }
 
 impl ExtractError {
     /// Whether it speaks of the force's file rather than of the motion's.
-    pub fn is_of_force(&self) -> bool {
+    pub(crate) fn is_of_force(&self) -> bool {
         match self {
             Self::TooShort { origin, .. } | Self::NotFinite { origin, .. } => {
                 *origin == Origin::Force

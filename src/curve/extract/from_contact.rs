@@ -16,7 +16,7 @@ pub(super) struct FromContact {
 
 impl FromContact {
     /// Time and deflection counted from contact, between two states where it lies there.
-    pub fn of(
+    pub(crate) fn of(
         record: &Record,
         contact_s: f64,
         offset_m: f64,

@@ -1,7 +1,7 @@
 //! What an extraction starts from: the run's histories, and what the manifest says of it.
 
 use crate::curve::Masses;
-use crate::curve::recipe::{BodyMotion, Recipe};
+use crate::curve::recipe::{Recipe, RecordedMotion};
 use crate::history::History;
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -28,7 +28,7 @@ pub enum MeasuredForce<'a> {
     /// What the obstacle feels.
     Contact(&'a History),
     /// Acceleration or velocity of the body's node, to be multiplied by its mass.
-    Body(&'a History, BodyMotion),
+    Body(&'a History, RecordedMotion),
 }
 
 /// What the manifest says of a run.

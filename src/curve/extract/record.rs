@@ -4,7 +4,7 @@ use super::error::{ExtractError, Origin};
 use super::input::{Measured, MeasuredForce, Setup};
 use super::remarks::Remarks;
 use crate::curve::contact::milliseconds;
-use crate::curve::recipe::BodyMotion;
+use crate::curve::recipe::RecordedMotion;
 use crate::history::History;
 use crate::signal::derivative;
 use crate::signal::resample::interpolate;
@@ -25,7 +25,10 @@ pub(super) struct Record {
 
 impl Record {
     /// The record of a run, up to the manifest's end.
-    pub fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Remarks), ExtractError> {
+    pub(crate) fn of(
+        measured: &Measured<'_>,
+        setup: &Setup<'_>,
+    ) -> Result<(Self, Remarks), ExtractError> {
         let mut remarks = Remarks::default();
         let motion = remarks.take(Motion::of(measured, setup)?);
         let force = remarks.take(force(measured, setup)?);
@@ -105,18 +108,18 @@ impl Record {
     }
 
     /// That a time lies outside the record.
-    pub fn outside(&self, key: &'static str, time_s: f64) -> ExtractError {
+    pub(crate) fn outside(&self, key: &'static str, time_s: f64) -> ExtractError {
         let (first_s, last_s) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
         ExtractError::OutsideRecord { key, time_s, first_s, last_s }
     }
 
     /// Whether a time lies within the record and before its last state.
-    pub fn holds(&self, time_s: f64) -> bool {
+    pub(crate) fn holds(&self, time_s: f64) -> bool {
         (self.time_s[0]..self.time_s[self.time_s.len() - 1]).contains(&time_s)
     }
 
     /// A column's value at a time within the record.
-    pub fn at(&self, values: &[f64], time_s: f64) -> Result<f64, ExtractError> {
+    pub(crate) fn at(&self, values: &[f64], time_s: f64) -> Result<f64, ExtractError> {
         interpolate(&self.time_s, values, &[time_s])
             .map(|v| v[0])
             .map_err(|_| ExtractError::NoOverlap)
@@ -138,7 +141,7 @@ pub(super) struct Signal {
 }
 
 impl Signal {
-    pub fn of(
+    pub(crate) fn of(
         history: &History,
         units: UnitSystem,
         factor: f64,
@@ -237,10 +240,10 @@ fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Remarks)
     let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);
     match measured.force {
         MeasuredForce::Contact(history) => of(history, units.force(), "force"),
-        MeasuredForce::Body(history, BodyMotion::Acceleration) => {
+        MeasuredForce::Body(history, RecordedMotion::Acceleration) => {
             of(history, mass * units.acceleration(), "acceleration")
         }
-        MeasuredForce::Body(history, BodyMotion::Velocity) => {
+        MeasuredForce::Body(history, RecordedMotion::Velocity) => {
             let (velocity, mut remarks) = of(history, mass * units.speed(), "velocity")?;
             remarks.note("body force: mass times the central difference of the velocity");
             let values = derivative(&velocity.time_s, &velocity.values);

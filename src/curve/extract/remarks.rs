@@ -2,7 +2,7 @@
 
 /// Choices that were made, and what the user should look at.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Remarks {
+pub(crate) struct Remarks {
     /// Choices made, for the record.
     pub notes: Vec<String>,
     /// What the user should look at.
@@ -11,23 +11,23 @@ pub struct Remarks {
 
 impl Remarks {
     /// Adds a note.
-    pub fn note(&mut self, note: impl Into<String>) {
+    pub(crate) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }
 
     /// Adds a warning.
-    pub fn warn(&mut self, warning: impl Into<String>) {
+    pub(crate) fn warn(&mut self, warning: impl Into<String>) {
         self.warnings.push(warning.into());
     }
 
     /// Adds other remarks behind these.
-    pub fn append(&mut self, other: Self) {
+    pub(crate) fn append(&mut self, other: Self) {
         self.notes.extend(other.notes);
         self.warnings.extend(other.warnings);
     }
 
     /// The result of a step, whose remarks are added behind these.
-    pub fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
+    pub(crate) fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
         self.append(remarks);
         result
     }

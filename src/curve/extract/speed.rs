@@ -29,7 +29,7 @@ pub(super) struct ImpactSpeed {
 impl ImpactSpeed {
     /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
     /// are said. `before`: the last state that contact has not changed.
-    pub fn of(
+    pub(crate) fn of(
         measured: &Measured<'_>,
         setup: &Setup<'_>,
         record: &Record,

@@ -35,7 +35,7 @@ enum StartBy {
 
 impl Start {
     /// Where the manifest says, else where the force does.
-    pub fn find(
+    pub(crate) fn find(
         measured: &Measured<'_>,
         setup: &Setup<'_>,
         record: &Record,
@@ -88,7 +88,7 @@ impl Start {
     }
 
     /// By how much the crush may be off because contact lies somewhere in a step.
-    pub fn uncertainty(&self, contact: &FromContact) -> Remarks {
+    pub(crate) fn uncertainty(&self, contact: &FromContact) -> Remarks {
         let mut remarks = Remarks::default();
         let curve = &contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];

@@ -2,7 +2,7 @@
 //! the points that other tools need.
 
 use super::MIN_POINTS;
-use super::curve::{Facts, ReadCurve, SourceFile};
+use super::curve::{Facts, ReadCurve, ReadFile};
 use super::error::{ContentError, Place};
 use crate::unit::UnitSystem;
 
@@ -27,7 +27,7 @@ pub(super) struct Columns {
     pub units: Option<UnitSystem>,
     pub notes: Vec<String>,
     /// Files that were read beside the one that was given.
-    pub files: Vec<SourceFile>,
+    pub files: Vec<ReadFile>,
 }
 
 /// Where the points of a curve stand.
@@ -77,7 +77,9 @@ impl Columns {
         }
         self.check_finite()?;
         if self.time_s.is_none() {
-            let table = Points::of(&self)?.loading_then_unloading(&mut self.notes)?;
+            let mut points = Points::of(&self)?;
+            let crush_m = self.facts.max_deflection_m;
+            let table = points.loading_then_unloading(crush_m, &mut self.notes)?;
             (self.deflection_m, self.force_n) = table.iter().map(|p| (p.d, p.f)).unzip();
         }
         Ok(ReadCurve {
@@ -145,8 +147,10 @@ impl Points {
     }
 
     /// The loading branch from (0, 0), then the unloading branch if there is one.
+    /// `crush_m`: the largest crush, if the file says it.
     fn loading_then_unloading(
-        mut self,
+        &mut self,
+        crush_m: Option<f64>,
         notes: &mut Vec<String>,
     ) -> Result<Vec<Point>, ContentError> {
         self.turn(notes);
@@ -154,6 +158,7 @@ impl Points {
         self.put_in_order(notes);
         self.remove_guards(notes);
         self.remove_repeated(notes);
+        self.remove_tail(crush_m, notes);
         let points = self.list.len();
         if points < MIN_POINTS {
             let of = " without those of guard and repetition";
@@ -165,7 +170,7 @@ impl Points {
             notes.push(format!("points: the curve begins at {d} m, a point (0, 0) is put before"));
             self.list.insert(0, Point { d: 0.0, f: 0.0, place });
         }
-        Ok(self.list)
+        Ok(std::mem::take(&mut self.list))
     }
 
     /// Makes compression positive: springs of finite elements have it in the third quadrant.
@@ -258,6 +263,26 @@ impl Points {
         }
     }
 
+    /// Removes the points beyond the largest crush, which our exports add for other tools.
+    fn remove_tail(&mut self, crush_m: Option<f64>, notes: &mut Vec<String>) {
+        let Some(crush_m) = crush_m else { return };
+        // As many digits as exports have.
+        let is_beyond = |p: &Point| p.d > crush_m * (1.0 + SAME_DISTANCE);
+        let Some(first) = self.list.iter().position(is_beyond).filter(|&i| i > 0) else { return };
+        let (last, next) = (self.list[first - 1].clone(), self.list[first].clone());
+        let before = self.list.len();
+        self.list.retain(|p| !is_beyond(p));
+        let removed = before - self.list.len();
+        notes.push(format!(
+            "points: {removed} beyond the maximal crush of {crush_m} m, which the file states, removed"
+        ));
+        if last.d < crush_m * (1.0 - SAME_DISTANCE) {
+            let f = last.f + (next.f - last.f) * (crush_m - last.d) / (next.d - last.d);
+            self.list.insert(first, Point { d: crush_m, f, place: next.place });
+            notes.push("points: one put at the maximal crush, between its neighbours".into());
+        }
+    }
+
     /// Up to the largest deflection it must increase, behind it decrease.
     fn check_order(&self) -> Result<(), ContentError> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
@@ -315,6 +340,20 @@ mod tests {
         let unloading = [&plain[..], &[(2.9, 1.0), (2.8, 0.0)]].concat();
         t(&unloading, &unloading, 0);
         t(&[&plain[1..], &[(4.0, 2.0)]].concat(), &[&plain[..], &[(4.0, 2.0)]].concat(), 1);
+    }
+
+    #[test]
+    fn points_beyond_the_stated_crush_are_removed() {
+        let points = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (3.0, 3.0), (4.0, 1.0), (6.0, 9.0)];
+        for (crush_m, end) in [(3.0, (3.0, 3.0)), (3.5, (3.5, 2.0))] {
+            let mut columns = Columns::at(Places::Rows);
+            (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
+            columns.facts.max_deflection_m = Some(crush_m);
+            let curve = columns.curve().unwrap();
+            let last = (curve.deflection_m.last(), curve.force_n.last());
+            assert_eq!(last, (Some(&end.0), Some(&end.1)));
+            assert!(curve.notes[0].starts_with("points: 2 beyond the maximal crush"));
+        }
     }
 
     #[test]

@@ -28,12 +28,12 @@ pub struct ReadCurve {
     /// What was taken how.
     pub notes: Vec<String>,
     /// The files that were read.
-    pub files: Vec<SourceFile>,
+    pub files: Vec<ReadFile>,
 }
 
 /// A file as it was read.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SourceFile {
+pub struct ReadFile {
     /// As it was given, or found from what was.
     pub path: PathBuf,
     /// Bytes that were read.
@@ -42,7 +42,7 @@ pub struct SourceFile {
     pub blake3: String,
 }
 
-impl SourceFile {
+impl ReadFile {
     pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
         Self {
             path: path.into(),
@@ -69,6 +69,8 @@ pub struct Facts {
     pub mass_kg: Option<f64>,
     /// Mass of the other body in kg.
     pub other_mass_kg: Option<f64>,
+    /// Largest crush in m; points behind it are what other tools need beyond it.
+    pub max_deflection_m: Option<f64>,
 }
 
 impl Facts {
@@ -100,6 +102,7 @@ impl Facts {
             "speed_m_per_s" => self.speed_m_per_s = above_zero()?,
             "mass_kg" => self.mass_kg = above_zero()?,
             "other_mass_kg" => self.other_mass_kg = above_zero()?,
+            "max_deflection_m" => self.max_deflection_m = above_zero()?,
             "force_kind" => {
                 let kind = ForceKind::parse(value);
                 self.force = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);

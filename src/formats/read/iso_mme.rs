@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
-use super::curve::{Facts, SourceFile, title};
+use super::curve::{Facts, ReadFile, title};
 use super::error::{ContentError, Place, shown};
 use super::label::Quantity;
 use super::text::{lines, number};
@@ -33,7 +33,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     let mut columns = Columns::at(Places::Rows);
-    comments(input.bytes, &mut columns.facts)?;
+    test_facts(input, &mut columns)?;
     let (mut found, mut bytes_left) = (Vec::new(), MAX_CURVE_BYTES);
     for path in channel_files(input.path)? {
         let named = |source: ContentError| ContentError::Beside {
@@ -84,6 +84,35 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     columns.deflection_m.truncate(time_s.len());
     columns.time_s = Some(time_s);
     Ok(columns)
+}
+
+/// Takes what the test's `.mme` file says: of the folder, or the one that was given.
+fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), ContentError> {
+    if !input.path.is_dir() {
+        described(input.bytes, &mut columns.facts);
+        return comments(input.bytes, &mut columns.facts);
+    }
+    let Some(path) = names(input.path)?.into_iter().find(|p| has_extension(p, "mme")) else {
+        return Ok(());
+    };
+    let bytes = file::read(&path, MAX_CURVE_BYTES)?;
+    columns.files.push(ReadFile::of(&path, &bytes));
+    described(&bytes, &mut columns.facts);
+    comments(&bytes, &mut columns.facts)
+}
+
+/// Takes masses (kg) and velocities (m/s) of the test objects.
+fn described(bytes: &[u8], facts: &mut Facts) {
+    let header = Header::read(bytes);
+    let of = |what: &str, k: usize| {
+        let text = |key: String| number(header.text(&key));
+        text(format!("{what} test object {k}"))
+            .or_else(|| text(format!("{what} of test object {k}")))
+    };
+    facts.mass_kg = of("mass", 1).filter(|m| *m > 0.0);
+    facts.other_mass_kg = of("mass", 2).filter(|m| *m > 0.0);
+    let closing = of("velocity", 1).map(|v| (v - of("velocity", 2).unwrap_or(0.0)).abs());
+    facts.speed_m_per_s = closing.filter(|v| *v > 0.0);
 }
 
 /// What the first that says anything says.
@@ -161,7 +190,7 @@ struct Channel {
     values: Vec<f64>,
     lines: Vec<u64>,
     facts: Facts,
-    file: SourceFile,
+    file: ReadFile,
 }
 
 impl Channel {
@@ -214,7 +243,7 @@ impl Channel {
             values,
             lines,
             facts,
-            file: SourceFile::of(path, bytes),
+            file: ReadFile::of(path, bytes),
         }))
     }
 }

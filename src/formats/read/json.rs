@@ -103,6 +103,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, ReadCurveError> {
         body_unloading_stiffness_n_per_m: curve.body_unloading_stiffness_n_per_m,
         mass_kg: Some(curve.mass_kg),
         other_mass_kg,
+        max_deflection_m: None,
     };
     Ok(ReadCurve {
         title: title(&format!("{}, {}", curve.provenance.group, curve.model), &mut notes),

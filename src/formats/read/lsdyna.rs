@@ -22,10 +22,10 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     let mut deck = Deck::read(input.bytes)?;
-    let Found { id, title: found, scale, points, lines } =
-        deck.choose(input.options.curve.as_deref())?;
+    let found = deck.choose(input.options.curve.as_deref())?;
+    let Found { id, title: found, scale, points, lines, facts, units: stated } = found;
     let mut notes = vec![format!("curve: {id} of the deck")];
-    let system = units(deck.units, input.options.units, REMEDY, &mut notes)?;
+    let system = units(stated, input.options.units, REMEDY, &mut notes)?;
     if scale != Scale::default() {
         notes.push(format!(
             "scale: abscissas times {} after {} is added, ordinates times {} after {}",
@@ -36,13 +36,16 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     Ok(Columns {
         deflection_m: points.iter().map(|(a, _)| scale.sfa * (a + scale.offa) * length).collect(),
         force_n: points.iter().map(|(_, o)| scale.sfo * (o + scale.offo) * force).collect(),
-        facts: deck.facts,
+        facts,
         title: title(&found, &mut notes),
         units: Some(system),
         notes,
         ..Columns::at(Places::Lines(lines))
     })
 }
+
+/// Curves that a message lists.
+const LISTED: usize = 20;
 
 /// Factors and offsets of card 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +70,9 @@ struct Found {
     scale: Scale,
     points: Vec<(f64, f64)>,
     lines: Vec<u64>,
+    /// What the comments in front of its points say.
+    facts: super::Facts,
+    units: Option<(crate::unit::UnitSystem, u64)>,
 }
 
 /// What the next line of a curve is.
@@ -129,8 +135,8 @@ impl Deck {
 
     fn comment(&mut self, comment: &str, line: u64) -> Result<(), ContentError> {
         let comment = comment.trim_start_matches(['$', '#']);
-        if self.units.is_none() {
-            self.units = stated_units(comment).map(|units| (units, line));
+        if let Some(units) = stated_units(comment) {
+            self.units = Some((units, line));
         }
         self.facts.take("$", comment, Place::Line(line))
     }
@@ -157,8 +163,9 @@ impl Deck {
     }
 
     fn card(&mut self, line: &str, number: u64, width: usize) -> Result<(), ContentError> {
-        let comment_line = self.comment_line;
+        let (comment_line, facts, units) = (self.comment_line, self.facts, self.units);
         let Some(curve) = self.curves.last_mut() else { return Ok(()) };
+        (curve.facts, curve.units) = (facts, units);
         let fields = Fields::of(line, number, width);
         let id = fields.text(0).trim();
         curve.id = id.parse().ok().filter(|id| *id > 0).ok_or_else(|| {
@@ -200,7 +207,13 @@ impl Deck {
 
     /// The curve of that number, or the only one.
     fn choose(&mut self, asked: Option<&str>) -> Result<Found, ContentError> {
-        let known = || self.curves.iter().map(|c| c.id.to_string()).collect::<Vec<_>>().join(", ");
+        let known = || {
+            let shown = |c: &Found| match c.title.is_empty() {
+                true => c.id.to_string(),
+                false => format!("{} (\"{}\")", c.id, shown(&c.title)),
+            };
+            self.curves.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
+        };
         let at = match (asked, self.curves.len()) {
             (_, 0) => {
                 let found = "none in this deck".into();

@@ -30,7 +30,8 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     let matrices = matrices(input.bytes)?;
     let table = choose(&matrices, input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: matrix {} of the file", table.name)];
-    let system = match (table.name == OURS, input.options.units) {
+    let ours = table.name.strip_prefix(OURS);
+    let system = match (ours.is_some(), input.options.units) {
         (true, None) => {
             notes.push(format!("units: SI, as crumple export writes {OURS}"));
             UnitSystem::SI
@@ -41,11 +42,23 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     let rows = table.rows;
     columns.deflection_m = table.values(0, rows).map(|v| v * system.length_m).collect();
     columns.force_n = table.values(rows, rows).map(|v| v * system.force()).collect();
-    let stiffness = matrices.iter().find(|m| m.name == "k_u" && m.rows * m.columns == 1);
+    // Further curves of one file have numbers behind their names.
+    let beside = |name: &str| {
+        let name = format!("{name}{}", ours.unwrap_or_default());
+        matrices.iter().find(move |m| m.name == name)
+    };
+    if let Some(facts) = beside("facts").filter(|m| m.is_text) {
+        for (line, text) in facts.texts().enumerate() {
+            columns.facts.take("facts:", &text, Place::Row(line + 1))?;
+        }
+    }
+    let stiffness = beside("k_u").filter(|m| m.rows * m.columns == 1);
     let stiffness = stiffness.and_then(|m| m.values(0, 1).next());
     let stiffness = stiffness.map(|k| k * system.force() / system.length_m);
-    columns.facts.unloading_stiffness_n_per_m = stiffness.filter(|k| *k > 0.0 && k.is_finite());
-    if matrices.iter().any(|m| m.name == "fd_unload") {
+    let stiffness = stiffness.filter(|k| *k > 0.0 && k.is_finite());
+    columns.facts.unloading_stiffness_n_per_m =
+        stiffness.or(columns.facts.unloading_stiffness_n_per_m);
+    if beside("fd_unload").is_some() {
         notes.push("unloading: that of k_u, fd_unload is not read".into());
     }
     columns.title = Some(table.name.clone());
@@ -59,8 +72,9 @@ fn is_later(bytes: &[u8]) -> bool {
     bytes.starts_with(b"MATLAB ")
 }
 
-/// A full matrix of doubles.
+/// A full matrix of doubles; of a text, one for each character.
 struct Matrix<'a> {
+    is_text: bool,
     name: String,
     rows: usize,
     columns: usize,
@@ -78,13 +92,30 @@ impl Matrix<'_> {
     }
 }
 
+/// Most lines and columns of a text that is read.
+const MOST_TEXT: usize = 1_000;
+
+impl Matrix<'_> {
+    /// The rows of a text.
+    fn texts(&self) -> impl Iterator<Item = String> {
+        let (rows, columns) = (self.rows.min(MOST_TEXT), self.columns.min(MOST_TEXT));
+        let character = |code: f64| char::from_u32(code as u32).unwrap_or(' ');
+        (0..rows).map(move |row| {
+            let code = |column: usize| self.values(column * self.rows + row, 1).next();
+            let line: String = (0..columns).filter_map(code).map(character).collect();
+            line.trim_end().to_string()
+        })
+    }
+}
+
 /// What the integers in front of a matrix say.
 struct Head {
     is_big: bool,
     /// Bytes of one number.
     number: usize,
-    /// Whether it is full and of doubles.
+    /// Whether it is full or a text, and of doubles.
     is_read: bool,
+    is_text: bool,
     rows: usize,
     columns: usize,
     is_complex: bool,
@@ -114,8 +145,9 @@ fn head(bytes: &[u8], at: usize) -> Option<Head> {
         && (0..=1).contains(&complex);
     let name = usize::try_from(name).ok().filter(|name| (2..=NAME).contains(name))?;
     let (rows, columns) = (usize::try_from(rows).ok()?, usize::try_from(columns).ok()?);
-    let (is_read, is_complex) = (numbers == 0 && form == 0 && complex == 0, complex == 1);
-    fits.then_some(Head { is_big, number, is_read, rows, columns, is_complex, name })
+    let (is_read, is_complex) = (numbers == 0 && form < 2 && complex == 0, complex == 1);
+    let is_text = form == 1;
+    fits.then_some(Head { is_big, number, is_read, is_text, rows, columns, is_complex, name })
 }
 
 /// The full matrices of doubles; others are passed over.
@@ -145,6 +177,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, ContentError> {
         };
         if head.is_read {
             found.push(Matrix {
+                is_text: head.is_text,
                 name: name.into_owned(),
                 rows: head.rows,
                 columns: head.columns,
@@ -162,10 +195,11 @@ fn choose<'a>(
     matrices: &'a [Matrix<'_>],
     asked: Option<&str>,
 ) -> Result<&'a Matrix<'a>, ContentError> {
-    let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2).collect();
+    let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2 && !m.is_text).collect();
     let known = || fitting.iter().map(|m| shown(&m.name)).collect::<Vec<_>>().join(", ");
     let by_name = |name: &str| fitting.iter().find(|m| m.name == name).copied();
-    let table = match (asked, by_name(OURS), &fitting[..]) {
+    let has_ours = fitting.iter().filter(|m| m.name.starts_with(OURS)).count();
+    let table = match (asked, by_name(OURS).filter(|_| has_ours == 1), &fitting[..]) {
         (_, _, []) => {
             let sizes =
                 matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));

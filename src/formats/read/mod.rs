@@ -28,10 +28,11 @@ use crate::curve::ForceKind;
 use crate::file;
 use crate::unit::UnitSystem;
 use columns::Columns;
-pub use curve::{Facts, ReadCurve, SourceFile};
+pub use curve::{Facts, ReadCurve, ReadFile};
 pub use error::{ContentError, Place, ReadCurveError};
 
 /// One format of curves.
+#[derive(Debug)]
 pub struct Reader {
     /// Its name.
     pub name: &'static str,
@@ -45,6 +46,7 @@ pub struct Reader {
 }
 
 /// What a reader gives.
+#[derive(Debug)]
 enum Read {
     /// Columns, of which the curve is made.
     Columns(fn(&Input<'_>) -> Result<Columns, ContentError>),
@@ -183,9 +185,9 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, ReadCurveError> {
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.
-fn open(path: &Path) -> Result<(Vec<u8>, SourceFile), ReadCurveError> {
+fn open(path: &Path) -> Result<(Vec<u8>, ReadFile), ReadCurveError> {
     let bytes = file::read(path, MAX_CURVE_BYTES)
         .map_err(|source| ReadCurveError::Io { path: path.into(), source })?;
-    let own = SourceFile::of(path, &bytes);
+    let own = ReadFile::of(path, &bytes);
     Ok((bytes, own))
 }

@@ -40,7 +40,7 @@ pub(in super::super) struct Move {
 
 impl Move {
     /// This and what happened later in the same step.
-    pub fn then(self, later: Self) -> Self {
+    pub(crate) fn then(self, later: Self) -> Self {
         Self {
             loads: self.loads || later.loads,
             closed_m: self.closed_m.or(later.closed_m),
@@ -53,13 +53,13 @@ impl Move {
 
 impl Contact {
     /// An interface that has never been in contact.
-    pub fn open() -> Self {
+    pub(crate) fn open() -> Self {
         Self { stage: Stage::Below, index: 0, branch: Branch::default(), peak_n: 0.0 }
     }
 
     /// The piece of the envelope that holds a new largest deflection.
     #[inline(always)]
-    pub fn load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
+    pub(crate) fn load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
         let before = self.index;
         self.index = law.piece_index(before, deflection_m);
         let passed_n = law.peak_between_n(before, self.index);
@@ -71,7 +71,7 @@ impl Contact {
     }
 
     /// From here on the deflection is below its largest.
-    pub fn turn(&mut self, law: &ForceLaw, largest_m: f64) {
+    pub(crate) fn turn(&mut self, law: &ForceLaw, largest_m: f64) {
         let before = self.index;
         self.index = law.piece_index(before, largest_m);
         self.branch = law.branch(self.index, largest_m);
@@ -82,7 +82,7 @@ impl Contact {
 
     /// The piece that holds a deflection after a stretch below the largest: the envelope's if it
     /// is a new largest one.
-    pub fn unload_or_load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
+    pub(crate) fn unload_or_load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
         if deflection_m > 0.0 && deflection_m >= self.branch.largest_m {
             return self.load(law, deflection_m);
         }

@@ -30,7 +30,7 @@ pub(super) enum Direction {
 impl Direction {
     /// Of a deflection as counted from the way in which the bodies move towards each other.
     #[inline(always)]
-    pub fn sign(self) -> f64 {
+    pub(crate) fn sign(self) -> f64 {
         match self {
             Self::Compression => 1.0,
             Self::Tension => -1.0,
@@ -110,7 +110,7 @@ pub(super) struct Contacts<'a> {
 
 impl<'a> Contacts<'a> {
     /// Laws and gaps (m) of the interfaces, all open.
-    pub fn new(
+    pub(crate) fn new(
         layout: &Layout,
         laws: &[(Option<&'a ForceLaw>, f64)],
         direction: Direction,
@@ -146,39 +146,39 @@ impl<'a> Contacts<'a> {
         self.totals[slot.row()].set(slot.lane(), contact, piece);
     }
 
-    pub fn deflection_m(&self, at: StepPoint, k: usize) -> f64 {
+    pub(crate) fn deflection_m(&self, at: StepPoint, k: usize) -> f64 {
         self.deflection_m[at as usize][self.fixed.layout.of(k)]
     }
 
-    pub fn force_n(&self, at: StepPoint, k: usize) -> f64 {
+    pub(crate) fn force_n(&self, at: StepPoint, k: usize) -> f64 {
         self.force_n[at as usize][self.fixed.layout.of(k)]
     }
 
     #[inline(always)]
-    pub fn deflections_m(&self, at: StepPoint) -> &Rows {
+    pub(crate) fn deflections_m(&self, at: StepPoint) -> &Rows {
         &self.deflection_m[at as usize]
     }
 
     #[inline(always)]
-    pub fn forces_n(&self, at: StepPoint) -> &Rows {
+    pub(crate) fn forces_n(&self, at: StepPoint) -> &Rows {
         &self.force_n[at as usize]
     }
 
-    pub fn slope_n_per_m(&self, slot: Slot) -> f64 {
+    pub(crate) fn slope_n_per_m(&self, slot: Slot) -> f64 {
         self.lanes[slot.row()].slope_n_per_m[slot.lane()]
     }
 
-    pub fn has_law(&self, k: usize) -> bool {
+    pub(crate) fn has_law(&self, k: usize) -> bool {
         self.fixed.laws[k].is_some()
     }
 
     /// Largest force on the law up to the end of the last step.
-    pub fn peak_n(&self, k: usize) -> f64 {
+    pub(crate) fn peak_n(&self, k: usize) -> f64 {
         self.contacts[k].peak_n.max(self.force_n(StepPoint::End, k))
     }
 
     /// Sets the deflection at the end of the flight to first contact, and the piece it is on.
-    pub fn set_start(&mut self, k: usize, deflection_m: f64, closes: bool) {
+    pub(crate) fn set_start(&mut self, k: usize, deflection_m: f64, closes: bool) {
         let slot = self.fixed.layout.of(k);
         self.deflection_m[StepPoint::End as usize][slot] = deflection_m;
         // Bodies that touch and close are already on the envelope: a curve may begin above 0.
@@ -194,7 +194,7 @@ impl<'a> Contacts<'a> {
 
     /// The end of a step becomes the start of the next.
     #[inline(always)]
-    pub fn next(&mut self) {
+    pub(crate) fn next(&mut self) {
         self.deflection_m.swap(StepPoint::Start as usize, StepPoint::End as usize);
         self.force_n.swap(StepPoint::Start as usize, StepPoint::End as usize);
     }
@@ -202,7 +202,7 @@ impl<'a> Contacts<'a> {
     /// Deflections and forces at positions `x_m`; whether some interface has left its piece. At
     /// the end of a step the largest deflections follow.
     #[inline(always)]
-    pub fn evaluate<const N: usize>(&mut self, x_m: &Rows, at: StepPoint) -> bool {
+    pub(crate) fn evaluate<const N: usize>(&mut self, x_m: &Rows, at: StepPoint) -> bool {
         match at {
             StepPoint::End => self.pass::<N, true>(x_m, at as usize),
             StepPoint::Start | StepPoint::Inside => self.pass::<N, false>(x_m, at as usize),
@@ -243,7 +243,7 @@ impl<'a> Contacts<'a> {
 
     /// Takes `factor` times the change of the forces along `a`.
     #[inline(always)]
-    pub fn take_gradient<const N: usize>(&mut self, a: &Rows, factor: f64) {
+    pub(crate) fn take_gradient<const N: usize>(&mut self, a: &Rows, factor: f64) {
         let n = self.fixed.layout.known::<N>();
         let factor = self.fixed.direction.sign() * factor;
         let a = a.values(n);
@@ -258,14 +258,14 @@ impl<'a> Contacts<'a> {
 
     /// What [`Self::take_gradient`] has taken.
     #[inline(always)]
-    pub fn gradient_n(&self) -> &Rows {
+    pub(crate) fn gradient_n(&self) -> &Rows {
         &self.gradient_n
     }
 
     /// Calls `leave` with the slot of each interface that has left its piece in the last
     /// [`Self::evaluate`].
     #[inline(always)]
-    pub fn left(&self, mut leave: impl FnMut(Slot)) {
+    pub(crate) fn left(&self, mut leave: impl FnMut(Slot)) {
         for (row, outside) in self.outside_m.values(self.lanes.len()).iter().enumerate() {
             for (lane, &outside) in outside.iter().enumerate() {
                 if outside > 0.0 {
@@ -277,7 +277,7 @@ impl<'a> Contacts<'a> {
 
     /// Whether the deflection of `k` has fallen below its largest, along the envelope so far.
     #[inline(always)]
-    pub fn turns(&self, at: StepPoint, k: usize, slot: Slot) -> bool {
+    pub(crate) fn turns(&self, at: StepPoint, k: usize, slot: Slot) -> bool {
         self.is_loading(k)
             && self.deflections_m(at)[slot] < self.lanes[slot.row()].from_m[slot.lane()]
     }
@@ -285,7 +285,13 @@ impl<'a> Contacts<'a> {
     /// Finds the piece for the deflection of `k`. If it [turns](Self::turns), it was largest at
     /// `top_m`.
     #[inline(always)]
-    pub fn settle(&mut self, at: StepPoint, k: usize, slot: Slot, top_m: Option<f64>) -> Move {
+    pub(crate) fn settle(
+        &mut self,
+        at: StepPoint,
+        k: usize,
+        slot: Slot,
+        top_m: Option<f64>,
+    ) -> Move {
         let contact = &mut self.contacts[k];
         let Some(law) = self.fixed.laws[k] else { return Move::default() };
         let deflection = self.deflection_m[at as usize][slot];
@@ -327,7 +333,7 @@ impl<'a> Contacts<'a> {
     }
 
     /// Largest deflection so far.
-    pub fn largest_m(&self, at: StepPoint, k: usize) -> f64 {
+    pub(crate) fn largest_m(&self, at: StepPoint, k: usize) -> f64 {
         match self.contacts[k].stage {
             Stage::Loading => self.deflection_m(at, k),
             Stage::Below => self.contacts[k].branch.largest_m,
@@ -335,23 +341,23 @@ impl<'a> Contacts<'a> {
     }
 
     /// Whether the deflection of `k` has not yet fallen since it was last at its largest.
-    pub fn is_loading(&self, k: usize) -> bool {
+    pub(crate) fn is_loading(&self, k: usize) -> bool {
         self.contacts[k].stage == Stage::Loading
     }
 
     /// Whether the piece of `k` has any force.
-    pub fn presses(&self, k: usize) -> bool {
+    pub(crate) fn presses(&self, k: usize) -> bool {
         let slot = self.fixed.layout.of(k);
         !self.lanes[slot.row()].is_idle(slot.lane())
     }
 
     /// Deflection below which `k` is open.
-    pub fn opens_at_m(&self, k: usize) -> f64 {
+    pub(crate) fn opens_at_m(&self, k: usize) -> f64 {
         let slot = self.fixed.layout.of(k);
         self.lanes[slot.row()].to_m[slot.lane()]
     }
 
-    pub fn is_open(&self, k: usize) -> bool {
+    pub(crate) fn is_open(&self, k: usize) -> bool {
         let slot = self.fixed.layout.of(k);
         self.lanes[slot.row()].is_open(slot.lane())
     }

@@ -19,7 +19,7 @@ pub(super) struct Totals {
 }
 
 impl Totals {
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         let zero = [0.0; LANES];
         Self {
             known_m: zero,
@@ -32,7 +32,7 @@ impl Totals {
     }
 
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, contact: &Contact, piece: &Piece) {
+    pub(crate) fn set(&mut self, lane: usize, contact: &Contact, piece: &Piece) {
         self.known_m[lane] = piece.known.deflection_m;
         self.known_n[lane] = piece.known.force_n;
         self.known_j[lane] = piece.known.work_j;
@@ -51,7 +51,7 @@ impl Contacts<'_> {
     /// Work done at an interface so far in J (what is stored and dissipated, from the law's
     /// tables), and its integral over the deflection in J m.
     #[inline(always)]
-    pub fn work(&self, at: StepPoint, slot: Slot) -> (f64, f64) {
+    pub(crate) fn work(&self, at: StepPoint, slot: Slot) -> (f64, f64) {
         let (totals, lane) = (&self.totals[slot.row()], slot.lane());
         let along = self.deflections_m(at)[slot] - totals.known_m[lane];
         let (known, force) = (totals.known_n[lane], self.forces_n(at)[slot]);
@@ -62,7 +62,7 @@ impl Contacts<'_> {
 
     /// The work of all interfaces, into `out_j`.
     #[inline(always)]
-    pub fn works_j<const N: usize>(&self, out_j: &mut Rows) {
+    pub(crate) fn works_j<const N: usize>(&self, out_j: &mut Rows) {
         let n = self.fixed.layout.known::<N>();
         let (d, f) =
             (self.deflections_m(StepPoint::End).values(n), self.forces_n(StepPoint::End).values(n));
@@ -76,7 +76,7 @@ impl Contacts<'_> {
     /// Largest deflections so far (0 before contact), and what of the work of all interfaces is
     /// dissipated.
     #[inline(always)]
-    pub fn largest_and_dissipated<const N: usize>(
+    pub(crate) fn largest_and_dissipated<const N: usize>(
         &self,
         work_j: &Rows,
         largest_m: &mut Rows,

@@ -44,7 +44,7 @@ pub(super) struct OutputRecorder {
 }
 
 impl OutputRecorder {
-    pub fn new(chain: &Chain, layout: &Layout, record: Record) -> Self {
+    pub(crate) fn new(chain: &Chain, layout: &Layout, record: Record) -> Self {
         let zeros = || Rows::zeros(layout);
         let (of_body, of_interface) = kinds(record);
         let rows = (of_body.len() + of_interface.len()) * layout.rows();

@@ -8,7 +8,7 @@ use super::state::{Engine, Fixed, Losses, Scheme};
 
 impl<'a> Engine<'a> {
     /// The chain at its first contact.
-    pub fn new(chain: &'a Chain, scheme: Scheme, step_s: f64) -> Self {
+    pub(crate) fn new(chain: &'a Chain, scheme: Scheme, step_s: f64) -> Self {
         let (bodies, interfaces) = (chain.bodies(), chain.interfaces());
         let layout = Layout::new(bodies.len());
         let laws: Vec<_> = interfaces.iter().map(|i| (Some(&*i.law), i.gap_m)).collect();

@@ -28,7 +28,7 @@ impl Fixed<'_> {
     /// The time by which speeds are ahead of positions between the steps: half a step, or a sixth
     /// in the scheme of fourth order.
     #[inline(always)]
-    pub fn ahead_s(&self) -> f64 {
+    pub(crate) fn ahead_s(&self) -> f64 {
         match self.scheme {
             Scheme::FourthOrder => 1.0 / 6.0 * self.step_s,
             Scheme::Verlet => 0.5 * self.step_s,
@@ -104,33 +104,33 @@ pub(super) struct Turn {
 
 impl<'a> Engine<'a> {
     /// The bodies at interface `k`.
-    pub fn sides(&self, k: usize) -> Range<usize> {
+    pub(crate) fn sides(&self, k: usize) -> Range<usize> {
         k..self.fixed.chain.bodies().len().min(k + 2)
     }
 
     /// Net force of interface `k`.
-    pub fn force_n(&self, at: StepPoint, k: usize) -> f64 {
+    pub(crate) fn force_n(&self, at: StepPoint, k: usize) -> f64 {
         self.forces_n(at)[self.fixed.layout.of(k)]
     }
 
     /// Net forces of all interfaces.
     #[inline(always)]
-    pub fn forces_n(&self, at: StepPoint) -> &Rows {
+    pub(crate) fn forces_n(&self, at: StepPoint) -> &Rows {
         self.net_n.as_ref().unwrap_or(self.push.forces_n(at))
     }
 
     /// Rate of deflection of interface `k`: of the body behind it against what is in front.
-    pub fn closing(&self, k: usize) -> f64 {
+    pub(crate) fn closing(&self, k: usize) -> f64 {
         self.between(&self.v, k)
     }
 
     /// By how much a value of the body behind interface `k` exceeds that of what is in front.
-    pub fn between(&self, values: &Rows, k: usize) -> f64 {
+    pub(crate) fn between(&self, values: &Rows, k: usize) -> f64 {
         values[self.fixed.layout.of(k)] - values[self.fixed.layout.of(k + 1)]
     }
 
     #[inline(always)]
-    pub fn contacts(&self, direction: Direction) -> &Contacts<'a> {
+    pub(crate) fn contacts(&self, direction: Direction) -> &Contacts<'a> {
         match &self.pull {
             Some(pull) if direction == Direction::Tension => pull,
             _ => &self.push,
@@ -138,7 +138,7 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    pub fn contacts_mut(&mut self, direction: Direction) -> &mut Contacts<'a> {
+    pub(crate) fn contacts_mut(&mut self, direction: Direction) -> &mut Contacts<'a> {
         match &mut self.pull {
             Some(pull) if direction == Direction::Tension => pull,
             _ => &mut self.push,
@@ -146,7 +146,7 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    pub fn kick<const N: usize>(&mut self, dt: f64) {
+    pub(crate) fn kick<const N: usize>(&mut self, dt: f64) {
         let n = self.fixed.layout.known::<N>();
         let (v, a) = (self.v.values_mut(n), self.a.values(n));
         for c in 0..n {
@@ -155,7 +155,7 @@ impl<'a> Engine<'a> {
     }
 
     #[inline(always)]
-    pub fn drift<const N: usize>(&mut self, dt: f64) {
+    pub(crate) fn drift<const N: usize>(&mut self, dt: f64) {
         let n = self.fixed.layout.known::<N>();
         let (x, v) = (self.x_m.values_mut(n), self.v.values(n));
         for c in 0..n {
@@ -165,14 +165,14 @@ impl<'a> Engine<'a> {
 
     /// Impulse of the wall over `dt` at the present forces.
     #[inline(always)]
-    pub fn on_wall(&mut self, at: StepPoint, dt: f64) {
+    pub(crate) fn on_wall(&mut self, at: StepPoint, dt: f64) {
         if self.fixed.chain.has_wall() {
             self.wall_impulse += dt * self.force_n(at, self.fixed.chain.bodies().len() - 1);
         }
     }
 
     /// An impulse between the bodies at interface `k`, and its moment about the step's end.
-    pub fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
+    pub(crate) fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
         let Fixed { chain, layout, per_kg, .. } = &self.fixed;
         let (behind, ahead) = (layout.of(k), layout.of(k + 1));
         self.v[behind] -= impulse * per_kg[behind];
@@ -186,7 +186,7 @@ impl<'a> Engine<'a> {
 
     /// The end of a step becomes the start of the next.
     #[inline(always)]
-    pub fn next(&mut self) {
+    pub(crate) fn next(&mut self) {
         std::mem::swap(&mut self.a, &mut self.a_start);
         self.push.next();
         if let Some(pull) = &mut self.pull {

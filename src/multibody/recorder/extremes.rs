@@ -21,41 +21,41 @@ pub(super) struct Extremes {
 }
 
 impl Extremes {
-    pub fn contact_began(&mut self, closing_m_per_s: f64) {
+    pub(crate) fn contact_began(&mut self, closing_m_per_s: f64) {
         self.approach_m_per_s = self.approach_m_per_s.or(Some(closing_m_per_s));
     }
 
-    pub fn released(&mut self, separation_m_per_s: f64) {
+    pub(crate) fn released(&mut self, separation_m_per_s: f64) {
         if separation_m_per_s > 0.0 {
             self.separation_m_per_s = self.separation_m_per_s.or(Some(separation_m_per_s));
         }
     }
 
-    pub fn turned(&mut self, largest_m: f64, time_s: f64) {
+    pub(crate) fn turned(&mut self, largest_m: f64, time_s: f64) {
         self.common_velocity_s = self.common_velocity_s.or(Some(time_s));
         self.deflected(largest_m, time_s);
     }
 
-    pub fn deflected(&mut self, deflection_m: f64, time_s: f64) {
+    pub(crate) fn deflected(&mut self, deflection_m: f64, time_s: f64) {
         if deflection_m > self.max_deflection_m {
             (self.max_deflection_m, self.max_deflection_time_s) = (deflection_m, time_s);
         }
     }
 
-    pub fn pressed(&mut self, force_n: f64) {
+    pub(crate) fn pressed(&mut self, force_n: f64) {
         self.peak_n = self.peak_n.max(force_n);
     }
 
-    pub fn pulled(&mut self, tension_n: f64) {
+    pub(crate) fn pulled(&mut self, tension_n: f64) {
         self.peak_tension_n = self.peak_tension_n.max(tension_n);
     }
 
-    pub fn extended(&mut self, extension_m: f64) {
+    pub(crate) fn extended(&mut self, extension_m: f64) {
         self.max_extension_m = self.max_extension_m.max(extension_m);
     }
 
     /// Fills in the summary of the interface.
-    pub fn close(self, history: &mut InterfaceHistory) {
+    pub(crate) fn close(self, history: &mut InterfaceHistory) {
         history.peak_force_n = self.peak_n;
         history.max_deflection_m = self.max_deflection_m;
         history.max_deflection_time_s = self.max_deflection_time_s;

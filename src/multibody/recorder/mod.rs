@@ -57,7 +57,7 @@ struct BodyEvents {
 }
 
 impl EventRecorder {
-    pub fn new(chain: &Chain, layout: &Layout) -> Self {
+    pub(crate) fn new(chain: &Chain, layout: &Layout) -> Self {
         let bodies = chain.bodies();
         let of = |value: &dyn Fn(usize) -> f64| Rows::of(layout, bodies.len(), value);
         let none = || of(&|_| 0.0);
@@ -87,42 +87,42 @@ impl EventRecorder {
     }
 
     /// Contact began at interface `k` with this closing speed.
-    pub fn contact_began(&mut self, k: usize, closing_m_per_s: f64) {
+    pub(crate) fn contact_began(&mut self, k: usize, closing_m_per_s: f64) {
         self.interfaces[k].contact_began(closing_m_per_s);
     }
 
     /// The force of interface `k` has fallen to zero while it opened with this speed.
-    pub fn released(&mut self, k: usize, separation_m_per_s: f64) {
+    pub(crate) fn released(&mut self, k: usize, separation_m_per_s: f64) {
         self.interfaces[k].released(separation_m_per_s);
     }
 
     /// The deflection of interface `k` was largest.
-    pub fn turned(&mut self, k: usize, largest_m: f64, time_s: f64) {
+    pub(crate) fn turned(&mut self, k: usize, largest_m: f64, time_s: f64) {
         self.interfaces[k].turned(largest_m, time_s);
     }
 
     /// Interface `k` has this deflection.
-    pub fn deflected(&mut self, k: usize, deflection_m: f64, time_s: f64) {
+    pub(crate) fn deflected(&mut self, k: usize, deflection_m: f64, time_s: f64) {
         self.interfaces[k].deflected(deflection_m, time_s);
     }
 
     /// Interface `k` presses with this force.
-    pub fn pressed(&mut self, k: usize, force_n: f64) {
+    pub(crate) fn pressed(&mut self, k: usize, force_n: f64) {
         self.interfaces[k].pressed(force_n);
     }
 
     /// Interface `k` pulls with this force.
-    pub fn pulled(&mut self, k: usize, tension_n: f64) {
+    pub(crate) fn pulled(&mut self, k: usize, tension_n: f64) {
         self.interfaces[k].pulled(tension_n);
     }
 
     /// Interface `k` is pulled apart by this length.
-    pub fn extended(&mut self, k: usize, extension_m: f64) {
+    pub(crate) fn extended(&mut self, k: usize, extension_m: f64) {
         self.interfaces[k].extended(extension_m);
     }
 
     /// Contact forces act on body `i` from `at_s` on.
-    pub fn touched(&mut self, i: usize, at_s: f64) {
+    pub(crate) fn touched(&mut self, i: usize, at_s: f64) {
         if self.bodies[i].phase == Phase::Free {
             let slot = self.layout.of(i);
             let begin = Moment { time_s: at_s, v_m_per_s: self.present.free_speed[slot] };
@@ -131,7 +131,7 @@ impl EventRecorder {
     }
 
     /// No contact force acts on body `i` any more.
-    pub fn left_alone(&mut self, i: usize, at: Moment) {
+    pub(crate) fn left_alone(&mut self, i: usize, at: Moment) {
         let body = &mut self.bodies[i];
         if let Some(span) = body.phase.closed_at(at) {
             body.spans.close(span);
@@ -151,7 +151,7 @@ impl EventRecorder {
 
     /// Whether the accelerations by contact forces are news to [`Self::look`].
     #[inline(always)]
-    pub fn is_news<const N: usize>(&self, a: &Rows) -> bool {
+    pub(crate) fn is_news<const N: usize>(&self, a: &Rows) -> bool {
         let n = self.layout.known::<N>();
         let (least, most) = (self.present.least.values(n), self.present.most.values(n));
         let mut outside: Row = [0.0; LANES];
@@ -165,7 +165,7 @@ impl EventRecorder {
     /// Looks at body `i` with this acceleration by contact forces: its span ends if the net force
     /// has ended or changed its sign since the last look, and one begins that nothing has
     /// announced.
-    pub fn look(&mut self, i: usize, now: Moment, a: f64) {
+    pub(crate) fn look(&mut self, i: usize, now: Moment, a: f64) {
         let slot = self.layout.of(i);
         let present = &self.present;
         if a >= present.least[slot] && a <= present.most[slot] {
@@ -192,7 +192,7 @@ impl EventRecorder {
 
     /// Ends a look at all bodies, with their accelerations by contact forces.
     #[inline(always)]
-    pub fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
+    pub(crate) fn looked<const N: usize>(&mut self, a: &Rows, at_s: f64) {
         let n = self.layout.known::<N>();
         self.present.seen_a.values_mut(n).copy_from_slice(a.values(n));
         self.present.seen_s = at_s;
@@ -200,7 +200,7 @@ impl EventRecorder {
 
     /// Takes the speeds of all bodies at an output.
     #[inline(always)]
-    pub fn output_bodies<const N: usize>(&mut self, v: &Rows, time_s: f64) {
+    pub(crate) fn output_bodies<const N: usize>(&mut self, v: &Rows, time_s: f64) {
         let n = self.layout.known::<N>();
         let vs = v.values(n);
         let Present { is_free, free_speed, .. } = &mut self.present;
@@ -214,7 +214,7 @@ impl EventRecorder {
     }
 
     /// Fills in the summary; `interval_s` lies between the outputs.
-    pub fn close(self, run: &mut Run, record: Record, interval_s: f64) {
+    pub(crate) fn close(self, run: &mut Run, record: Record, interval_s: f64) {
         for (history, extremes) in run.interfaces.iter_mut().zip(self.interfaces) {
             extremes.close(history);
         }

@@ -98,7 +98,7 @@ impl Look {
 
 impl Phase {
     /// The phase after a look, and the span that has ended by it.
-    pub fn after(self, look: &Look) -> (Self, Option<Span>) {
+    pub(crate) fn after(self, look: &Look) -> (Self, Option<Span>) {
         let ended = |begin, end| Some(Span { begin, end, is_cut: false });
         match (self, look.push()) {
             (Self::Free, None) => (Self::Free, None),
@@ -132,7 +132,7 @@ impl Phase {
     }
 
     /// The span up to `end`, where contacts have ended; `None` for a body that was free.
-    pub fn closed_at(self, end: Moment) -> Option<Span> {
+    pub(crate) fn closed_at(self, end: Moment) -> Option<Span> {
         match self {
             Self::Free => None,
             Self::Announced { begin }
@@ -142,7 +142,7 @@ impl Phase {
     }
 
     /// The span up to the end of the run.
-    pub fn at_end_of_run(self, run_end: Moment) -> Option<Span> {
+    pub(crate) fn at_end_of_run(self, run_end: Moment) -> Option<Span> {
         match self {
             // A force that was never looked at does not count as one that still acts.
             Self::Free | Self::Announced { .. } => self.closed_at(run_end),
@@ -153,7 +153,7 @@ impl Phase {
 
     /// Accelerations between these tell nothing new: those too small to count of a free body, all
     /// of one sign while a force of that sign acts. Everything is new in the other phases.
-    pub fn nothing_new_between(self, least_a: f64) -> (f64, f64) {
+    pub(crate) fn nothing_new_between(self, least_a: f64) -> (f64, f64) {
         match self {
             Self::Free => (-least_a, least_a),
             Self::Announced { .. } | Self::Fading { .. } => (f64::INFINITY, f64::NEG_INFINITY),
@@ -169,7 +169,7 @@ impl Span {
         (self.begin.v_m_per_s - self.end.v_m_per_s).abs()
     }
 
-    pub fn mean_deceleration(&self) -> f64 {
+    pub(crate) fn mean_deceleration(&self) -> f64 {
         (self.begin.v_m_per_s - self.end.v_m_per_s) / (self.end.time_s - self.begin.time_s)
     }
 }
@@ -184,7 +184,7 @@ pub(super) struct Spans {
 
 impl Spans {
     /// Keeps a span that may count: before it there may be many that do not.
-    pub fn close(&mut self, span: Span) {
+    pub(crate) fn close(&mut self, span: Span) {
         self.largest_change = self.largest_change.max(span.change());
         if self.counts(&span) && self.closed.len() < MOST_SPANS {
             self.closed.push(span);
@@ -197,7 +197,7 @@ impl Spans {
     }
 
     /// The first span that counts.
-    pub fn first(&self) -> Option<&Span> {
+    pub(crate) fn first(&self) -> Option<&Span> {
         self.closed.iter().find(|span| self.counts(span))
     }
 }

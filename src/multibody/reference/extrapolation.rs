@@ -28,7 +28,7 @@ impl Motion<'_> {
 
     /// The state after `h`, and its error over the tolerance, infinite if no two rows are
     /// within it.
-    pub fn step(&self, y: &[f64], h: f64, scale: &[f64]) -> (Vec<f64>, f64) {
+    pub(crate) fn step(&self, y: &[f64], h: f64, scale: &[f64]) -> (Vec<f64>, f64) {
         let first = self.rates(y);
         let mut table: Vec<Vec<f64>> = Vec::with_capacity(ROWS);
         let mut error = f64::INFINITY;

@@ -25,7 +25,7 @@ pub(super) struct Contact {
 
 impl Contact {
     /// Net force, below 0 where a coupling pulls.
-    pub fn force_n(&self) -> f64 {
+    pub(crate) fn force_n(&self) -> f64 {
         self.spring_n + self.damper_n
     }
 }
@@ -38,12 +38,12 @@ fn touches(law: &ForceLaw, d: f64, largest_m: f64, force_n: f64, closing: f64) -
 
 impl<'a> Motion<'a> {
     /// Without any memory yet.
-    pub fn new(chain: &'a Chain) -> Self {
+    pub(crate) fn new(chain: &'a Chain) -> Self {
         let none = vec![0.0; chain.interfaces().len()];
         Self { chain, pushed_m: none.clone(), pulled_m: none }
     }
 
-    pub fn contact(&self, y: &[f64], k: usize) -> Contact {
+    pub(crate) fn contact(&self, y: &[f64], k: usize) -> Contact {
         let n = self.chain.bodies().len();
         let interface = &self.chain.interfaces()[k];
         let of = |values: &[f64], i: usize| if i < n { values[i] } else { 0.0 };
@@ -67,7 +67,7 @@ impl<'a> Motion<'a> {
 
     /// Rates of positions, speeds, then of the impulse of wall and track, of damped and of
     /// resisted energy.
-    pub fn rates(&self, y: &[f64]) -> Vec<f64> {
+    pub(crate) fn rates(&self, y: &[f64]) -> Vec<f64> {
         let bodies = self.chain.bodies();
         let n = bodies.len();
         let mut rates = vec![0.0; 2 * n + 3];
@@ -94,7 +94,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Accelerations of the bodies by the forces between them.
-    pub fn by_contacts(&self, y: &[f64]) -> Vec<f64> {
+    pub(crate) fn by_contacts(&self, y: &[f64]) -> Vec<f64> {
         let mut behind_n = 0.0;
         let of = |(i, body): (usize, &Body)| {
             let mut ahead_n = 0.0;
@@ -111,7 +111,7 @@ impl<'a> Motion<'a> {
 
     /// The share of a step from `y` to `next` up to the first turn of a law with memory at its
     /// largest deflection, if one lies before the step's end.
-    pub fn turn(&self, y: &[f64], next: &[f64], slow: f64) -> Option<f64> {
+    pub(crate) fn turn(&self, y: &[f64], next: &[f64], slow: f64) -> Option<f64> {
         let turn = |law: &ForceLaw, before: f64, now: f64, reached: bool| {
             let turned = law.has_memory() && reached && before > slow && now < -slow;
             turned.then(|| before / (before - now))
@@ -134,13 +134,13 @@ impl<'a> Motion<'a> {
     }
 
     /// The memory follows to an accepted state.
-    pub fn remember(&mut self, k: usize, contact: &Contact) {
+    pub(crate) fn remember(&mut self, k: usize, contact: &Contact) {
         self.pushed_m[k] = self.pushed_m[k].max(contact.deflection_m);
         self.pulled_m[k] = self.pulled_m[k].max(contact.extension_m);
     }
 
     /// Stored and dissipated energy of interface `k`, in J.
-    pub fn energies_j(&self, k: usize, contact: &Contact) -> (f64, f64) {
+    pub(crate) fn energies_j(&self, k: usize, contact: &Contact) -> (f64, f64) {
         let interface = &self.chain.interfaces()[k];
         let (mut stored_j, mut dissipated_j) =
             interface.law.energies_j(contact.deflection_m, self.pushed_m[k]);

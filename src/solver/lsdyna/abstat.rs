@@ -39,12 +39,12 @@ const AREAS: [Labelled; 3] = [
 ];
 const MAX_MATERIALS: usize = 1_000;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     let text = line.trim_ascii_start();
     text.starts_with(b"time   airbag/cv #") || (text.starts_with(MATERIAL) && text.len() > 60)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("abstat", source, selection, Abstat::default)
 }
 

@@ -26,7 +26,7 @@ use crate::solver::states::States;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
-pub trait Body {
+pub(crate) trait Body {
     /// Whether a line can only stand below the header.
     fn is_signature(&self, line: &[u8]) -> bool;
 
@@ -59,7 +59,7 @@ pub trait Body {
 }
 
 /// Header, legend and states of a file, while it is read.
-pub struct Frame<'a> {
+pub(crate) struct Frame<'a> {
     format: &'static str,
     lines: Lines<Stream<'a>>,
     pub states: States<'a>,
@@ -80,7 +80,7 @@ const MAX_SKIPPED: usize = 3;
 ///
 /// The first whole state tells which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
-pub fn read<B: Body>(
+pub(crate) fn read<B: Body>(
     format: &'static str,
     source: &dyn Source,
     selection: &Selection,
@@ -124,7 +124,11 @@ fn read_from_state(
 }
 
 impl<'a> Frame<'a> {
-    pub fn new(format: &'static str, source: &'a dyn Source, selection: &'a Selection) -> Self {
+    pub(crate) fn new(
+        format: &'static str,
+        source: &'a dyn Source,
+        selection: &'a Selection,
+    ) -> Self {
         Self {
             format,
             lines: Lines::new(Stream::new(source)),
@@ -137,7 +141,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Takes one line; false at the end of the file.
-    pub fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
+    pub(crate) fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
         let Some(line) = self.lines.next_line()? else { return Ok(false) };
         let states = &mut self.states;
         let in_header = line.number <= 2 || self.fence.is_open();
@@ -185,7 +189,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Ends the file.
-    pub fn finish(mut self, body: &mut impl Body) -> SolverFile {
+    pub(crate) fn finish(mut self, body: &mut impl Body) -> SolverFile {
         let end = self.lines.place();
         if end.line < 2 {
             self.states.problems.add(

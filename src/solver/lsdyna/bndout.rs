@@ -22,10 +22,10 @@ fn heading(line: &[u8]) -> Option<String> {
         .then(|| first.to_ascii_lowercase())
 }
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(LAYOUT.state)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("bndout", source, selection, || NodeForces::new(&LAYOUT))
 }

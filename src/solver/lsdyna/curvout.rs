@@ -15,11 +15,11 @@ use crate::solver::{Selection, SolverFile};
 const STATE: &[u8] = b" curve data for time step";
 const COLUMN_LINE: &[u8] = b" curve id";
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("curvout", source, selection, Curvout::default)
 }
 

@@ -9,10 +9,10 @@ use crate::solver::{Selection, SolverFile};
 
 const ENTITIES: &[&str] = &["spring/damper number"];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     dotted::label(line).is_some_and(|label| ENTITIES.contains(&label))
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("deforc", source, selection, || Dotted::new(ENTITIES))
 }

@@ -16,7 +16,7 @@ const VALUE_WIDTH: usize = 14;
 const MAX_TABLES: usize = 100;
 
 /// Reader of either file; each label is a table of one column.
-pub struct Dotted {
+pub(crate) struct Dotted {
     /// Labels that begin an entity.
     entities: &'static [&'static str],
     tables: Vec<(String, TableId)>,
@@ -24,19 +24,19 @@ pub struct Dotted {
 }
 
 impl Dotted {
-    pub fn new(entities: &'static [&'static str]) -> Self {
+    pub(crate) fn new(entities: &'static [&'static str]) -> Self {
         Self { entities, tables: Vec::new(), entity: None }
     }
 }
 
 /// The label of a line, without its dots.
-pub fn label(line: &[u8]) -> Option<&str> {
+pub(crate) fn label(line: &[u8]) -> Option<&str> {
     split(line, LABEL).map(|(label, _)| label)
 }
 
 /// The label of a line, without its dots, and where the dots end. One dot ends a label only
 /// where labels usually end, at column `usual`.
-pub fn split(line: &[u8], usual: usize) -> Option<(&str, usize)> {
+pub(crate) fn split(line: &[u8], usual: usize) -> Option<(&str, usize)> {
     let end = match memchr::memmem::rfind(line, b"..") {
         Some(at) => at + 2,
         None => (line.get(usual - 1) == Some(&b'.')).then_some(usual)?,

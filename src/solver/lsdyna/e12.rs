@@ -59,7 +59,7 @@ const HIGH_BITS: u64 = 0x8080_8080_8080_8080;
 /// The nearest double of a field of exactly this form whose exponent is small enough to be
 /// exact; `None` for any other field, which [`super::line::real`] reads.
 #[inline(always)]
-pub fn parse(field: &[u8; 12]) -> Option<f64> {
+pub(crate) fn parse(field: &[u8; 12]) -> Option<f64> {
     let [s, d, p, f0, f1, f2, f3, f4, e, es, e1, e2] = *field;
     let mantissa = u64::from_le_bytes([s, d, p, f0, f1, f2, f3, f4]);
     // Two zeros, the digit before the point, the five behind it: eight digits.

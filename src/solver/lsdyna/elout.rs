@@ -41,20 +41,20 @@ const BEAM_STRESS_WIDTH: usize = 15;
 /// Combinations of quantity, point and surface in one file; more are damage.
 const MAX_TABLES: usize = 1_000;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
 }
 
 /// Whether a line can only stand in an `eloutdet`.
-pub fn signature_of_details(line: &[u8]) -> bool {
+pub(crate) fn signature_of_details(line: &[u8]) -> bool {
     line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("elout", source, selection, Elout::default)
 }
 
-pub fn read_details(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read_details(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("eloutdet", source, selection, Elout::default)
 }
 

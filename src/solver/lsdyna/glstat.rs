@@ -25,11 +25,11 @@ const NAMES: [(&str, &str); 3] = [
     ("time per zone cycle.(nanosec)", "nzc"),
 ];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("glstat", source, selection, Glstat::default)
 }
 

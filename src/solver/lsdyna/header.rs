@@ -9,7 +9,7 @@ use nom::sequence::{preceded, terminated};
 
 /// The text between `ls-dyna` and `date` on the second line, blanks folded:
 /// `smp d R13 R13.1.1_27_8731a0`, `smp.123264 s`, `(version 970)`.
-pub fn version(line: &[u8]) -> Option<String> {
+pub(crate) fn version(line: &[u8]) -> Option<String> {
     fn parse(line: &[u8]) -> IResult<&[u8], &[u8]> {
         let (line, _) = preceded(space0, tag_no_case("ls-dyna")).parse(line)?;
         let (line, version) = opt(terminated(take_until("date "), rest)).parse(line)?;
@@ -22,23 +22,23 @@ pub fn version(line: &[u8]) -> Option<String> {
 
 /// Follows the fence around a legend, line by line.
 #[derive(Debug, Default)]
-pub struct LegendFence {
+pub(crate) struct LegendFence {
     inside: bool,
 }
 
 impl LegendFence {
     /// Whether a legend was opened and not closed.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.inside
     }
 
     /// Ends the legend without its closing line.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.inside = false;
     }
 
     /// Whether this line belongs to a legend (its two fence lines included).
-    pub fn covers(&mut self, line: &[u8]) -> bool {
+    pub(crate) fn covers(&mut self, line: &[u8]) -> bool {
         let text = line.trim_ascii();
         // One l2a release wrote the opening line without its closing brace.
         if text.starts_with(b"{BEGIN LEGEND") {
@@ -55,7 +55,7 @@ impl LegendFence {
 
 /// One entry of a legend: id in columns 1-9, five blanks, title from column 15.
 /// The width of the title differs by file and writer, so it runs to the line's end.
-pub fn legend_entry(line: &[u8]) -> Option<(i64, Option<String>)> {
+pub(crate) fn legend_entry(line: &[u8]) -> Option<(i64, Option<String>)> {
     fn parse(line: &[u8]) -> IResult<&[u8], i64> {
         let (line, id) = preceded(space0, integer).parse(line)?;
         // A title that touches its id would make it ambiguous.

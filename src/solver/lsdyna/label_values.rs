@@ -6,7 +6,7 @@
 use super::line::{Line, is_whole_real};
 
 /// A component, its label, and the usual width of the number right behind the label.
-pub struct Labelled {
+pub(crate) struct Labelled {
     pub component: &'static str,
     pub label: &'static str,
     pub width: usize,
@@ -14,7 +14,7 @@ pub struct Labelled {
 
 /// First and last column of every component's number; `None` for labels that the line does
 /// not have. `None` for the row if something else than one number stands behind a label.
-pub fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize, usize)>>> {
+pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
     let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
@@ -57,13 +57,13 @@ pub fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize,
 
 /// Whether the text behind a label is one number: a whole one, or, whatever it holds, one
 /// that fills the usual width.
-pub fn is_number(text: &[u8], width: usize) -> bool {
+pub(crate) fn is_number(text: &[u8], width: usize) -> bool {
     text.len() == width || is_whole_real(text.trim_ascii())
 }
 
 /// First and last column of the `count` numbers between the bytes `from` and `to`: apart from
 /// each other, or in columns of the usual width that end at `to`.
-pub fn numbers(
+pub(crate) fn numbers(
     line: &Line<'_>,
     from: usize,
     to: usize,
@@ -92,12 +92,16 @@ pub fn numbers(
 }
 
 /// The components' names.
-pub fn components<const N: usize>(labels: &[Labelled; N]) -> [&'static str; N] {
+pub(crate) fn components<const N: usize>(labels: &[Labelled; N]) -> [&'static str; N] {
     labels.each_ref().map(|l| l.component)
 }
 
 /// Short for a table of labels.
-pub const fn labelled(component: &'static str, label: &'static str, width: usize) -> Labelled {
+pub(crate) const fn labelled(
+    component: &'static str,
+    label: &'static str,
+    width: usize,
+) -> Labelled {
     Labelled { component, label, width }
 }
 

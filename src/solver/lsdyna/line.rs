@@ -11,7 +11,7 @@ const MAX_LINE: usize = 4096;
 
 /// One line without its line end.
 #[derive(Debug)]
-pub struct Line<'a> {
+pub(crate) struct Line<'a> {
     pub text: &'a [u8],
     /// Counted from 1, as editors do.
     pub number: u64,
@@ -24,23 +24,23 @@ pub struct Line<'a> {
 }
 
 impl Line<'_> {
-    pub fn is_blank(&self) -> bool {
+    pub(crate) fn is_blank(&self) -> bool {
         self.text.iter().all(u8::is_ascii_whitespace)
     }
 
     /// Whether the line has bytes that no text has: the file was overwritten there.
-    pub fn is_binary(&self) -> bool {
+    pub(crate) fn is_binary(&self) -> bool {
         self.text.iter().any(|b| b.is_ascii_control() && !matches!(b, b'\t' | b'\r' | b'\x0c'))
     }
 
     /// Whether a line that holds no numbers is as the solver wrote it: without stars, which
     /// stand only where a number should be.
-    pub fn is_heading(&self) -> bool {
+    pub(crate) fn is_heading(&self) -> bool {
         memchr::memmem::find(self.text, b"**").is_none()
     }
 
     /// Columns `from..=to`, counted from 1, as far as the line reaches.
-    pub fn columns(&self, from: usize, to: usize) -> &[u8] {
+    pub(crate) fn columns(&self, from: usize, to: usize) -> &[u8] {
         let end = to.min(self.text.len());
         self.text.get(from - 1..end).unwrap_or(&[])
     }
@@ -53,7 +53,7 @@ impl From<&Line<'_>> for Place {
 }
 
 /// Reads lines ended by LF or CRLF with a bounded buffer.
-pub struct Lines<R> {
+pub(crate) struct Lines<R> {
     input: R,
     buffer: Vec<u8>,
     number: u64,
@@ -61,17 +61,17 @@ pub struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    pub fn new(input: R) -> Self {
+    pub(crate) fn new(input: R) -> Self {
         Self { input, buffer: Vec::with_capacity(256), number: 0, byte: 0 }
     }
 
     /// Number of the last line read, counted from 1, and the byte behind it.
-    pub fn place(&self) -> Place {
+    pub(crate) fn place(&self) -> Place {
         Place { line: self.number, byte: self.byte }
     }
 
     /// The next line, or `None` at the end of the file.
-    pub fn next_line(&mut self) -> io::Result<Option<Line<'_>>> {
+    pub(crate) fn next_line(&mut self) -> io::Result<Option<Line<'_>>> {
         self.buffer.clear();
         let start = self.byte;
         let (mut ended, mut overlong) = (false, false);
@@ -110,7 +110,7 @@ impl<R: BufRead> Lines<R> {
 
 impl Lines<Stream<'_>> {
     /// Goes on with the line that begins at `place`.
-    pub fn go_to(&mut self, place: Place) {
+    pub(crate) fn go_to(&mut self, place: Place) {
         self.number = place.line - 1;
         self.byte = place.byte;
         self.input.go_to(place.byte);
@@ -119,7 +119,7 @@ impl Lines<Stream<'_>> {
 
 /// What a numeric field holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Field {
+pub(crate) enum Field {
     /// The nearest double. A number too small for a double is the zero of its sign.
     Real(f64),
     /// Stars: the number did not fit its Fortran format.
@@ -134,7 +134,7 @@ pub enum Field {
 ///
 /// Accepts what solvers write beyond C's syntax: `1.5D+00`, and exponents whose `E`
 /// was dropped to make room (`-1.5000-345`, `0.00+00`).
-pub fn real(field: &[u8]) -> Field {
+pub(crate) fn real(field: &[u8]) -> Field {
     let text = field.trim_ascii();
     let plain = match text {
         [] => return Field::Bad,
@@ -194,7 +194,7 @@ fn fortran_real(text: &[u8]) -> Field {
 
 /// Whether a text is a real as solvers print it, with nothing cut from it: a point between
 /// digits and an exponent of two or three digits; or stars, or no finite number.
-pub fn is_whole_real(text: &[u8]) -> bool {
+pub(crate) fn is_whole_real(text: &[u8]) -> bool {
     let digits = |text: &[u8]| text.iter().take_while(|b| b.is_ascii_digit()).count();
     let rest = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
     let before = digits(rest);
@@ -214,12 +214,12 @@ pub fn is_whole_real(text: &[u8]) -> bool {
 }
 
 /// Reads one integer: the whole field, blanks around it allowed.
-pub fn integer(field: &[u8]) -> Option<i64> {
+pub(crate) fn integer(field: &[u8]) -> Option<i64> {
     std::str::from_utf8(field.trim_ascii()).ok()?.parse().ok()
 }
 
 /// A field's text for messages, with bytes that are no text replaced.
-pub fn shown(field: &[u8]) -> String {
+pub(crate) fn shown(field: &[u8]) -> String {
     String::from_utf8_lossy(field)
         .chars()
         .map(|c| if c.is_control() { '\u{fffd}' } else { c })

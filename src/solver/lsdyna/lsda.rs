@@ -10,7 +10,7 @@ use crate::solver::source::{Source, Window};
 
 /// Widths of the container's own fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Header {
+pub(crate) struct Header {
     length: u8,
     width: u8,
     big_endian: bool,
@@ -19,7 +19,7 @@ pub struct Header {
 impl Header {
     /// "header length, bytes in LENGTH, OFFSET, COMMAND and TYPEID fields, byte order
     /// (1 little, 0 big), float format (0 IEEE), unused".
-    pub fn parse(head: &[u8]) -> Option<Self> {
+    pub(crate) fn parse(head: &[u8]) -> Option<Self> {
         match *head.get(..7)? {
             [length @ 8..=64, width @ (4 | 8), 4 | 8, 1, 1, order @ (0 | 1), 0] => {
                 Some(Self { length, width, big_endian: order == 0 })
@@ -39,11 +39,11 @@ impl Header {
 
 /// Types of values: 1–4 signed of 1, 2, 4, 8 bytes, 5–8 unsigned, 9 float32, 10 float64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kind(pub u8);
+pub(crate) struct Kind(pub u8);
 
 impl Kind {
     /// Bytes of one value; `None` for a type that does not exist.
-    pub fn size(self) -> Option<usize> {
+    pub(crate) fn size(self) -> Option<usize> {
         match self.0 {
             1 | 5 => Some(1),
             2 | 6 => Some(2),
@@ -53,16 +53,16 @@ impl Kind {
         }
     }
 
-    pub fn is_text(self) -> bool {
+    pub(crate) fn is_text(self) -> bool {
         matches!(self.0, 1 | 5)
     }
 
-    pub fn is_real(self) -> bool {
+    pub(crate) fn is_real(self) -> bool {
         matches!(self.0, 9 | 10)
     }
 
     /// Appends the values of `bytes` to `out`, as doubles.
-    pub fn reals(self, header: Header, bytes: &[u8], out: &mut Vec<f64>) {
+    pub(crate) fn reals(self, header: Header, bytes: &[u8], out: &mut Vec<f64>) {
         let words = |size| bytes.chunks_exact(size).map(move |w| header.unsigned(w));
         match (self.0, header.big_endian) {
             // The two that matter, without going byte by byte.
@@ -78,7 +78,7 @@ impl Kind {
     }
 
     /// The values of `bytes`, as integers; empty for reals.
-    pub fn integers(self, header: Header, bytes: &[u8]) -> Vec<i64> {
+    pub(crate) fn integers(self, header: Header, bytes: &[u8]) -> Vec<i64> {
         let words = |size| bytes.chunks_exact(size).map(move |w| header.unsigned(w));
         match self.0 {
             1 => words(1).map(|w| i64::from(w as u8 as i8)).collect(),
@@ -92,14 +92,14 @@ impl Kind {
 
 /// Where the values of a data record are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Payload {
+pub(crate) struct Payload {
     pub kind: Kind,
     pub at: u64,
     pub bytes: u64,
 }
 
 /// What the walk meets.
-pub enum Event<'a> {
+pub(crate) enum Event<'a> {
     /// Change to a directory; the path may be relative.
     Directory(&'a str),
     Data {
@@ -133,13 +133,13 @@ const NEAR: usize = 64;
 const MANY: usize = 1 << 14;
 
 /// Reads the header; `None` if this is no container.
-pub fn header(source: &dyn Source) -> io::Result<Option<Header>> {
+pub(crate) fn header(source: &dyn Source) -> io::Result<Option<Header>> {
     let mut window = Window::new(source);
     Ok(window.get(0, 8, 0)?.and_then(Header::parse))
 }
 
 /// Walks all records of a container.
-pub fn walk(
+pub(crate) fn walk(
     source: &dyn Source,
     header: Header,
     mut each: impl FnMut(Event<'_>),
@@ -302,7 +302,7 @@ fn resume(source: &dyn Source, header: Header, from: u64, size: u64) -> io::Resu
 }
 
 /// Follows an absolute or relative path with `..`.
-pub fn change_directory(path: &mut Vec<String>, to: &str) {
+pub(crate) fn change_directory(path: &mut Vec<String>, to: &str) {
     if to.starts_with('/') {
         path.clear();
     }

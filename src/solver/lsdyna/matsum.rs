@@ -53,11 +53,11 @@ const LINES: [(&str, &[Labelled]); 4] = [
     ),
 ];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(PART)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("matsum", source, selection, Matsum::default)
 }
 

@@ -41,7 +41,7 @@ const TOTALS: [Labelled; 7] = [
 const MAX_BLOCKS: usize = 200;
 
 /// What the two files differ in.
-pub struct Layout {
+pub(crate) struct Layout {
     /// Begins a state; the time stands behind `t=`.
     pub state: &'static [u8],
     /// Name of the block that a heading begins, such as a group; `None` for other lines.
@@ -50,7 +50,7 @@ pub struct Layout {
 
 /// Reader of either file. Components of all blocks but the first of the file have the
 /// block's name in front, because the same node may stand in several.
-pub struct NodeForces {
+pub(crate) struct NodeForces {
     layout: &'static Layout,
     blocks: Vec<Block>,
     current: Option<usize>,
@@ -63,7 +63,7 @@ struct Block {
 }
 
 impl NodeForces {
-    pub fn new(layout: &'static Layout) -> Self {
+    pub(crate) fn new(layout: &'static Layout) -> Self {
         Self { layout, blocks: Vec::new(), current: None, body: None }
     }
 

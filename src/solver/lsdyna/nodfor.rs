@@ -20,10 +20,10 @@ fn heading(line: &[u8]) -> Option<String> {
     Some(format!("group{number}"))
 }
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(LAYOUT.state)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("nodfor", source, selection, || NodeForces::new(&LAYOUT))
 }

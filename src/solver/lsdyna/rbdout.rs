@@ -45,11 +45,11 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
     (b"row 3", &["dircos_31", "dircos_32", "dircos_33"], &[]),
 ];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("rbdout", source, selection, Rbdout::default)
 }
 

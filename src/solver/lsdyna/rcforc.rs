@@ -49,11 +49,11 @@ const COLUMNS: [Column; 9] = [
     column("tie_area", b"  tied area ", 163, false),
 ];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some())
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("rcforc", source, selection, Rcforc::default)
 }
 

@@ -16,11 +16,11 @@ const TIME: (usize, usize) = (1, 12);
 const WALL: (usize, usize) = (13, 20);
 const VALUE_WIDTH: usize = 15;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     is_column_line(line) || is_node_set_heading(line)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("rwforc", source, selection, Rwforc::default)
 }
 

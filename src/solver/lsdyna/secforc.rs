@@ -26,11 +26,11 @@ const LINES: [(&str, [&str; 4]); 3] = [
     ("sections' centroids", ["x_centroid", "y_centroid", "z_centroid", "area"]),
 ];
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.trim_ascii_start().starts_with(b"line#1  section#")
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("secforc", source, selection, Secforc::default)
 }
 

@@ -29,11 +29,11 @@ const SUMS: [(&[u8], &str); 6] = [
 ];
 const SUM_WIDTH: usize = 14;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("sleout", source, selection, Sleout::default)
 }
 

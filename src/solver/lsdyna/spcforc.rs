@@ -27,11 +27,11 @@ const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.trim_ascii() == HEADING || line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("spcforc", source, selection, Spcforc::default)
 }
 

@@ -27,11 +27,11 @@ const FAILURE_TIME_WIDTH: usize = 12;
 /// Kinds of connection, each with ids of its own.
 const MAX_KINDS: usize = 20;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(COLUMN_LINE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("swforc", source, selection, Swforc::default)
 }
 

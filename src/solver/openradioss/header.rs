@@ -11,22 +11,22 @@ const MAX_HEADER_RECORD: usize = 1 << 20;
 const MAX_COUNT: i32 = 50_000_000;
 
 /// Records: 4-byte length, that many bytes, the same length again, all big-endian.
-pub struct Records<'a> {
+pub(crate) struct Records<'a> {
     input: Stream<'a>,
 }
 
 impl<'a> Records<'a> {
-    pub fn new(input: Stream<'a>) -> Self {
+    pub(crate) fn new(input: Stream<'a>) -> Self {
         Self { input }
     }
 
     /// Position of the next byte.
-    pub fn position(&self) -> u64 {
+    pub(crate) fn position(&self) -> u64 {
         self.input.position()
     }
 
     /// Goes on at `position`; false if there is nothing.
-    pub fn go_to(&mut self, position: u64) -> io::Result<bool> {
+    pub(crate) fn go_to(&mut self, position: u64) -> io::Result<bool> {
         self.input.go_to(position);
         Ok(!self.input.fill_buf()?.is_empty())
     }
@@ -41,7 +41,7 @@ impl<'a> Records<'a> {
     }
 
     /// The next record, or `None` where there is none, or none that is whole.
-    pub fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
+    pub(crate) fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
         let Some(length) = self.length()? else { return Ok(None) };
         let mut bytes = Vec::new();
         self.input.by_ref().take(length as u64).read_to_end(&mut bytes)?;
@@ -57,16 +57,16 @@ impl<'a> Records<'a> {
 }
 
 /// Bytes of the length before and behind each record.
-pub const FRAME: u64 = 4;
+pub(crate) const FRAME: u64 = 4;
 
 /// A group of histories.
-pub struct Group {
+pub(crate) struct Group {
     pub kind: i32,
     pub objects: Vec<(i64, Option<String>)>,
     pub codes: Vec<i32>,
 }
 
-pub struct Header {
+pub(crate) struct Header {
     pub title: Option<String>,
     pub solver: Option<String>,
     pub globals: usize,
@@ -92,7 +92,7 @@ fn count(value: Option<&i32>) -> Option<usize> {
 
 impl Header {
     /// `None` if the header is cut or makes no sense.
-    pub fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
+    pub(crate) fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
         let Some(first) = records.header()? else { return Ok(None) };
         let Some(&code) = integers(first.get(..4).unwrap_or_default()).first() else {
             return Ok(None);
@@ -192,7 +192,7 @@ fn subset_values(records: &mut Records<'_>, subsets: usize) -> io::Result<Option
 }
 
 impl Group {
-    pub fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
+    pub(crate) fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
         // Id, type, one integer, number of objects, number of variables, title.
         let Some(head) = records.header()? else { return Ok(None) };
         let head = integers(head.get(..20).unwrap_or_default());
@@ -222,7 +222,7 @@ impl Group {
         }
     }
 
-    pub fn section(&self) -> Option<&'static str> {
+    pub(crate) fn section(&self) -> Option<&'static str> {
         match self.kind {
             NODES => Some("nodout"),
             INTERFACE => Some("rcforc"),
@@ -233,7 +233,7 @@ impl Group {
     }
 
     /// Position of a variable's code among an object's values.
-    pub fn position(&self, code: usize) -> Option<usize> {
+    pub(crate) fn position(&self, code: usize) -> Option<usize> {
         self.codes.iter().position(|&c| usize::try_from(c) == Ok(code))
     }
 }

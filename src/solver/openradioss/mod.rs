@@ -62,14 +62,17 @@ const FORCE_COMPONENTS: [&str; 3] = ["x_force", "y_force", "z_force"];
 const IMPULSES: usize = 6;
 
 /// Whether a file begins like a T01: a record of a code and a title of 80 characters.
-pub fn recognises(head: &[u8]) -> bool {
+pub(crate) fn recognises(head: &[u8]) -> bool {
     let Some(words) = head.get(..8) else { return false };
     let code = i32::from_be_bytes([words[4], words[5], words[6], words[7]]);
     words[..4] == 84i32.to_be_bytes() && (1_000..100_000).contains(&code)
 }
 
 /// Reads the selected histories of every section, or of the one selected.
-pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
+pub(crate) fn read(
+    parts: &[Box<dyn Source>],
+    selection: &Selection,
+) -> io::Result<Vec<SolverFile>> {
     let Some(source) = parts.first() else { return Ok(Vec::new()) };
     let input = Stream::new(&**source);
     let mut problems = Problems::default();

@@ -25,7 +25,7 @@ struct Channel {
 const STANDING: usize = 6;
 
 /// The states, of selected values only.
-pub struct States {
+pub(crate) struct States {
     time: Vec<f64>,
     globals: Vec<Channel>,
     /// Channels per group, in order of the offsets asked for.
@@ -65,7 +65,7 @@ fn channels_of(group: &Group, section: &str, selection: &Selection) -> Vec<Chann
 }
 
 impl States {
-    pub fn new(header: &Header, selection: &Selection) -> Self {
+    pub(crate) fn new(header: &Header, selection: &Selection) -> Self {
         let wants_section = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
         let channel = |offset| Channel { offset, values: Vec::new() };
         let globals = GLOBAL_COMPONENTS
@@ -107,7 +107,7 @@ impl States {
 
     /// Reads states until the end. One that is damaged is left out and said; as all have the
     /// same length, the next one is found behind it.
-    pub fn read(
+    pub(crate) fn read(
         &mut self,
         header: &Header,
         records: &mut Records<'_>,
@@ -279,7 +279,7 @@ impl States {
         });
     }
 
-    pub fn finish(
+    pub(crate) fn finish(
         mut self,
         header: &Header,
         selection: &Selection,

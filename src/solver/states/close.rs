@@ -5,7 +5,7 @@ use crate::solver::problem::ProblemCode;
 
 impl States<'_> {
     /// Ends the pending state; keeps it if it is whole.
-    pub fn close(&mut self, at_end: bool) {
+    pub(crate) fn close(&mut self, at_end: bool) {
         let Some(pending) = self.pending.take() else { return };
         match (pending.time, self.missing(&pending, at_end)) {
             (Some(time), None) if self.skip > 0 => {

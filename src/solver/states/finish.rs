@@ -8,7 +8,7 @@ use crate::history::{EntityId, History};
 use crate::solver::problem::{Problem, ProblemCode};
 
 /// What a file's body hands over at its end.
-pub struct Collected {
+pub(crate) struct Collected {
     pub entities: Vec<EntityId>,
     pub components: Vec<Arc<str>>,
     pub time: Arc<[f64]>,
@@ -18,7 +18,7 @@ pub struct Collected {
 
 impl States<'_> {
     /// Ends the file.
-    pub fn finish(mut self) -> Collected {
+    pub(crate) fn finish(mut self) -> Collected {
         self.close(true);
         self.resolve_restarts();
         let time: Arc<[f64]> = self.time.into();

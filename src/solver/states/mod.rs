@@ -16,13 +16,13 @@ use super::Selection;
 use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Place, ProblemCode, Problems};
 use crate::history::EntityId;
-pub use finish::Collected;
+pub(crate) use finish::Collected;
 use table::Table;
 
 /// Values that states may lack, beyond so many times the values they have: more are no
 /// erosion but damage, and would fill the memory.
-pub const ABSENT_CELLS: usize = 10_000_000;
-pub const ABSENT_PER_PRESENT: usize = 20;
+pub(crate) const ABSENT_CELLS: usize = 10_000_000;
+pub(crate) const ABSENT_PER_PRESENT: usize = 20;
 
 /// Labels kept of a file of labels; real ones have about thirty.
 const MAX_LABELS: usize = 500;
@@ -48,7 +48,7 @@ struct Pending {
 }
 
 /// The states of one file while it is read.
-pub struct States<'a> {
+pub(crate) struct States<'a> {
     selection: &'a Selection,
     tables: Vec<Table>,
     scalars: Vec<Scalar>,
@@ -73,10 +73,10 @@ pub struct States<'a> {
 
 /// Index of a table, from [`States::table`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TableId(usize);
+pub(crate) struct TableId(usize);
 
 impl<'a> States<'a> {
-    pub fn new(selection: &'a Selection) -> Self {
+    pub(crate) fn new(selection: &'a Selection) -> Self {
         Self {
             selection,
             tables: Vec::new(),
@@ -96,39 +96,39 @@ impl<'a> States<'a> {
     }
 
     /// Leaves out the first `count` whole states.
-    pub fn skip(&mut self, count: usize) {
+    pub(crate) fn skip(&mut self, count: usize) {
         self.skip = count;
     }
 
     /// Says that a state without rows is whole.
-    pub fn may_be_empty(&mut self) {
+    pub(crate) fn may_be_empty(&mut self) {
         self.may_be_empty = true;
     }
 
     /// Whether more states disagree with the first whole state than agree with it.
-    pub fn is_disputed(&self) -> bool {
+    pub(crate) fn is_disputed(&self) -> bool {
         self.disagreeing > self.time.len()
     }
 
     /// Number of states kept so far.
-    pub fn kept(&self) -> usize {
+    pub(crate) fn kept(&self) -> usize {
         self.time.len()
     }
 
     /// Whether the whole file is to be looked through for problems.
-    pub fn is_audit(&self) -> bool {
+    pub(crate) fn is_audit(&self) -> bool {
         self.selection.audit
     }
 
     /// Adds a table whose rows may come and go.
-    pub fn varying_table(&mut self, name: &'static str, components: &[&str]) -> TableId {
+    pub(crate) fn varying_table(&mut self, name: &'static str, components: &[&str]) -> TableId {
         let id = self.table(name, components);
         self.tables[id.0].varies = true;
         id
     }
 
     /// Adds a table. `name` is for messages; `components` name its columns.
-    pub fn table(&mut self, name: &'static str, components: &[&str]) -> TableId {
+    pub(crate) fn table(&mut self, name: &'static str, components: &[&str]) -> TableId {
         let components: Vec<Arc<str>> = components.iter().map(|&c| c.into()).collect();
         let wanted_columns = (0..components.len())
             .filter(|&i| self.selection.wants_component(&components[i]))
@@ -138,49 +138,49 @@ impl<'a> States<'a> {
     }
 
     /// Ends the pending state and starts one at `time` (`None`: not yet known).
-    pub fn begin(&mut self, time: Option<f64>, place: Place) {
+    pub(crate) fn begin(&mut self, time: Option<f64>, place: Place) {
         self.close(false);
         self.pending =
             Some(Pending { time, cycle: None, place, damaged: false, disagrees: false, labels: 0 });
     }
 
     /// Time of the pending state.
-    pub fn pending_time(&self) -> Option<f64> {
+    pub(crate) fn pending_time(&self) -> Option<f64> {
         self.pending.as_ref().and_then(|p| p.time)
     }
 
-    pub fn is_pending(&self) -> bool {
+    pub(crate) fn is_pending(&self) -> bool {
         self.pending.is_some()
     }
 
     /// Gives the pending state its cycle.
-    pub fn set_cycle(&mut self, cycle: i64) {
+    pub(crate) fn set_cycle(&mut self, cycle: i64) {
         if let Some(pending) = &mut self.pending {
             pending.cycle = Some(cycle);
         }
     }
 
     /// Gives the pending state its time.
-    pub fn set_time(&mut self, time: f64) {
+    pub(crate) fn set_time(&mut self, time: f64) {
         if let Some(pending) = &mut self.pending {
             pending.time = Some(time);
         }
     }
 
     /// Whether the pending state already has rows in this table.
-    pub fn has_rows(&self, table: TableId) -> bool {
+    pub(crate) fn has_rows(&self, table: TableId) -> bool {
         !self.tables[table.0].filled_rows.is_empty()
     }
 
     /// Whether the pending state already has this entity's row.
-    pub fn has_row(&self, table: TableId, entity: EntityId) -> bool {
+    pub(crate) fn has_row(&self, table: TableId, entity: EntityId) -> bool {
         let table = &self.tables[table.0];
         table.row_of.get(&entity).is_some_and(|&row| table.filled[row])
     }
 
     /// Notes a line that cannot be read; the state it belongs to is not whole.
     /// Behind the last row of a whole state, that is the next state.
-    pub fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
+    pub(crate) fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
         self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
         if let Some(pending) = &self.pending
             && self.sealed
@@ -194,7 +194,7 @@ impl<'a> States<'a> {
     }
 
     /// Makes the pending state count as not whole.
-    pub fn mark_damaged(&mut self) {
+    pub(crate) fn mark_damaged(&mut self) {
         if let Some(pending) = &mut self.pending {
             pending.damaged = true;
         }
@@ -202,7 +202,7 @@ impl<'a> States<'a> {
 
     /// Stores the selected fields of one row. `field(k)` gives the first and last
     /// column (from 1) of the table's k-th component, `None` if this row does not have it.
-    pub fn row(
+    pub(crate) fn row(
         &mut self,
         table: TableId,
         entity: EntityId,
@@ -255,7 +255,13 @@ impl<'a> States<'a> {
     }
 
     /// Stores one global quantity of the pending state.
-    pub fn scalar(&mut self, component: &str, bytes: &[u8], line: &Line<'_>, columns: [usize; 2]) {
+    pub(crate) fn scalar(
+        &mut self,
+        component: &str,
+        bytes: &[u8],
+        line: &Line<'_>,
+        columns: [usize; 2],
+    ) {
         let Some(pending) = &mut self.pending else { return };
         pending.labels += 1;
         // States repeat their labels in the same order: look where the last one was found.
@@ -298,24 +304,24 @@ impl<'a> States<'a> {
     }
 
     /// The entities of a table, in order of its rows.
-    pub fn rows(&self, table: TableId) -> &[EntityId] {
+    pub(crate) fn rows(&self, table: TableId) -> &[EntityId] {
         &self.tables[table.0].rows
     }
 
     /// Rows of a table of which values are kept.
-    pub fn wanted_rows(&self, table: TableId) -> Vec<usize> {
+    pub(crate) fn wanted_rows(&self, table: TableId) -> Vec<usize> {
         let of = &self.tables[table.0].channel_of;
         (0..of.len()).filter(|&row| of[row].is_some()).collect()
     }
 
     /// Columns of a table of which values are kept.
-    pub fn wanted_columns(&self, table: TableId) -> &[usize] {
+    pub(crate) fn wanted_columns(&self, table: TableId) -> &[usize] {
         &self.tables[table.0].wanted_columns
     }
 
     /// Adds whole states that were read at once. Per state: its cycle and time, the place of
     /// its beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
-    pub fn extend(&mut self, states: &[((i64, f64), Place)], values: &[Vec<f64>]) {
+    pub(crate) fn extend(&mut self, states: &[((i64, f64), Place)], values: &[Vec<f64>]) {
         for &((cycle, time), place) in states {
             self.time.push(time);
             self.cycles.push(Some(cycle));

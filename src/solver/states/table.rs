@@ -9,7 +9,7 @@ use crate::solver::Selection;
 use crate::solver::problem::{Problem, ProblemCode, Problems};
 
 /// Rows of the same components.
-pub struct Table {
+pub(crate) struct Table {
     pub name: &'static str,
     pub components: Vec<Arc<str>>,
     /// Indices into `components` that are selected.
@@ -35,7 +35,7 @@ pub struct Table {
 }
 
 /// One kept history: values of whole states, and the pending state's value.
-pub struct Channel {
+pub(crate) struct Channel {
     pub values: Vec<f64>,
     pub pending: f64,
     /// Kept states in which its row had this column.
@@ -44,7 +44,11 @@ pub struct Channel {
 }
 
 impl Table {
-    pub fn new(name: &'static str, components: Vec<Arc<str>>, wanted_columns: Vec<usize>) -> Self {
+    pub(crate) fn new(
+        name: &'static str,
+        components: Vec<Arc<str>>,
+        wanted_columns: Vec<usize>,
+    ) -> Self {
         Self {
             name,
             seen_columns: vec![false; components.len()],
@@ -63,14 +67,14 @@ impl Table {
         }
     }
 
-    pub fn find(&self, entity: EntityId) -> Option<usize> {
+    pub(crate) fn find(&self, entity: EntityId) -> Option<usize> {
         match self.rows.get(self.next_row) {
             Some(&expected) if expected == entity => Some(self.next_row),
             _ => self.row_of.get(&entity).copied(),
         }
     }
 
-    pub fn forget_rows(&mut self) {
+    pub(crate) fn forget_rows(&mut self) {
         self.rows.clear();
         self.row_of.clear();
         self.channel_of.clear();
@@ -82,7 +86,12 @@ impl Table {
     }
 
     /// Adds a row that the first `states` kept states do not have.
-    pub fn add_row(&mut self, entity: EntityId, selection: &Selection, states: usize) -> usize {
+    pub(crate) fn add_row(
+        &mut self,
+        entity: EntityId,
+        selection: &Selection,
+        states: usize,
+    ) -> usize {
         let row = self.rows.len();
         self.rows.push(entity);
         self.row_of.insert(entity, row);
@@ -116,7 +125,7 @@ impl Table {
 
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
-pub fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Problems {
+pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Problems {
     let states = collected.time.len();
     let mut problems = Problems::default();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();

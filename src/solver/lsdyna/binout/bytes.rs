@@ -4,7 +4,7 @@ use std::io;
 use std::ops::Range;
 
 use super::super::lsda::{Header, Kind};
-use super::records::Place;
+use super::records::DataRecord;
 use crate::solver::source::{Source, fill_at};
 
 /// Largest text of titles that is read, and ids of one list; real ones are far shorter. A
@@ -23,12 +23,12 @@ pub(super) struct Bytes<'a> {
 pub(super) type Scratch = Vec<u8>;
 
 impl<'a> Bytes<'a> {
-    pub fn new(parts: &'a [Box<dyn Source>], headers: &'a [Option<Header>]) -> Self {
+    pub(crate) fn new(parts: &'a [Box<dyn Source>], headers: &'a [Option<Header>]) -> Self {
         Self { parts, headers }
     }
 
     /// Kind and bytes of a record, up to the bound of texts.
-    fn whole(&self, place: Place) -> io::Result<(Kind, Header, Vec<u8>)> {
+    fn whole(&self, place: DataRecord) -> io::Result<(Kind, Header, Vec<u8>)> {
         let header = self.headers[place.part].ok_or(io::ErrorKind::InvalidData)?;
         let length = place.payload.bytes.min(MAX_METADATA) as usize;
         let mut bytes = vec![0; length];
@@ -38,11 +38,11 @@ impl<'a> Bytes<'a> {
     }
 
     /// The bytes of a text.
-    pub fn text(&self, place: Place) -> io::Result<Vec<u8>> {
+    pub(crate) fn text(&self, place: DataRecord) -> io::Result<Vec<u8>> {
         self.whole(place).map(|(_, _, bytes)| bytes)
     }
 
-    pub fn integers(&self, mut place: Place) -> io::Result<Vec<i64>> {
+    pub(crate) fn integers(&self, mut place: DataRecord) -> io::Result<Vec<i64>> {
         let size = place.payload.kind.size().unwrap_or(1) as u64;
         place.payload.bytes = place.payload.bytes.min(MAX_IDS * size);
         let (kind, header, bytes) = self.whole(place)?;
@@ -50,7 +50,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// The first value of a record.
-    pub fn first_real(&self, place: Place) -> io::Result<Option<f64>> {
+    pub(crate) fn first_real(&self, place: DataRecord) -> io::Result<Option<f64>> {
         let (kind, header, bytes) = self.whole(place)?;
         let mut values = Vec::new();
         kind.reals(header, &bytes, &mut values);
@@ -58,9 +58,9 @@ impl<'a> Bytes<'a> {
     }
 
     /// Appends some values of a record to `out`.
-    pub fn reals(
+    pub(crate) fn reals(
         &self,
-        place: Place,
+        place: DataRecord,
         range: Range<usize>,
         scratch: &mut Scratch,
         out: &mut Vec<f64>,

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::history::EntityId;
 
 /// Where the kept entities' values are in a state's record.
-pub struct Pick {
+pub(crate) struct Pick {
     /// `None` for an entity that the state lacks.
     pub positions: Vec<Option<usize>>,
     /// From the first to behind the last of them.
@@ -16,7 +16,7 @@ pub struct Pick {
 }
 
 impl Pick {
-    pub fn new(positions: Vec<Option<usize>>) -> Self {
+    pub(crate) fn new(positions: Vec<Option<usize>>) -> Self {
         let known = || positions.iter().flatten().copied();
         let span = match known().min().zip(known().max()) {
             Some((first, last)) => first..last + 1,
@@ -28,13 +28,19 @@ impl Pick {
 
     /// The values of a record that hold those of the kept entities at one of the points that
     /// each entity has. The span must not be empty.
-    pub fn range(&self, per_entity: usize, point: usize) -> Range<usize> {
+    pub(crate) fn range(&self, per_entity: usize, point: usize) -> Range<usize> {
         self.span.start * per_entity..(self.span.end - 1) * per_entity + point + 1
     }
 
     /// Takes a state's values from the record's `row`, which begins with the span's first
     /// entity; returns how many of them are not finite.
-    pub fn fill(&self, values: &mut [f64], row: &[f64], per_entity: usize, point: usize) -> usize {
+    pub(crate) fn fill(
+        &self,
+        values: &mut [f64],
+        row: &[f64],
+        per_entity: usize,
+        point: usize,
+    ) -> usize {
         if self.is_run && per_entity == 1 && row.len() == values.len() {
             values.copy_from_slice(row);
             return row.iter().filter(|v| !v.is_finite()).count();
@@ -51,7 +57,7 @@ impl Pick {
 
 /// Rows of states turned into columns, several rows at a time: a value alone would cost a
 /// cache line.
-pub struct Columns {
+pub(crate) struct Columns {
     columns: Vec<Vec<f64>>,
     rows: Vec<f64>,
     pending: usize,
@@ -61,7 +67,7 @@ pub struct Columns {
 const ROWS: usize = 16;
 
 impl Columns {
-    pub fn new(columns: usize, states: usize) -> Self {
+    pub(crate) fn new(columns: usize, states: usize) -> Self {
         Self {
             columns: (0..columns).map(|_| Vec::with_capacity(states)).collect(),
             rows: vec![f64::NAN; columns * ROWS],
@@ -70,7 +76,7 @@ impl Columns {
     }
 
     /// The next state's row, to be filled.
-    pub fn row(&mut self) -> &mut [f64] {
+    pub(crate) fn row(&mut self) -> &mut [f64] {
         if self.pending == ROWS {
             self.turn();
         }
@@ -87,14 +93,14 @@ impl Columns {
         self.pending = 0;
     }
 
-    pub fn finish(mut self) -> Vec<Vec<f64>> {
+    pub(crate) fn finish(mut self) -> Vec<Vec<f64>> {
         self.turn();
         self.columns
     }
 }
 
 /// For every kept entity its position among a state's ids.
-pub fn positions_of(kept: &[(usize, Option<EntityId>)], ids: &[i64]) -> Vec<Option<usize>> {
+pub(crate) fn positions_of(kept: &[(usize, Option<EntityId>)], ids: &[i64]) -> Vec<Option<usize>> {
     let of: HashMap<i64, usize> = ids.iter().enumerate().map(|(k, &id)| (id, k)).collect();
     kept.iter().map(|(_, entity)| entity.and_then(|e| of.get(&e.id).copied())).collect()
 }

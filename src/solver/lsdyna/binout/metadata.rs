@@ -8,7 +8,7 @@ use super::records::Section;
 use crate::history::{EntityId, Side};
 
 /// What a section says of itself.
-pub struct Metadata {
+pub(crate) struct Metadata {
     pub title: Option<String>,
     pub version: Option<String>,
     pub revision: Option<String>,
@@ -20,7 +20,7 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    pub fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<Self> {
+    pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<Self> {
         let text = |key: &str| -> io::Result<Option<Vec<u8>>> {
             let place = section.metadata.get(key).filter(|p| p.payload.kind.is_text());
             place.map(|&place| bytes.text(place)).transpose()
@@ -42,7 +42,7 @@ impl Metadata {
     }
 
     /// The entities that the values of a component belong to, by their number.
-    pub fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
+    pub(crate) fn entities(&self, component: &str, width: usize) -> Option<Vec<EntityId>> {
         let fits = |ids: &Option<Vec<i64>>| ids.clone().filter(|ids| ids.len() == width);
         let ids = fits(&self.ids).or_else(|| match component {
             c if c.ends_with("_force") => fits(&self.force_ids),

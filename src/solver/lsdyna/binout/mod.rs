@@ -35,7 +35,7 @@ use records::Tree;
 use section::SectionReader;
 
 /// Whether a file begins with the header of an LSDA container.
-pub fn recognises(head: &[u8]) -> bool {
+pub(crate) fn recognises(head: &[u8]) -> bool {
     Header::parse(head).is_some()
 }
 
@@ -44,7 +44,10 @@ pub fn recognises(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// Those of reading the sources.
-pub fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
+pub(crate) fn read(
+    parts: &[Box<dyn Source>],
+    selection: &Selection,
+) -> io::Result<Vec<SolverFile>> {
     let mut tree = Tree::default();
     for (number, part) in parts.iter().enumerate() {
         tree.walk(number, &**part)?;

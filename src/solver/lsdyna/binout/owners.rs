@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::bytes::Bytes;
 use super::metadata::Metadata;
-use super::records::{Component, Place, Section};
+use super::records::{Component, DataRecord, Section};
 use super::states::States;
 use crate::history::EntityId;
 use crate::solver::problem::{Problem, ProblemCode};
@@ -40,7 +40,7 @@ pub(super) enum Found {
 }
 
 impl Owners {
-    pub fn of(
+    pub(crate) fn of(
         section: &Section,
         component: &Component,
         metadata: &Metadata,
@@ -49,7 +49,7 @@ impl Owners {
     ) -> io::Result<Found> {
         let first = states.whole.iter().find_map(|state| component.records.get(state));
         let any = first.or_else(|| component.records.values().next());
-        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(Place::width) else {
+        let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(DataRecord::width) else {
             return Ok(Found::Nothing);
         };
         if width == 0 || is_total(&component.name) {
@@ -80,7 +80,7 @@ impl Owners {
         Ok(Found::Unfit(Problem::new(ProblemCode::UnreadRows, message)))
     }
 
-    pub fn entities(&self) -> &[EntityId] {
+    pub(crate) fn entities(&self) -> &[EntityId] {
         match self {
             Self::Global => &[],
             Self::Fixed(ids) | Self::OfState(ids) => ids,
@@ -88,7 +88,7 @@ impl Owners {
     }
 
     /// The same with a list that other components have as well.
-    pub fn sharing(self, list: &EntityList) -> Self {
+    pub(crate) fn sharing(self, list: &EntityList) -> Self {
         match self {
             Self::Global => self,
             Self::Fixed(_) => Self::Fixed(list.entities.clone()),
@@ -131,7 +131,7 @@ pub(super) struct EntityList {
 
 impl EntityList {
     /// The list, and which entities are there more often than they can be.
-    pub fn of(section: &Section, owners: &Owners) -> (Self, Option<Problem>) {
+    pub(crate) fn of(section: &Section, owners: &Owners) -> (Self, Option<Problem>) {
         let entities: Arc<[EntityId]> = owners.entities().into();
         let ordinals = ordinals(&entities);
         let rows = || ordinals.iter().zip(&*entities).filter(|(_, id)| !section.is_lost(id.id));

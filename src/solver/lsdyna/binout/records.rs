@@ -26,7 +26,7 @@ const MAX_RECORDS: usize = 20_000_000;
 
 /// A data record of one of the containers.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct DataRecord {
     pub part: usize,
     pub payload: Payload,
 }
@@ -49,9 +49,9 @@ pub(super) struct Tree {
 #[derive(Default)]
 pub(super) struct Section {
     pub name: String,
-    pub metadata: HashMap<String, Place>,
+    pub metadata: HashMap<String, DataRecord>,
     /// Lists of ids and sides, each for the states written behind it.
-    pub lists: Vec<(&'static str, Place)>,
+    pub lists: Vec<(&'static str, DataRecord)>,
     /// Directory numbers of the states, in order of appearance.
     pub states: Vec<u64>,
     pub state_index: HashMap<u64, usize>,
@@ -71,12 +71,12 @@ pub(super) struct Section {
 pub(super) struct Component {
     pub name: Arc<str>,
     /// By state.
-    pub records: HashMap<usize, Place>,
+    pub records: HashMap<usize, DataRecord>,
 }
 
 impl Tree {
     /// Notes all records of one container.
-    pub fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
+    pub(crate) fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
         let header = lsda::header(source)?;
         self.headers.push(header);
         let Some(header) = header else {
@@ -98,7 +98,7 @@ impl Tree {
                     self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
                 }
                 if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
-                    self.sections[section].note(name, state, Place { part, payload });
+                    self.sections[section].note(name, state, DataRecord { part, payload });
                 }
             }
             Event::Damage { at, resumed, message } => {
@@ -177,7 +177,7 @@ impl Section {
         })
     }
 
-    fn note(&mut self, name: &str, state: Option<usize>, place: Place) {
+    fn note(&mut self, name: &str, state: Option<usize>, place: DataRecord) {
         let Some(state) = state else {
             if let Some(list) = LISTS.into_iter().find(|list| *list == name) {
                 self.lists.push((list, place));
@@ -207,30 +207,30 @@ impl Section {
 
     /// Whether an id can only be one that was overwritten with zeros: LS-DYNA counts from 1,
     /// but prints a part 0 for lumped masses.
-    pub fn is_lost(&self, id: i64) -> bool {
+    pub(crate) fn is_lost(&self, id: i64) -> bool {
         id == 0 && self.name != "matsum"
     }
 
-    pub fn component(&self, name: &str) -> Option<&Component> {
+    pub(crate) fn component(&self, name: &str) -> Option<&Component> {
         self.component_index.get(name).map(|&index| &self.components[index])
     }
 }
 
-impl Place {
+impl DataRecord {
     /// Order of writing.
-    pub fn order(&self) -> (usize, u64) {
+    pub(crate) fn order(&self) -> (usize, u64) {
         (self.part, self.payload.at)
     }
 
     /// Number of values.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         let size = self.payload.kind.size().unwrap_or(1) as u64;
         usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)
     }
 }
 
 impl Component {
-    pub fn is_real(&self) -> bool {
+    pub(crate) fn is_real(&self) -> bool {
         self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
     }
 }

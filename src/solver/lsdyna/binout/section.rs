@@ -39,7 +39,7 @@ struct Contents<'a> {
 }
 
 impl<'a> SectionReader<'a> {
-    pub fn open(
+    pub(crate) fn open(
         section: &'a Section,
         bytes: Bytes<'a>,
         selection: &'a Selection,
@@ -49,7 +49,7 @@ impl<'a> SectionReader<'a> {
         Ok(Self { section, bytes, selection, metadata, states, problems })
     }
 
-    pub fn read(mut self) -> io::Result<(SolverFile, Problems)> {
+    pub(crate) fn read(mut self) -> io::Result<(SolverFile, Problems)> {
         self.problems.extend(self.beyond_bound());
         self.problems.extend(self.states.absent(self.section));
         self.problems.extend(self.lost_ids());

@@ -5,8 +5,8 @@ use std::io;
 use std::sync::Arc;
 
 use super::bytes::Bytes;
-use super::records::{Component, LISTS, Place, Section};
-use crate::solver::problem::{Place as FilePlace, Problem, ProblemCode, Problems};
+use super::records::{Component, DataRecord, LISTS, Section};
+use crate::solver::problem::{Place, Problem, ProblemCode, Problems};
 use crate::solver::restart;
 
 /// The whole states of a section.
@@ -24,7 +24,7 @@ pub(super) type Ids = Arc<[i64]>;
 impl States {
     /// A state is whole if it has a time and no damage; the last one must also have what the
     /// one before has. Of states that a restart wrote again the last ones are kept.
-    pub fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
+    pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
         let mut problems = Problems::default();
         problems.extend(order_of(section));
         let (mut timed, left_out) = Timed::of(section, bytes)?;
@@ -47,7 +47,7 @@ impl States {
     }
 
     /// Entities that some states lack.
-    pub fn absent(&self, section: &Section) -> Option<Problem> {
+    pub(crate) fn absent(&self, section: &Section) -> Option<Problem> {
         let ids = self.ids.as_ref()?;
         let mut states_with: HashMap<i64, usize> = HashMap::new();
         for id in ids.iter().flat_map(|ids| ids.iter()) {
@@ -157,7 +157,7 @@ impl Timed {
             "{}: the ids change; {lost} states that were written before are left out",
             section.name
         );
-        let place = Some(FilePlace::at_byte(change.1));
+        let place = Some(Place::at_byte(change.1));
         (lost > 0).then(|| Problem::at(ProblemCode::UnexpectedEntity, place, message))
     }
 }
@@ -201,7 +201,7 @@ fn ids_by_order(
     whole: &[usize],
     bytes: Bytes<'_>,
 ) -> io::Result<Option<Vec<Ids>>> {
-    let places: Vec<Place> =
+    let places: Vec<DataRecord> =
         section.lists.iter().filter(|(name, _)| *name == "ids").map(|(_, p)| *p).collect();
     let lists: Vec<Ids> = places
         .iter()
@@ -213,7 +213,7 @@ fn ids_by_order(
     }
     let of = |state: &usize| {
         let time = section.component("time").and_then(|t| t.records.get(state));
-        let before = |p: &Place| time.is_some_and(|t| p.order() < t.order());
+        let before = |p: &DataRecord| time.is_some_and(|t| p.order() < t.order());
         let last = places.iter().rposition(before).unwrap_or(0);
         lists[last].clone()
     };
@@ -237,9 +237,9 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
 }
 
 /// Where a state is in its file.
-fn place_of(section: &Section, state: usize) -> Option<FilePlace> {
+fn place_of(section: &Section, state: usize) -> Option<Place> {
     let records = || section.components.iter().filter_map(|c| c.records.get(&state));
     let time = section.component("time").and_then(|t| t.records.get(&state));
     let place = time.or_else(|| records().min_by_key(|p| p.order()))?;
-    Some(FilePlace::at_byte(place.payload.at))
+    Some(Place::at_byte(place.payload.at))
 }

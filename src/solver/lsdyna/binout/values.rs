@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::bytes::{Bytes, Scratch};
 use super::columns::{Columns, Pick, positions_of};
 use super::owners::{MAX_ROWS, Owners, ordinals, row_name};
-use super::records::{Component, Place, Section};
+use super::records::{Component, DataRecord, Section};
 use super::states::{Ids, States};
 use crate::history::{EntityId, History};
 use crate::solver::Selection;
@@ -36,7 +36,7 @@ struct Lacks {
 
 impl Series<'_> {
     /// The histories of the selected entities; of all of them for an audit.
-    pub fn histories(
+    pub(crate) fn histories(
         &self,
         states: &States,
         selection: &Selection,
@@ -76,7 +76,7 @@ impl Series<'_> {
     fn too_sparse(&self, kept: usize, states: &States) -> Option<Problem> {
         let states = &states.whole;
         let records = states.iter().filter_map(|state| self.component.records.get(state));
-        let present: usize = records.map(Place::width).sum();
+        let present: usize = records.map(DataRecord::width).sum();
         let cells = kept.saturating_mul(states.len());
         let most = ABSENT_CELLS.saturating_add(present.saturating_mul(ABSENT_PER_PRESENT));
         (cells > most).then(|| {

@@ -37,7 +37,7 @@ impl Format {
 }
 
 impl<'a> Card<'a> {
-    pub fn new(line: &Line<'a>, format: Format) -> Self {
+    pub(crate) fn new(line: &Line<'a>, format: Format) -> Self {
         fn fixed(text: &[u8], width: usize) -> IResult<&[u8], Vec<&[u8]>> {
             many0(take_while_m_n(1, width, |_: u8| true)).parse(text)
         }
@@ -57,22 +57,22 @@ impl<'a> Card<'a> {
         Self { text, place: line.into(), format, fields: fields.collect() }
     }
 
-    pub fn is_blank(&self) -> bool {
+    pub(crate) fn is_blank(&self) -> bool {
         self.text.trim_ascii().is_empty()
     }
 
     /// Field `k`, counted from 0; blank beyond the end of the card.
-    pub fn field(&self, k: usize) -> Field<'a> {
+    pub(crate) fn field(&self, k: usize) -> Field<'a> {
         self.fields.get(k).copied().unwrap_or_default()
     }
 
-    pub fn fields(&self) -> impl Iterator<Item = Field<'a>> + use<'a, '_> {
+    pub(crate) fn fields(&self) -> impl Iterator<Item = Field<'a>> + use<'a, '_> {
         self.fields.iter().copied()
     }
 
     /// An id and the text behind it. The text may hold commas, so the card counts as
     /// free only when its first columns are no number by themselves.
-    pub fn id_and_text(&self) -> (Field<'a>, Option<String>) {
+    pub(crate) fn id_and_text(&self) -> (Field<'a>, Option<String>) {
         let width = self.format.width().min(self.text.len());
         let (id, title) = self.text.split_at(width);
         let free_id = self.field(0);

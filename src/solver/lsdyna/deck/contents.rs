@@ -37,7 +37,7 @@ pub struct Deck {
 
 /// Where a card or keyword is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct At {
+pub struct DeckPlace {
     /// Counted from 1.
     pub line: u64,
     /// Index into [`Deck::includes`]; `None` for the deck itself.
@@ -50,7 +50,7 @@ pub struct StatedUnits {
     /// `kg / mm / ms / kN / GPa`, or the fields of `*CONTROL_UNITS`.
     pub text: String,
     /// Where they are stated.
-    pub at: At,
+    pub at: DeckPlace,
     /// When length, mass and time are all recognised and nothing contradicts them.
     pub system: Option<UnitSystem>,
 }
@@ -62,7 +62,7 @@ pub struct InitialVelocity {
     /// In capitals and without its star.
     pub keyword: String,
     /// Where it is given.
-    pub at: At,
+    pub at: DeckPlace,
     /// x, y, z. `None` when it is not known; a problem says why.
     pub velocity: Option<[f64; 3]>,
     /// Whether a rotation is given or not known as well.
@@ -100,7 +100,7 @@ pub struct Output {
     /// 1 ASCII, 2 binout, 3 both; 0 or `None` leaves it to the solver.
     pub binary: Option<i64>,
     /// Where its keyword is.
-    pub at: At,
+    pub at: DeckPlace,
 }
 
 /// An id and the title that goes with it.
@@ -111,7 +111,7 @@ pub struct Named {
     /// `None` where the deck gives none.
     pub title: Option<String>,
     /// Where its card is.
-    pub at: At,
+    pub at: DeckPlace,
 }
 
 /// A contact or a rigid wall.
@@ -125,7 +125,7 @@ pub struct Interface {
     /// In capitals and without its star.
     pub keyword: String,
     /// Where its keyword is.
-    pub at: At,
+    pub at: DeckPlace,
 }
 
 /// One included file.
@@ -134,7 +134,7 @@ pub struct Include {
     /// As the deck writes it.
     pub name: String,
     /// Where it is included.
-    pub at: At,
+    pub at: DeckPlace,
     /// Whether the file is there.
     pub found: bool,
 }
@@ -145,7 +145,7 @@ pub struct ImpactSpeed {
     /// Above zero, in the deck's units.
     pub speed: f64,
     /// Where the first velocity is given.
-    pub at: At,
+    pub at: DeckPlace,
 }
 
 impl Deck {

@@ -2,7 +2,7 @@
 //! files that are open, and its problems.
 
 use super::card::{Card, Field};
-use super::contents::{At, Deck};
+use super::contents::{Deck, DeckPlace};
 use super::keyword::{Format, Keyword};
 use super::kind::Kind;
 use super::parameters::{NoNumber, Parameters};
@@ -46,20 +46,28 @@ pub(super) struct Context {
 }
 
 impl Context {
-    pub fn real(&mut self, card: &Card<'_>, k: usize) -> Result<Option<f64>, Missing> {
+    pub(crate) fn real(&mut self, card: &Card<'_>, k: usize) -> Result<Option<f64>, Missing> {
         self.real_of(card.field(k), card.place)
     }
 
-    pub fn integer(&mut self, card: &Card<'_>, k: usize) -> Result<Option<i64>, Missing> {
+    pub(crate) fn integer(&mut self, card: &Card<'_>, k: usize) -> Result<Option<i64>, Missing> {
         self.integer_of(card.field(k), card.place)
     }
 
-    pub fn real_of(&mut self, field: Field<'_>, place: Place) -> Result<Option<f64>, Missing> {
+    pub(crate) fn real_of(
+        &mut self,
+        field: Field<'_>,
+        place: Place,
+    ) -> Result<Option<f64>, Missing> {
         let number = self.parameters.real(field);
         self.named(number, field, place)
     }
 
-    pub fn integer_of(&mut self, field: Field<'_>, place: Place) -> Result<Option<i64>, Missing> {
+    pub(crate) fn integer_of(
+        &mut self,
+        field: Field<'_>,
+        place: Place,
+    ) -> Result<Option<i64>, Missing> {
         let number = self.parameters.integer(field);
         self.named(number, field, place)
     }
@@ -78,11 +86,11 @@ impl Context {
         })
     }
 
-    pub fn required_id(&mut self, card: &Card<'_>, k: usize) -> Option<i64> {
+    pub(crate) fn required_id(&mut self, card: &Card<'_>, k: usize) -> Option<i64> {
         self.required_id_of(card.field(k), card.place)
     }
 
-    pub fn required_id_of(&mut self, field: Field<'_>, place: Place) -> Option<i64> {
+    pub(crate) fn required_id_of(&mut self, field: Field<'_>, place: Place) -> Option<i64> {
         match self.integer_of(field, place) {
             Ok(Some(id)) => Some(id),
             Ok(None) => {
@@ -94,11 +102,11 @@ impl Context {
         }
     }
 
-    pub fn at(&self, place: Place) -> At {
-        At { line: place.line, include: self.reading.last().map(|&(index, _)| index) }
+    pub(crate) fn at(&self, place: Place) -> DeckPlace {
+        DeckPlace { line: place.line, include: self.reading.last().map(|&(index, _)| index) }
     }
 
-    pub fn problem(
+    pub(crate) fn problem(
         &mut self,
         code: ProblemCode,
         place: Place,
@@ -115,14 +123,14 @@ impl Context {
     }
 
     /// Notes that a list had to leave out entries.
-    pub fn note_full(&mut self, what: &'static str) {
+    pub(crate) fn note_full(&mut self, what: &'static str) {
         if !self.full.contains(&what) {
             self.full.push(what);
         }
     }
 
     /// Adds an entry to one of the deck's lists, which `list` picks, up to its bound.
-    pub fn keep<T>(
+    pub(crate) fn keep<T>(
         &mut self,
         list: impl FnOnce(&mut Deck) -> &mut Vec<T>,
         entry: T,
@@ -137,7 +145,7 @@ impl Context {
     }
 
     /// The deck with its parameters and problems.
-    pub fn finish(mut self) -> Deck {
+    pub(crate) fn finish(mut self) -> Deck {
         self.deck.parameters = self.parameters.list;
         self.deck.problems = self.problems.into_list();
         // Added last, so that a deck full of damage cannot push them out.

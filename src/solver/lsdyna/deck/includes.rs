@@ -36,13 +36,13 @@ pub(super) struct Included {
 }
 
 impl<'a, 'o> Includes<'a, 'o> {
-    pub fn new(open: &'a mut Open<'o>) -> Self {
+    pub(crate) fn new(open: &'a mut Open<'o>) -> Self {
         Self { open, folders: Vec::new() }
     }
 
     /// One name per card; " +" at the end of a card says that the name goes on below. `Some`
     /// for a file that is to be read before the next card.
-    pub fn file_name(
+    pub(crate) fn file_name(
         &mut self,
         context: &mut Context,
         block: &mut Block,

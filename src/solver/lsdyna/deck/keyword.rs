@@ -30,7 +30,7 @@ const FAMILIES: [&str; 14] = [
 ];
 
 /// Whether only a keyword deck has such a line.
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     Keyword::parse(line).is_some_and(|k| {
         let bare = k.arguments.is_empty() || k.name == "KEYWORD";
         bare && (ALONE.contains(&&*k.name) || FAMILIES.iter().any(|f| k.name.starts_with(f)))
@@ -55,7 +55,7 @@ pub(super) struct Keyword {
 }
 
 impl Keyword {
-    pub fn parse(line: &[u8]) -> Option<Self> {
+    pub(crate) fn parse(line: &[u8]) -> Option<Self> {
         fn split(line: &[u8]) -> IResult<&[u8], (&[u8], &[u8])> {
             let end = |b: u8| b.is_ascii_whitespace() || b == b',';
             (preceded(tag("*"), take_till1(end)), rest).parse(line)
@@ -74,7 +74,7 @@ impl Keyword {
     }
 
     /// The format that `*KEYWORD LONG=Y` sets for the whole deck.
-    pub fn deck_format(&self) -> Option<Format> {
+    pub(crate) fn deck_format(&self) -> Option<Format> {
         if self.name != "KEYWORD" {
             return None;
         }

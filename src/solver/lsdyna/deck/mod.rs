@@ -19,10 +19,9 @@ mod velocity;
 
 use std::io::{self, BufRead};
 
-pub use contents::{
-    At, Deck, ImpactSpeed, Include, InitialVelocity, Interface, Named, Output, Scope, StatedUnits,
-};
-pub use keyword::signature;
+pub use contents::{Deck, Interface, Named};
+pub use contents::{DeckPlace, ImpactSpeed, Include, InitialVelocity, Output, Scope, StatedUnits};
+pub(crate) use keyword::signature;
 pub use parameters::Value;
 
 /// Reads a deck.
@@ -125,7 +124,7 @@ after the end
         assert_eq!(messages(&d), [""; 0]);
         assert_eq!(d.title.as_deref(), Some("a car against a wall"));
         let units = d.units.as_ref().unwrap();
-        assert_eq!(units.at, At { line: 5, include: None });
+        assert_eq!(units.at, DeckPlace { line: 5, include: None });
         assert_eq!(units.system, Some(UnitSystem::parse("t-mm-s").unwrap()));
         let outputs: Vec<_> = d.outputs.iter().map(|o| (o.file, o.interval, o.binary)).collect();
         assert_eq!(outputs, [("nodout", Some(0.00075), Some(2)), ("rcforc", Some(1.0e-4), None)]);
@@ -274,7 +273,7 @@ after the end
         );
         assert_eq!(d.title, None);
         assert_eq!(d.outputs[0].interval, Some(0.5));
-        assert_eq!(d.parts[0].at, At { line: 3, include: Some(1) });
+        assert_eq!(d.parts[0].at, DeckPlace { line: 3, include: Some(1) });
         let includes: Vec<_> = d.includes.iter().map(|i| (&*i.name, i.found, i.at.line)).collect();
         assert_eq!(
             includes,

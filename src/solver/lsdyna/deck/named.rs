@@ -1,7 +1,7 @@
 //! Cards that name what a run holds: outputs, history nodes, contacts, walls, parts.
 
 use super::card::{Card, text};
-use super::contents::{At, Interface, Named, Output};
+use super::contents::{DeckPlace, Interface, Named, Output};
 use super::context::{Block, Context};
 use super::kind::Kind;
 
@@ -42,7 +42,7 @@ impl Context {
         &mut self,
         kind: Kind,
         keyword: String,
-        at: At,
+        at: DeckPlace,
         id: Option<i64>,
         title: Option<String>,
     ) {

@@ -49,7 +49,7 @@ pub(super) enum Defined {
 
 impl Parameters {
     /// `name` in lower case.
-    pub fn define(&mut self, name: String, value: Value, limit: usize) -> Defined {
+    pub(crate) fn define(&mut self, name: String, value: Value, limit: usize) -> Defined {
         if let Some((_, known)) = self.places.get(&name).and_then(|&k| self.list.get_mut(k)) {
             if *known == value {
                 return Defined::Kept;
@@ -66,7 +66,7 @@ impl Parameters {
     }
 
     /// The number of a field; `None` when blank.
-    pub fn real(&self, field: Field<'_>) -> Result<Option<f64>, NoNumber> {
+    pub(crate) fn real(&self, field: Field<'_>) -> Result<Option<f64>, NoNumber> {
         let number = match self.named(field)? {
             Some((_, Value::Text(_))) => None,
             Some((_, Value::Unknown)) => return Err(NoNumber::Unknown),
@@ -82,7 +82,7 @@ impl Parameters {
     }
 
     /// The integer of a field; `None` when blank.
-    pub fn integer(&self, field: Field<'_>) -> Result<Option<i64>, NoNumber> {
+    pub(crate) fn integer(&self, field: Field<'_>) -> Result<Option<i64>, NoNumber> {
         let number = match self.named(field)? {
             Some((_, Value::Text(_) | Value::Real(_))) => None,
             Some((_, Value::Unknown)) => return Err(NoNumber::Unknown),

@@ -1,7 +1,7 @@
 //! Cards that give initial velocities.
 
 use super::card::Card;
-use super::contents::{At, InitialVelocity, Scope};
+use super::contents::{DeckPlace, InitialVelocity, Scope};
 use super::context::{Block, Context, Missing};
 use super::kind::Kind;
 
@@ -79,7 +79,7 @@ impl Context {
     pub(super) fn velocity(
         &mut self,
         keyword: &str,
-        at: At,
+        at: DeckPlace,
         scope: Scope,
         velocity: Option<[f64; 3]>,
         rotates: bool,

@@ -21,7 +21,7 @@ use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
-pub use blocks::Blocks;
+pub use blocks::{Blocks, Column};
 use stride::Stride;
 
 /// Opens every block's state line.
@@ -60,11 +60,11 @@ const ROTATIONS: [&str; 9] = [
 const ID_WIDTH: usize = 10;
 const FIELD_WIDTH: usize = 12;
 
-pub fn signature(line: &[u8]) -> bool {
+pub(crate) fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
+pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
     ascii::read("nodout", source, selection, Nodout::default)
 }
 

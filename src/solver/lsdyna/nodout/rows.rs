@@ -12,12 +12,12 @@ use crate::solver::source::Window;
 use crate::solver::states::TableId;
 
 /// Bytes read at once where all rows are read.
-pub const DENSE_READ: usize = 1 << 18;
+pub(crate) const DENSE_READ: usize = 1 << 18;
 /// Bytes below which two wanted rows are read together rather than apart.
 const PAGE: usize = 4096;
 
 /// Rows of equal width, and what stands above them.
-pub struct Block {
+pub(crate) struct Block {
     pub table: TableId,
     /// Bytes above the rows, and where in them the state line is.
     pub head: Vec<u8>,
@@ -36,7 +36,7 @@ pub struct Block {
 }
 
 /// What is wanted of a block.
-pub struct Wanted {
+pub(crate) struct Wanted {
     pub rows: Vec<usize>,
     pub columns: Vec<usize>,
     /// Index of the block's first value in the output, and the distance between the values
@@ -47,24 +47,24 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    pub fn values(&self) -> usize {
+    pub(crate) fn values(&self) -> usize {
         self.rows.len() * self.columns.len()
     }
 
-    pub fn rows(&self) -> &[usize] {
+    pub(crate) fn rows(&self) -> &[usize] {
         &self.rows
     }
 
-    pub fn columns(&self) -> &[usize] {
+    pub(crate) fn columns(&self) -> &[usize] {
         &self.columns
     }
 
-    pub fn range(&self) -> Range<usize> {
+    pub(crate) fn range(&self) -> Range<usize> {
         self.start..self.start + self.values()
     }
 
     /// Whether so many pages of the block are wanted that it is read as a whole.
-    pub fn reads_most(&self, block: &Block) -> bool {
+    pub(crate) fn reads_most(&self, block: &Block) -> bool {
         let pages = self.rows.len() * (PAGE + block.width);
         !self.columns.is_empty() && 2 * pages > block.rows * block.width
     }
@@ -72,7 +72,7 @@ impl Wanted {
 
 impl Block {
     /// A block without rows yet, which begin `rows_at` bytes behind the state's start.
-    pub fn below(
+    pub(crate) fn below(
         head: Vec<u8>,
         state_line: Range<usize>,
         table: TableId,
@@ -85,7 +85,7 @@ impl Block {
     }
 
     /// Adds a row of the state that is learnt; false if it differs from those above it.
-    pub fn add(&mut self, text: &[u8]) -> bool {
+    pub(crate) fn add(&mut self, text: &[u8]) -> bool {
         let fields = self.fields * FIELD_WIDTH;
         let width = text.len() + self.line_end.len();
         let Some(first) = text.len().checked_sub(fields) else { return false };
@@ -101,7 +101,7 @@ impl Block {
         &self.ids[row * self.first..(row + 1) * self.first]
     }
 
-    pub fn entities(&self) -> impl Iterator<Item = Option<EntityId>> {
+    pub(crate) fn entities(&self) -> impl Iterator<Item = Option<EntityId>> {
         (0..self.rows).map(|row| {
             let id = self.id(row);
             integer(&id[..id_end(id)]).map(EntityId::new)
@@ -109,7 +109,7 @@ impl Block {
     }
 
     /// Cycle and time, if all else is as in the state that was learnt.
-    pub fn verify_head(&self, head: &[u8]) -> Option<(i64, f64)> {
+    pub(crate) fn verify_head(&self, head: &[u8]) -> Option<(i64, f64)> {
         let Range { start, end } = self.state_line;
         let same = head[..start] == self.head[..start] && head[end..] == self.head[end..];
         cycle_and_time(&head[start..end]).filter(|_| same)
@@ -155,7 +155,7 @@ impl Block {
     }
 
     /// Reads and verifies all rows.
-    pub fn read_all(
+    pub(crate) fn read_all(
         &self,
         window: &mut Window<'_>,
         at: u64,
@@ -192,7 +192,7 @@ impl Block {
     }
 
     /// Reads the wanted rows and verifies the first and the last one as well.
-    pub fn read_some(
+    pub(crate) fn read_some(
         &self,
         window: &mut Window<'_>,
         at: u64,

@@ -31,7 +31,7 @@ const MAX_BATCH: usize = 256;
 type ReadState = ((i64, f64), Vec<f64>);
 
 /// The layout of one state.
-pub struct Stride {
+pub(crate) struct Stride {
     blocks: Vec<Block>,
     /// Bytes and lines from one state to the next.
     period: u64,
@@ -95,7 +95,7 @@ fn blocks(
 
 impl Stride {
     /// The layout of the state between `from` and `to`, if its rows are those of the tables.
-    pub fn learn(
+    pub(crate) fn learn(
         source: &dyn Source,
         from: Place,
         to: Place,
@@ -121,7 +121,7 @@ impl Stride {
 
     /// Reads the states from `start` on as long as they repeat the layout; the place behind
     /// them, or `None` if there is none.
-    pub fn leap(
+    pub(crate) fn leap(
         &self,
         source: &dyn Source,
         start: Place,
@@ -173,7 +173,7 @@ impl Stride {
 
     /// Number of states between byte `at` and the end of the file; the last one may lack
     /// the blank lines behind it.
-    pub fn count(&self, size: u64, at: u64) -> usize {
+    pub(crate) fn count(&self, size: u64, at: u64) -> usize {
         let body = self.period - self.tail.len() as u64;
         match size.saturating_sub(at).checked_sub(body) {
             Some(rest) => usize::try_from(rest / self.period).unwrap_or(usize::MAX - 1) + 1,
@@ -181,7 +181,7 @@ impl Stride {
         }
     }
 
-    pub fn period(&self) -> u64 {
+    pub(crate) fn period(&self) -> u64 {
         self.period
     }
 
@@ -208,7 +208,7 @@ impl Stride {
     }
 
     /// The same for a table whose columns are to stand one behind the other.
-    pub fn wanted_by_column(&self, states: &States<'_>) -> Vec<Wanted> {
+    pub(crate) fn wanted_by_column(&self, states: &States<'_>) -> Vec<Wanted> {
         let mut wanted = self.wanted(states);
         for wanted in &mut wanted {
             (wanted.row_step, wanted.column_step) = (1, wanted.rows.len());
@@ -217,7 +217,7 @@ impl Stride {
     }
 
     /// No value of any block.
-    pub fn nothing(&self) -> Vec<Wanted> {
+    pub(crate) fn nothing(&self) -> Vec<Wanted> {
         let none = || Wanted {
             rows: Vec::new(),
             columns: Vec::new(),
@@ -228,7 +228,7 @@ impl Stride {
         self.blocks.iter().map(|_| none()).collect()
     }
 
-    pub fn table(&self, block: usize) -> TableId {
+    pub(crate) fn table(&self, block: usize) -> TableId {
         self.blocks[block].table
     }
 
@@ -241,7 +241,7 @@ impl Stride {
 
     /// Reads the state at byte `at` into `out`; its cycle and time, or `None` at any surprise.
     /// `audit`: parse the fields that are not wanted as well.
-    pub fn state(
+    pub(crate) fn state(
         &self,
         window: &mut Window<'_>,
         at: u64,

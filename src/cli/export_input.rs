@@ -1,0 +1,164 @@
+//! What `crumple export` is given: a predicted curve, a model or a database, told apart by content.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use crumple::curve::Case;
+use crumple::database::Database;
+use crumple::dataset::is_same_speed;
+use crumple::file;
+use crumple::formats::ExportInput;
+use crumple::formats::read::json::{self, CurveFileError};
+use crumple::surrogate::max_crush::MaxCrushRule;
+use crumple::surrogate::predict::predict_beyond;
+use crumple::surrogate::{Model, PredictedCurve, Query};
+use crumple::unit::km_per_h;
+
+use super::Failure;
+
+/// The input of an export.
+pub enum Input {
+    Curve(Box<PredictedCurve>),
+    Model(Box<Model>),
+    Database(PathBuf, Database),
+}
+
+/// Which curves of it.
+pub struct Chosen<'a> {
+    pub speeds_m_per_s: &'a [f64],
+    pub mass_kg: Option<f64>,
+    pub rule: Option<MaxCrushRule>,
+    pub extrapolate: bool,
+    pub group: Option<&'a str>,
+    pub cases: &'a [String],
+}
+
+/// Bytes in which a model file says that it is one.
+const HEAD: u64 = 4096;
+/// With these every HDF5 file begins.
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+impl Input {
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let mut head = Vec::new();
+        let named = |source| CurveFileError::Io { path: path.into(), source };
+        file::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head)).map_err(named)?;
+        if head.starts_with(HDF5) {
+            return Ok(Self::Database(path.into(), Database::read(path)?));
+        }
+        let text = String::from_utf8_lossy(&head);
+        match text.contains("\"crumple model\"") {
+            true => Ok(Self::Model(Box::new(Model::read(path)?))),
+            false => Ok(Self::Curve(Box::new(json::predicted(path)?))),
+        }
+    }
+
+    /// The model, for a format that is made of one.
+    pub fn model(&self, format: &str) -> Result<&Model, Failure> {
+        match self {
+            Self::Model(model) => Ok(model),
+            Self::Curve(_) | Self::Database(..) => Err(Failure::Usage(format!(
+                "{format} takes a model: crumple train, then crumple export MODEL --to {format}"
+            ))),
+        }
+    }
+
+    /// The recorded cases, for a format that is made of histories.
+    pub fn cases(&self, chosen: &Chosen<'_>, format: &str) -> Result<Vec<Case>, Failure> {
+        match self {
+            Self::Database(path, database) => chosen.of_database(path, database),
+            Self::Curve(_) | Self::Model(_) => Err(Failure::Usage(format!(
+                "{format} takes histories over time, which a predicted curve does not have: give a curve database, or write a run's with crumple simulate -o"
+            ))),
+        }
+    }
+
+    /// The curves.
+    pub fn curves(&self, chosen: &Chosen<'_>) -> Result<Vec<ExportInput>, Failure> {
+        match self {
+            Self::Curve(curve) => {
+                chosen.refuse_all("a predicted curve")?;
+                Ok(vec![ExportInput { curve: (**curve).clone(), beyond: None }])
+            }
+            Self::Model(model) => chosen.of_model(model),
+            Self::Database(path, database) => {
+                let cases = chosen.of_database(path, database)?;
+                let curve = |case: &Case| {
+                    Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })
+                };
+                cases.iter().map(curve).collect()
+            }
+        }
+    }
+}
+
+impl Chosen<'_> {
+    fn refuse_all(&self, what: &str) -> Result<(), Failure> {
+        let is_asked = !self.speeds_m_per_s.is_empty()
+            || self.mass_kg.is_some()
+            || self.rule.is_some()
+            || self.extrapolate
+            || self.group.is_some()
+            || !self.cases.is_empty();
+        match is_asked {
+            true => Err(Failure::Usage(format!(
+                "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --group, --case, or give the model or the database"
+            ))),
+            false => Ok(()),
+        }
+    }
+
+    fn of_model(&self, model: &Model) -> Result<Vec<ExportInput>, Failure> {
+        if self.group.is_some() || !self.cases.is_empty() {
+            let message = "--group and --case are for a database: a model is of one group";
+            return Err(Failure::Usage(message.into()));
+        }
+        if self.speeds_m_per_s.is_empty() {
+            let (low, high) = model.range_m_per_s();
+            return Err(Failure::Usage(format!(
+                "name the speeds of the model's curves with --speed ({} to {})",
+                km_per_h(low),
+                km_per_h(high)
+            )));
+        }
+        let curve = |&speed: &f64| {
+            let query = Query {
+                mass_kg: self.mass_kg,
+                rule: self.rule,
+                extrapolate: self.extrapolate,
+                ..Query::at(speed)
+            };
+            let (curve, beyond) = predict_beyond(model, &query)?;
+            Ok(ExportInput { curve, beyond: Some(beyond) })
+        };
+        self.speeds_m_per_s.iter().map(curve).collect()
+    }
+
+    fn of_database(&self, path: &Path, database: &Database) -> Result<Vec<Case>, Failure> {
+        if self.mass_kg.is_some() || self.rule.is_some() || self.extrapolate {
+            let message = "--mass, --max-crush and --extrapolate are for a model: a recorded case has its own mass and crush";
+            return Err(Failure::Usage(message.into()));
+        }
+        let (group, cases) = database.group_or_only(path, self.group)?;
+        for name in self.cases {
+            database.case(path, group, name)?;
+        }
+        let has_speed = |case: &Case, v: f64| is_same_speed(case.speed.m_per_s, v);
+        if let Some(&v) =
+            self.speeds_m_per_s.iter().find(|&&v| !cases.iter().any(|c| has_speed(c, v)))
+        {
+            let known: Vec<String> = cases.iter().map(|c| km_per_h(c.speed.m_per_s)).collect();
+            return Err(Failure::Usage(format!(
+                "group {group} has no case at {}: it has {}; a model gives curves at other speeds",
+                km_per_h(v),
+                known.join(", ")
+            )));
+        }
+        let is_chosen = |case: &&Case| {
+            let by_name = self.cases.is_empty() || self.cases.contains(&case.name);
+            let speeds = self.speeds_m_per_s;
+            by_name && (speeds.is_empty() || speeds.iter().any(|&v| has_speed(case, v)))
+        };
+        Ok(cases.iter().filter(is_chosen).cloned().collect())
+    }
+}

@@ -1,0 +1,152 @@
+//! Adams: a spline as View command (`.cmd`), Solver statement (`.adm`) or spring property file (`.spr`).
+//!
+//! Adams interpolates by Akima's or cubic splines, so kinks are fenced with points; beyond the ends linear extrapolation is
+//! asked for. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
+
+use super::text::{Lines, nine_digits, title};
+use super::thin::for_splines;
+use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
+use crate::unit::{FORCE, LENGTH, UnitSystem};
+
+/// Numbers per line of a statement.
+const PER_LINE: usize = 4;
+/// Columns of a comment.
+const COMMENT_WIDTH: usize = 200;
+
+pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+    // mm and N, as of Adams' own default units (MMKS).
+    let usual = UnitSystem { length_m: 1e-3, mass_kg: 1e3, time_s: 1.0 };
+    let units = options.units.unwrap_or(usual);
+    let extension = options.extension.as_deref().unwrap_or("cmd");
+    let mut files = Vec::new();
+    let mut notes = Vec::new();
+    let mut together = Lines::default();
+    for (k, curve) in curves.iter().enumerate() {
+        let spline = Spline::of(curve, units, options.id + k as u32)?;
+        notes.push(curve.restitution_note("Adams", TargetUnloading::Elastic));
+        match extension {
+            "spr" => files.push((format!("{}.spr", curve.file_stem()), spline.property_file()?)),
+            "adm" => spline.solver_statement(&mut together),
+            _ => spline.view_command(&mut together),
+        }
+    }
+    if extension != "spr" {
+        let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
+        files.push((format!("{stem}.{extension}"), together.into_bytes()));
+    }
+    Ok(Exported { files, notes })
+}
+
+struct Spline<'a> {
+    curve: &'a ExportCurve,
+    units: UnitSystem,
+    id: u32,
+    /// Deflection and force of each point in the file's units, compression positive; they begin
+    /// below 0 with no force.
+    points: Vec<(f64, f64)>,
+}
+
+impl<'a> Spline<'a> {
+    fn of(curve: &'a ExportCurve, units: UnitSystem, id: u32) -> Result<Self, ExportError> {
+        let loading = for_splines(&curve.loading)?;
+        let guard = |share: f64| (-share * loading.end_m(), 0.0);
+        let force = std::iter::once(0.0).chain(loading.force_n().iter().copied().skip(1));
+        let points = [guard(0.02), guard(0.01)]
+            .into_iter()
+            .chain(loading.deflection_m().iter().copied().zip(force))
+            .map(|(d, f)| (d / units.length_m, f / units.force()))
+            .collect();
+        Ok(Self { curve, units, id, points })
+    }
+
+    fn comments(&self, lines: &mut Lines, sign: &str) {
+        lines.add(format_args!(
+            "{sign} units of the points: length {} m, force {} N",
+            nine_digits(self.units.length_m),
+            nine_digits(self.units.force())
+        ));
+        for (key, value) in self.curve.facts() {
+            lines.add(format_args!("{sign} {}", title(&format!("{key}: {value}"), COMMENT_WIDTH)));
+        }
+    }
+
+    fn columns(&self) -> [(char, Vec<String>); 2] {
+        let x = self.points.iter().map(|p| nine_digits(p.0)).collect();
+        let y = self.points.iter().map(|p| nine_digits(p.1)).collect();
+        [('x', x), ('y', y)]
+    }
+
+    /// `data_element create spline`: a line ends in `&` where the command goes on.
+    fn view_command(&self, lines: &mut Lines) {
+        self.comments(lines, "!");
+        lines.add(format_args!(
+            "data_element create spline spline_name=.model_1.{} adams_id={} &",
+            self.curve.identifier(),
+            self.id
+        ));
+        for (name, numbers) in self.columns() {
+            let rows: Vec<&[String]> = numbers.chunks(PER_LINE).collect();
+            for (i, row) in rows.iter().enumerate() {
+                let key = if i == 0 { format!("{name}=") } else { String::new() };
+                let comma = if i + 1 < rows.len() { "," } else { "" };
+                lines.add(format_args!("  {key}{}{comma} &", row.join(",")));
+            }
+        }
+        lines.add(format_args!("  linear_extrapolate=yes"));
+    }
+
+    /// `SPLINE/id`: a line begins with a comma where the statement goes on.
+    fn solver_statement(&self, lines: &mut Lines) {
+        self.comments(lines, "!");
+        lines.add(format_args!("SPLINE/{}, LINEAR_EXTRAPOLATE", self.id));
+        for (name, numbers) in self.columns() {
+            for (i, row) in numbers.chunks(PER_LINE).enumerate() {
+                let key =
+                    if i == 0 { format!("{}=", name.to_ascii_uppercase()) } else { String::new() };
+                lines.add(format_args!(", {key}{}", row.join(",")));
+            }
+        }
+    }
+
+    /// The units stand in it, with names of their own.
+    fn property_file(&self) -> Result<Vec<u8>, ExportError> {
+        let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
+        let words = |(length, force): (&str, &str)| {
+            let length = match length {
+                "m" => "meter",
+                other => other,
+            };
+            let force = match force {
+                "N" => "newton",
+                "kN" => "knewton",
+                _ => return None,
+            };
+            Some((length.to_string(), force))
+        };
+        let (length, force) = names.and_then(words).ok_or_else(|| ExportError::NoUnitNames {
+            lengths: LENGTH.known_units(),
+            forces: "N, kN".into(),
+        })?;
+        let mut lines = Lines::default();
+        self.comments(&mut lines, "$");
+        lines.add(format_args!("[MDI_HEADER]"));
+        lines.add(format_args!("FILE_TYPE = 'spr'"));
+        lines.add(format_args!("FILE_VERSION = 4.0"));
+        lines.add(format_args!("FILE_FORMAT = 'ASCII'"));
+        lines.add(format_args!("[UNITS]"));
+        lines.add(format_args!("LENGTH = '{length}'"));
+        lines.add(format_args!("ANGLE = 'degrees'"));
+        lines.add(format_args!("FORCE = '{force}'"));
+        lines.add(format_args!("MASS = 'kg'"));
+        lines.add(format_args!("TIME = 'second'"));
+        lines.add(format_args!("[SPRING_DATA]"));
+        let reach = self.points[self.points.len() - 1].0;
+        lines.add(format_args!("FREE_LENGTH = {}", nine_digits(1.2 * reach)));
+        lines.add(format_args!("[CURVE]"));
+        lines.add(format_args!("{{ disp force }}"));
+        for (d, f) in &self.points {
+            lines.add(format_args!("{} {}", nine_digits(*d), nine_digits(*f)));
+        }
+        Ok(lines.into_bytes())
+    }
+}

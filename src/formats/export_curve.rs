@@ -1,0 +1,286 @@
+//! A curve made ready for another tool's file: one force, its unloading, its tail, what must be said of it.
+
+use super::tail::{Tail, with_tail};
+use super::text::nine_digits;
+use super::thin::softened;
+use super::{ExportError, Options};
+use crate::curve::{DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::dataset::OTHER_MASS;
+use crate::surrogate::predict::{Beyond, PredictError};
+use crate::surrogate::{PredictedCurve, Warning};
+use crate::unit::{SpeedKind, km_per_h};
+
+/// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
+#[derive(Clone, Debug)]
+pub struct ExportInput {
+    /// With both forces, where it has both.
+    pub curve: PredictedCurve,
+    /// The forces beyond the maximal crush, where a model tells them.
+    pub beyond: Option<Beyond>,
+}
+
+/// One curve of one force, as writers take it; SI.
+#[derive(Clone, Debug)]
+pub struct ExportCurve {
+    /// The curve of this force alone, as it was predicted or recorded.
+    pub predicted: PredictedCurve,
+    /// Loading branch with its tail.
+    pub loading: Envelope,
+    /// Index of the maximal crush among the points of `loading`.
+    pub end: usize,
+    /// Lower and upper edge of the band at the points of `loading`, in N.
+    pub band: Option<(Vec<f64>, Vec<f64>)>,
+    /// How the target goes on beyond the maximal crush.
+    pub tail: Tail,
+    follows_faster_runs: bool,
+    /// Whether a steep flank was made softer for the target.
+    pub is_softened: bool,
+}
+
+/// How a target lets go of the energy that it has stored at the maximal crush.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TargetUnloading {
+    /// On a straight line of this stiffness in N/m.
+    Line(f64),
+    /// Along the loading branch: everything comes back.
+    Elastic,
+}
+
+impl ExportCurve {
+    /// Makes the curve of one force ready for a target.
+    ///
+    /// # Errors
+    /// [`ExportError::Predict`] if the curve does not have that force or is damaged,
+    /// [`ExportError::Curve`] if its tail makes no curve.
+    pub fn new(
+        input: &ExportInput,
+        force: ForceKind,
+        tail: Tail,
+        soften: bool,
+    ) -> Result<Self, ExportError> {
+        let predicted = input.curve.of_force(force)?;
+        let mut loading = predicted.envelope()?;
+        let end = loading.deflection_m().len() - 1;
+        let stiffness = predicted.unloading_stiffness_n_per_m;
+        let soft = if soften { softened(&loading, stiffness, end) } else { None };
+        let is_softened = soft.is_some();
+        loading = soft.unwrap_or(loading);
+        let beyond = input.beyond.as_ref().map(|beyond| match force {
+            ForceKind::Contact => &beyond.declared,
+            ForceKind::Body => &beyond.body,
+        });
+        let follows_faster_runs = beyond.is_some_and(|b| b.end_m() > loading.end_m());
+        let with_tail = with_tail(&loading, beyond, stiffness, tail)?;
+        let band = predicted.force_low_n.as_ref().zip(predicted.force_high_n.as_ref());
+        // In the tail the band is as wide as at the end, as a share of the force.
+        let widened = |edge: &[f64]| -> Vec<f64> {
+            let share = edge[end] / loading.force_n()[end];
+            let tail = with_tail.force_n()[end + 1..].iter().map(|f| f * share);
+            edge.iter().copied().chain(tail).collect()
+        };
+        let band = band.map(|(low, high)| (widened(low), widened(high)));
+        Ok(Self {
+            loading: with_tail,
+            end,
+            band,
+            tail,
+            follows_faster_runs,
+            is_softened,
+            predicted,
+        })
+    }
+
+    /// The same curve through other points; `end` is the index of the maximal crush among them.
+    pub fn through(self, loading: Envelope, end: usize) -> Self {
+        Self { loading, end, band: None, ..self }
+    }
+
+    /// Deflection at each point, in m.
+    pub fn deflection_m(&self) -> &[f64] {
+        self.loading.deflection_m()
+    }
+
+    /// Force at each point, in N.
+    pub fn force_n(&self) -> &[f64] {
+        self.loading.force_n()
+    }
+
+    /// Maximal crush of the curve's own impact, in m.
+    pub fn max_crush_m(&self) -> f64 {
+        self.deflection_m()[self.end]
+    }
+
+    /// Force at the maximal crush, in N.
+    pub fn end_n(&self) -> f64 {
+        self.force_n()[self.end]
+    }
+
+    /// Unloading stiffness from the maximal crush, in N/m.
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        self.predicted.unloading_stiffness_n_per_m
+    }
+
+    /// The curve as it drives an interface, tail included.
+    pub fn driving(&self) -> DrivingCurve {
+        DrivingCurve {
+            force: Some(self.predicted.provenance.force_kind),
+            speed_kind: Some(self.predicted.speed_kind),
+            speed_m_per_s: Some(self.predicted.speed_m_per_s),
+            ..DrivingCurve::bare(self.loading.clone()).unloading_with(self.stiffness_n_per_m())
+        }
+    }
+
+    /// Mass of the other body of a pair, in kg; `None` against a wall.
+    pub fn other_mass_kg(&self) -> Option<f64> {
+        match (self.predicted.speed_kind, self.predicted.provenance.parameters.get(OTHER_MASS)) {
+            (SpeedKind::Wall, _) => None,
+            (SpeedKind::Closing, Some(Parameter::Number(other))) => Some(*other),
+            (SpeedKind::Closing, _) => Some(self.predicted.mass_kg),
+        }
+    }
+
+    /// Mass that moves along the deflection, in kg: the reduced one of a pair.
+    pub fn effective_mass_kg(&self) -> f64 {
+        let mass = self.predicted.mass_kg;
+        self.other_mass_kg().map_or(mass, |other| mass * other / (mass + other))
+    }
+
+    /// Speed of separation over impact speed, as the target unloads from the maximal crush.
+    pub fn restitution(&self, unloading: TargetUnloading) -> f64 {
+        let mass = self.effective_mass_kg();
+        let stored_j = match unloading {
+            TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
+            TargetUnloading::Elastic => self.loading.work_to(self.max_crush_m()),
+        };
+        (2.0 * stored_j / mass).sqrt() / self.predicted.speed_m_per_s
+    }
+
+    /// What the target's unloading gives beside ours, in one line.
+    pub fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
+        let ours = self.restitution(TargetUnloading::Line(self.stiffness_n_per_m()));
+        let theirs = self.restitution(unloading);
+        let how = match unloading {
+            TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),
+            TargetUnloading::Line(k) => format!("it unloads with {:.1} MN/m", k / 1e6),
+        };
+        format!(
+            "{}: restitution {theirs:.3} in {target} ({how}), {ours:.3} in crumple's own runs",
+            self.headline()
+        )
+    }
+
+    /// What the curve is, in one line, for headers and titles.
+    pub fn headline(&self) -> String {
+        format!(
+            "{} {} ({})",
+            self.predicted.provenance.group,
+            km_per_h(self.predicted.speed_m_per_s),
+            self.predicted.speed_kind.name()
+        )
+    }
+
+    /// Group and speed as a file's name without its extension.
+    pub fn file_stem(&self) -> String {
+        file_stem(&self.predicted)
+    }
+
+    /// Group and speed as an identifier of letters, digits and underscores.
+    pub fn identifier(&self) -> String {
+        let text: String =
+            self.file_stem().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        match text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            true => text,
+            false => format!("curve_{text}"),
+        }
+    }
+
+    /// What a curve is and what it may drive, as keys and values of a file's header; SI.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let curve = &self.predicted;
+        let kind = curve.provenance.force_kind;
+        let steepest = self.loading.max_slope();
+        vec![
+            ("curve", self.headline()),
+            ("force_kind", kind.name().into()),
+            ("drives", kind.drives().into()),
+            ("sign", "deflection and force positive in compression".into()),
+            ("speed_m_per_s", curve.speed_m_per_s.to_string()),
+            ("speed_kind", curve.speed_kind.name().into()),
+            ("mass_kg", curve.mass_kg.to_string()),
+            ("impact", self.impact()),
+            ("energy_J", nine_digits(curve.energy_j)),
+            ("max_deflection_m", nine_digits(self.max_crush_m())),
+            ("tail", self.tail.rule(self.follows_faster_runs).into()),
+            ("unloading_stiffness_N_per_m", nine_digits(self.stiffness_n_per_m())),
+            ("unloading", self.unloading(steepest).into()),
+            ("steepest_rise_N_per_m", nine_digits(steepest)),
+            ("model", curve.model.clone()),
+            ("training_hash", curve.provenance.training_hash.clone()),
+            ("written_by", curve.provenance.written_by.clone()),
+        ]
+    }
+
+    /// The warnings of the prediction.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.predicted.warnings
+    }
+
+    /// What the unloading stiffness gives.
+    fn unloading(&self, steepest_n_per_m: f64) -> &'static str {
+        let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
+        match (self.predicted.rebound.is_some(), softer) {
+            (true, false) => "along this stiffness from the maximal crush it gives the rebound",
+            (true, true) => {
+                "along this stiffness from the maximal crush it gives the rebound; from a point of the steepest rise it would give energy"
+            }
+            (false, _) => {
+                "no run shows the rebound: at least the steepest rise, so that it gives no energy"
+            }
+        }
+    }
+
+    /// What hits what.
+    fn impact(&self) -> String {
+        match self.other_mass_kg() {
+            None => "one body of this mass against a rigid wall".into(),
+            Some(other) if other == self.predicted.mass_kg => {
+                "two bodies of this mass each; the speed is that of their closure".into()
+            }
+            Some(other) => {
+                format!(
+                    "two bodies, of this mass and of {other} kg; the speed is that of their closure"
+                )
+            }
+        }
+    }
+}
+
+/// Group and speed of a curve as a file's name without its extension.
+pub(super) fn file_stem(curve: &PredictedCurve) -> String {
+    let speed = km_per_h(curve.speed_m_per_s).replace([' ', '/'], "");
+    let group: String = curve.provenance.group.chars().map(plain).collect();
+    format!("{group}-{speed}")
+}
+
+/// A character that every file system takes in a name.
+pub(super) fn plain(c: char) -> char {
+    if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }
+}
+
+impl From<PredictError> for ExportError {
+    fn from(error: PredictError) -> Self {
+        Self::Predict(Box::new(error))
+    }
+}
+
+impl Options {
+    /// The curves made ready for a target whose own tail is `usual`.
+    pub(super) fn ready(
+        &self,
+        inputs: &[ExportInput],
+        usual: Tail,
+    ) -> Result<Vec<ExportCurve>, ExportError> {
+        let tail = self.tail.unwrap_or(usual);
+        inputs.iter().map(|i| ExportCurve::new(i, self.force, tail, self.soften)).collect()
+    }
+}

@@ -1,0 +1,275 @@
+//! LS-DYNA: `*DEFINE_CURVE_TITLE` (loading, unloading) with a spring material that uses them, alone or in a runnable deck.
+//!
+//! Layouts and rules: LS-DYNA Keyword User's Manual, volumes I (`*DEFINE_CURVE`) and II (`*MAT_S06`, `*MAT_S08`, `*MAT_121`).
+
+mod deck;
+
+use super::text::{Lines, nine_digits, title};
+use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
+use crate::unit::UnitSystem;
+
+/// Columns of a title.
+const TITLE_WIDTH: usize = 80;
+/// Most points to which LS-DYNA is asked to resample a curve.
+const MOST_RESAMPLED: usize = 20_000;
+
+/// Spring materials of LS-DYNA.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Material {
+    /// `*MAT_SPRING_INELASTIC`: compression only; unloads with the larger of KU and the steepest
+    /// rise.
+    #[default]
+    S08,
+    /// `*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM`: unloads with its own stiffness.
+    Mat121,
+    /// `*MAT_SPRING_GENERAL_NONLINEAR`: unloads along a curve.
+    S06,
+}
+
+/// Factors from SI to the units of the file.
+#[derive(Clone, Copy)]
+pub(super) struct InUnits(pub UnitSystem);
+
+impl InUnits {
+    /// A length in m.
+    pub fn length(self, m: f64) -> String {
+        nine_digits(m / self.0.length_m)
+    }
+
+    /// A force in N.
+    pub fn force(self, n: f64) -> String {
+        nine_digits(n / self.0.force())
+    }
+
+    /// A stiffness in N/m.
+    pub fn stiffness(self, n_per_m: f64) -> f64 {
+        n_per_m * self.0.length_m / self.0.force()
+    }
+
+    /// The lines that say the units, for a header.
+    pub fn stated(self) -> String {
+        format!(
+            "units of the points: {} (length {} m, force {} N)",
+            self.0,
+            nine_digits(self.0.length_m),
+            nine_digits(self.0.force())
+        )
+    }
+}
+
+/// Numbers of one curve's parts in the deck.
+#[derive(Clone, Copy)]
+struct Ids {
+    loading: u32,
+    unloading: u32,
+    material: u32,
+}
+
+pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+    if options.deck && curves.len() != 1 {
+        let needs = format!("one curve for a deck of one mass, found {}", curves.len());
+        return Err(ExportError::Unfit { format: "lsdyna --deck", needs });
+    }
+    let mut lines = Lines::default();
+    let mut notes = Vec::new();
+    lines.add(format_args!("*KEYWORD"));
+    for (k, curve) in curves.iter().enumerate() {
+        let units = curve.predicted.provenance.study_units;
+        let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
+        let first = options.id + 2 * k as u32;
+        let ids = Ids { loading: first, unloading: first + 1, material: first };
+        describe(&mut lines, curve, units);
+        match options.material {
+            Material::S08 => inelastic(&mut lines, curve, units, ids),
+            Material::Mat121 => discrete_beam(&mut lines, curve, units, ids),
+            Material::S06 => general(&mut lines, curve, units, ids),
+        }
+        notes.extend(note(curve, options.material));
+        if options.deck {
+            deck::write(&mut lines, curve, units, options.material, ids.material);
+        }
+    }
+    lines.add(format_args!("*END"));
+    let name = format!("{}.k", curves.first().map_or("curves".into(), ExportCurve::file_stem));
+    Ok(Exported { files: vec![(name, lines.into_bytes())], notes })
+}
+
+/// What the material's unloading gives beside ours.
+fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
+    let (own, steepest) = (curve.stiffness_n_per_m(), curve.loading.max_slope());
+    let stiffness = match material {
+        Material::S08 => own.max(steepest),
+        Material::Mat121 | Material::S06 => own,
+    };
+    let name = match material {
+        Material::S08 => "LS-DYNA's S08",
+        Material::Mat121 => "LS-DYNA's MAT_121",
+        Material::S06 => "LS-DYNA's S06",
+    };
+    let mut notes = vec![curve.restitution_note(name, TargetUnloading::Line(stiffness))];
+    if stiffness > own * 1.01 {
+        notes.push(format!(
+            "S08 unloads with the steepest rise, {:.1} MN/m, which is more than KU, {:.1} MN/m: --soften makes the steep flank less steep at equal energy, --material mat121 unloads with its own stiffness",
+            steepest / 1e6,
+            own / 1e6
+        ));
+    }
+    if curve.is_softened {
+        notes.push(format!(
+            "the flank that was steeper than {:.1} MN/m has been made less steep, with the same energy to the maximal crush",
+            own / 1e6
+        ));
+    }
+    notes
+}
+
+fn describe(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
+    lines.add(format_args!("$ {}", units.stated()));
+    lines.add(format_args!(
+        "$ unloading stiffness in these units: {}",
+        nine_digits(units.stiffness(curve.stiffness_n_per_m()))
+    ));
+    for (key, value) in curve.facts() {
+        lines.add(format_args!("$ {key}: {value}"));
+    }
+}
+
+/// S08 takes the first quadrant and works in compression only (CTF 1).
+fn inelastic(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+    let points = points(curve);
+    let text = curve.headline();
+    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
+    lines.add(format_args!("*MAT_SPRING_INELASTIC_TITLE"));
+    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
+    lines.add(format_args!("$#     mid      lcfd        ku       ctf"));
+    lines.add(format_args!(
+        "{:>10}{:>10}{:>10}{:>10}",
+        ids.material,
+        ids.loading,
+        ten_columns(units.stiffness(curve.stiffness_n_per_m())),
+        "1.0"
+    ));
+}
+
+/// MAT_121 takes compression in the third quadrant, unloads with K until the unloading curve,
+/// which has no force, and goes on without force.
+fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+    let points = third_quadrant(&points(curve));
+    let text = curve.headline();
+    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
+    let reach = points[0].0;
+    let nothing = [(reach, 0.0), (0.0, 0.0), (-0.1 * reach, 0.0)];
+    define_curve(lines, (ids.unloading, &format!("{text} unloaded")), &nothing, units, 0);
+    lines.add(format_args!("*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE"));
+    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
+    lines.add(format_args!("$#     mid        ro         k   unldopt    offset     dampf"));
+    lines.add(format_args!(
+        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+        ids.material,
+        "1.0e-12",
+        ten_columns(units.stiffness(curve.stiffness_n_per_m())),
+        "2.0",
+        "0.0",
+        "0.0"
+    ));
+    lines.add(format_args!("$#   lcidt    lcidtu    lcidtd    lcidte"));
+    lines.add(format_args!("{:>10}{:>10}{:>10}{:>10}", ids.loading, ids.unloading, 0, 0));
+    lines.add(format_args!("$#  utfail    ucfail        iu"));
+    lines.add(format_args!("{:>10}{:>10}{:>10}", "0.0", "0.0", "0.0"));
+}
+
+/// S06 takes compression in the third quadrant. BETA 0: falling forces are followed.
+fn general(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+    let points = third_quadrant(&points(curve));
+    let text = curve.headline();
+    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
+    let highest = curve.loading.peak_force_n();
+    let length = highest / curve.stiffness_n_per_m();
+    let unloading = [(-length, -highest), (0.0, 0.0), (length, 0.0)];
+    define_curve(lines, (ids.unloading, &format!("{text} unloading")), &unloading, units, 0);
+    lines.add(format_args!("*MAT_SPRING_GENERAL_NONLINEAR_TITLE"));
+    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
+    lines.add(format_args!("$#     mid      lcdl      lcdu      beta       tyi       cyi"));
+    lines.add(format_args!(
+        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+        ids.material, ids.loading, ids.unloading, "0.0", "0.0", "0.0"
+    ));
+}
+
+/// Deflection in m and force in N of each point. They begin at the origin, else LS-DYNA carries the
+/// first slope on into tension.
+fn points(curve: &ExportCurve) -> Vec<(f64, f64)> {
+    let force = std::iter::once(0.0).chain(curve.force_n().iter().copied().skip(1));
+    curve.deflection_m().iter().copied().zip(force).collect()
+}
+
+/// The same in tension's signs, rising, with a point beyond the origin that holds the force at 0.
+fn third_quadrant(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let reach = points[points.len() - 1].0;
+    let pulled = [(0.1 * reach, 0.0)];
+    points.iter().rev().map(|&(d, f)| (-d, -f)).chain(pulled).collect()
+}
+
+fn define_curve(
+    lines: &mut Lines,
+    (id, text): (u32, &str),
+    points: &[(f64, f64)],
+    units: InUnits,
+    resampling: usize,
+) {
+    lines.add(format_args!("*DEFINE_CURVE_TITLE"));
+    lines.add(format_args!("{}", title(text, TITLE_WIDTH)));
+    lines.add(format_args!(
+        "$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint"
+    ));
+    lines.add(format_args!(
+        "{id:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{resampling:>10}",
+        0, "1.0", "1.0", "0.0", "0.0", 0
+    ));
+    lines.add(format_args!("$#                a1                  o1"));
+    for &(d, f) in points {
+        lines.add(format_args!("{:>20}{:>20}", units.length(d), units.force(f)));
+    }
+}
+
+/// Points to which LS-DYNA resamples a curve evenly, 100 by default: a curve with more would
+/// lose its peaks. As many as the smallest interval asks for keep every point of an even curve.
+fn resampling(points: &[(f64, f64)]) -> usize {
+    let smallest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
+    let reach = points[points.len() - 1].0 - points[0].0;
+    let intervals = (reach / smallest - 1e-6).ceil();
+    match intervals < 100.0 {
+        true => 0,
+        false => (intervals as usize + 1).min(MOST_RESAMPLED),
+    }
+}
+
+/// A number in a field of ten columns, with as many digits as fit.
+fn ten_columns(value: f64) -> String {
+    let text = (0..9).rev().map(|digits| format!("{value:.digits$e}")).find(|t| t.len() <= 9);
+    text.unwrap_or_else(|| format!("{value:e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_curve_keeps_its_points_when_it_is_resampled() {
+        let even: Vec<(f64, f64)> = (0..=400).map(|i| (f64::from(i) * 0.003, 1.0)).collect();
+        assert_eq!(resampling(&even), 401);
+        assert_eq!(resampling(&even[..50]), 0);
+        let mut uneven = even;
+        uneven.insert(1, (1e-9, 1.0));
+        assert_eq!(resampling(&uneven), MOST_RESAMPLED);
+    }
+
+    #[test]
+    fn numbers_fit_their_field() {
+        for value in [194_123.456_789, 1.0, 1e-12, 1e300, 7.0 / 3.0] {
+            let text = ten_columns(value);
+            assert!(text.len() < 10, "{text}");
+            assert!((text.parse::<f64>().unwrap() / value - 1.0).abs() < 1e-2, "{text}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Fewer points for tools with small tables, more for tools that interpolate by splines.
+
+use crate::curve::{Envelope, EnvelopeError};
+
+/// The envelope with at most `most` points (two or more): those are removed first whose removal
+/// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
+/// Whyatt, Cartographic Journal 30, 1993). `kept` is the index of a point that stays, such as the
+/// maximal crush; the forces up to it are then scaled so that the energy to it is the same.
+///
+/// # Errors
+/// [`EnvelopeError`] if the result is no envelope.
+pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, EnvelopeError> {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    let mut left: Vec<usize> = (0..d.len()).collect();
+    while left.len() > most.max(3) {
+        let area = |w: &[usize]| {
+            let (a, b, c) = (w[0], w[1], w[2]);
+            0.5 * ((d[b] - d[a]) * (f[c] - f[a]) - (d[c] - d[a]) * (f[b] - f[a])).abs()
+        };
+        let areas = left.windows(3).enumerate().filter(|(_, w)| w[1] != kept);
+        let Some((i, _)) = areas.min_by(|a, b| area(a.1).total_cmp(&area(b.1))) else { break };
+        left.remove(i + 1);
+    }
+    let mut force_n: Vec<f64> = left.iter().map(|&i| f[i]).collect();
+    let deflection_m: Vec<f64> = left.iter().map(|&i| d[i]).collect();
+    let plain = Envelope::new(deflection_m.clone(), force_n.clone())?;
+    let scale = curve.work_to(d[kept]) / plain.work_to(d[kept]);
+    if scale.is_finite() {
+        let until = left.partition_point(|&i| i <= kept);
+        force_n[..until].iter_mut().for_each(|f| *f *= scale);
+    }
+    Envelope::new(deflection_m, force_n)
+}
+
+/// Fewest points of a table that splines go through.
+const FEWEST: usize = 200;
+/// A kink is fenced by two points at this share of the intervals beside it.
+const FENCE: f64 = 0.05;
+/// A change of the force's slope over an interval that is a kink, as a share of the peak force.
+const KINK: f64 = 0.02;
+
+/// The same function with more points, so that Akima and cubic splines through them keep its
+/// energy: at least 200, and one close to each side of a kink, where a spline would overshoot.
+///
+/// # Errors
+/// [`EnvelopeError`] if the result is no envelope.
+pub fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    let widest_m = curve.end_m() / FEWEST as f64;
+    let slope = |i: usize| (f[i + 1] - f[i]) / (d[i + 1] - d[i]);
+    let mut deflection_m = vec![0.0];
+    for i in 0..d.len() - 1 {
+        let step = d[i + 1] - d[i];
+        let is_kink = |k: usize| {
+            k == 0
+                || k + 1 == d.len()
+                || (slope(k) - slope(k - 1)).abs() * step > KINK * curve.peak_force_n()
+        };
+        if is_kink(i) {
+            deflection_m.push(d[i] + FENCE * step);
+        }
+        let parts = (step / widest_m).ceil().max(1.0) as usize;
+        deflection_m.extend((1..parts).map(|p| d[i] + step * p as f64 / parts as f64));
+        if is_kink(i + 1) {
+            deflection_m.push(d[i + 1] - FENCE * step);
+        }
+        deflection_m.push(d[i + 1]);
+    }
+    deflection_m.sort_by(f64::total_cmp);
+    deflection_m.dedup();
+    let force_n = deflection_m.iter().map(|&d| curve.force_at(d)).collect();
+    Envelope::new(deflection_m, force_n)
+}
+
+/// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
+/// `end`: a too steep flank begins earlier on its line, and the peak behind it is raised for what
+/// the flank has lost. `None` if no rise is that steep, or if the energy cannot be kept.
+pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelope> {
+    if curve.max_slope() <= stiffness_n_per_m {
+        return None;
+    }
+    let d = curve.deflection_m();
+    let wanted_j = curve.work_to(d[end]);
+    // Raised before the rise is limited, so that no limited slope is steep again.
+    let with = |raise: f64, until: usize| {
+        let mut f = curve.force_n().to_vec();
+        f[..=until].iter_mut().for_each(|f| *f *= raise);
+        f[0] = f[0].min(0.0);
+        for i in 1..f.len() {
+            f[i] = f[i].min(f[i - 1] + stiffness_n_per_m * (d[i] - d[i - 1]));
+        }
+        Envelope::new(d.to_vec(), f).ok()
+    };
+    let limited = with(1.0, 0)?;
+    let last = (0..=end).rfind(|&i| limited.force_n()[i] < curve.force_n()[i])?;
+    // What is raised: twice as far as the limit reaches, more if that does not suffice.
+    let mut until = (2 * last).clamp(1, end);
+    loop {
+        let (mut low, mut high) = (1.0_f64, 2.0_f64);
+        if with(high, until)?.work_to(d[end]) >= wanted_j {
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                match with(middle, until)?.work_to(d[end]) < wanted_j {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            return with(high, until);
+        }
+        if until == end {
+            return None;
+        }
+        until = (2 * until).min(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sharp peak at 10 mm and folds behind it.
+    fn curve() -> Envelope {
+        let d: Vec<f64> = (0..=400).map(|i| f64::from(i) * 2.5e-3).collect();
+        let f = d
+            .iter()
+            .map(|&d| match d {
+                0.0 => 0.0,
+                d if d < 0.0101 => 6e6 * d / 0.01,
+                d => 1.5e6 + 4.5e6 * (-(d - 0.01) / 0.01).exp() + 3e5 * (30.0 * d).sin(),
+            })
+            .collect();
+        Envelope::new(d, f).unwrap()
+    }
+
+    #[test]
+    fn fewer_points_keep_the_energy_and_the_peak() {
+        let few = thinned(&curve(), 200, 400).unwrap();
+        assert_eq!(few.deflection_m().len(), 200);
+        assert!((few.work() / curve().work() - 1.0).abs() < 1e-12);
+        assert!((few.peak_force_n() / curve().peak_force_n() - 1.0).abs() < 1e-3);
+        let at = |k: i32| f64::from(k) * 1e-3;
+        let worst = (0..1000).map(|k| (few.force_at(at(k)) - curve().force_at(at(k))).abs());
+        assert!(worst.fold(0.0, f64::max) < 0.01 * curve().peak_force_n());
+    }
+
+    #[test]
+    fn a_kept_point_stays() {
+        let few = thinned(&curve(), 20, 333).unwrap();
+        assert!(few.deflection_m().contains(&curve().deflection_m()[333]));
+    }
+
+    #[test]
+    fn more_points_are_the_same_function() {
+        let coarse = Envelope::new(vec![0.0, 0.01, 0.02, 1.0], vec![0.0, 6e6, 1e6, 1e6]).unwrap();
+        let fine = for_splines(&coarse).unwrap();
+        assert!(fine.deflection_m().len() >= 200);
+        assert!((fine.work() / coarse.work() - 1.0).abs() < 1e-12);
+        assert_eq!(fine.peak_force_n(), 6e6);
+    }
+
+    #[test]
+    fn a_softened_flank_keeps_the_energy() {
+        let soft = softened(&curve(), 200e6, 400).unwrap();
+        assert!(soft.max_slope() <= 200e6 * (1.0 + 1e-9));
+        assert!((soft.work() / curve().work() - 1.0).abs() < 1e-9);
+        assert_eq!(soft.force_n()[0], 0.0);
+        assert_eq!(softened(&curve(), 700e6, 400), None);
+    }
+}

@@ -1,0 +1,109 @@
+//! A recorded case in the form of a predicted curve, so that it exports like one.
+
+use std::collections::BTreeMap;
+
+use super::max_crush::MaxCrush;
+use super::predicted::{PredictedCurve, Provenance, Rebound};
+use super::{PredictError, Warning};
+use crate::curve::driving::NoDrivingCurve;
+use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::dataset::OTHER_MASS;
+
+/// The name that stands where a predicted curve has its model's.
+pub const RECORDED: &str = "recorded";
+
+impl PredictedCurve {
+    /// The curve of one recorded run: its declared force, and beside a contact force the one that
+    /// moved the body, both at the points of either. Exact between the points, as both are
+    /// piecewise linear.
+    ///
+    /// # Errors
+    /// [`PredictError::Damaged`] if the case's states make no loading branch.
+    pub fn of_case(case: &Case) -> Result<Self, PredictError> {
+        let no_curve = |e: NoDrivingCurve| PredictError::Damaged(format!("{}: {e}", case.name));
+        let declared = DrivingCurve::of_case(case, case.force_kind).map_err(no_curve)?;
+        let body = match case.force_kind {
+            ForceKind::Contact => DrivingCurve::of_case(case, ForceKind::Body).ok(),
+            ForceKind::Body => None,
+        };
+        let deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
+        let at = |e: &Envelope| -> Vec<f64> {
+            let force = deflection_m.iter().map(|&d| e.force_at(d).max(0.0));
+            std::iter::once(0.0).chain(force.skip(1)).collect()
+        };
+        let force_n = at(&declared.loading);
+        let steepest = declared.loading.max_slope();
+        let loading = Envelope::new(deflection_m.clone(), force_n.clone())?;
+        let kinetic_energy_j = case.masses.kinetic_energy_j(case.speed);
+        let driving = body.as_ref().unwrap_or(&declared);
+        let top_n = driving.loading.force_at(driving.loading.end_m());
+        let rebound = driving.unloading.stiffness_n_per_m().map(|stiffness_n_per_m| Rebound {
+            speed_m_per_s: top_n / (stiffness_n_per_m * case.masses.effective_kg()).sqrt(),
+            stiffness_n_per_m,
+        });
+        let mut parameters: BTreeMap<String, Parameter> = case.parameters.clone();
+        if let Some(other) = case.masses.other_kg {
+            parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
+        }
+        let speed = case.speed.m_per_s;
+        let over_kinetic = |work_j: f64| work_j / kinetic_energy_j;
+        let mut curve = Self {
+            body_force_n: body.as_ref().map(|b| at(&b.loading)),
+            body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
+            body_unloading_stiffness_n_per_m: None,
+            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m.unwrap_or(steepest),
+            force_low_n: None,
+            force_high_n: None,
+            forest_quantiles: None,
+            drives: case.force_kind.drives().into(),
+            rebound,
+            max_deflection_m: loading.end_m(),
+            speed_m_per_s: speed,
+            speed_kind: case.speed.kind,
+            mass_kg: case.masses.body_kg,
+            energy_j: loading.work(),
+            model: RECORDED.into(),
+            warnings: case
+                .is_truncated()
+                .then(|| Warning::truncated_training_run(&case.name))
+                .into_iter()
+                .collect(),
+            provenance: Provenance {
+                written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
+                group: case.group.clone(),
+                force_kind: case.force_kind,
+                training_hash: case.fingerprint.clone(),
+                study_units: case.units(),
+                training_speeds_m_per_s: vec![speed],
+                in_range: true,
+                nearest_training_speed_m_per_s: speed,
+                distance_to_nearest_m_per_s: 0.0,
+                max_crush_rule: None,
+                max_crush: MaxCrush::NONE,
+                kinetic_energy_j,
+                energy_over_kinetic: over_kinetic(loading.work()),
+                body_energy_over_kinetic: body.as_ref().map(|b| over_kinetic(b.loading.work())),
+                band: None,
+                parameters,
+            },
+            deflection_m,
+            force_n,
+        };
+        curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&loading);
+        if let Some(body) = body {
+            curve.body_unloading_stiffness_n_per_m = Some(curve.stiffness_at_end(&body.loading));
+        }
+        Ok(curve)
+    }
+}
+
+/// The points of one or both envelopes up to the shorter end, rising; points closer together than 1e-9
+/// of the end are one.
+fn union(a: &Envelope, b: Option<&Envelope>) -> Vec<f64> {
+    let end = b.map_or(a.end_m(), |b| a.end_m().max(b.end_m()));
+    let mut all: Vec<f64> = a.deflection_m().to_vec();
+    all.extend(b.into_iter().flat_map(|b| b.deflection_m().iter().copied()));
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|next, kept| *next - *kept <= 1e-9 * end);
+    all
+}
