@@ -68,6 +68,8 @@ pub mod nsdm;
 #[allow(missing_docs)]
 pub mod formats;
 
+pub mod import;
+
 pub mod plan;
 
 pub mod scenario;

@@ -10,6 +10,7 @@ pub(crate) struct CsvTable<'a> {
     header: StringRecord,
     /// Lines of the file in front of the text.
     lines_before: u64,
+    separator: u8,
 }
 
 /// One row.
@@ -17,6 +18,8 @@ pub(crate) struct Row {
     record: StringRecord,
     /// Line in the file, counted from 1.
     pub line: u64,
+    /// Whether a comma cannot separate fields, so that it may stand in a number.
+    decimal_comma: bool,
 }
 
 /// A field that holds no number, or none that is finite.
@@ -39,14 +42,15 @@ impl<'a> CsvTable<'a> {
     /// If the header is no UTF-8.
     pub(crate) fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        let separator = separator(text);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .flexible(true)
-            .delimiter(separator(text))
+            .delimiter(separator)
             .from_reader(text);
         let header = reader.headers()?.clone();
-        Ok(Self { reader, header, lines_before })
+        Ok(Self { reader, header, lines_before, separator })
     }
 
     /// The names of the columns.
@@ -59,25 +63,41 @@ impl<'a> CsvTable<'a> {
         self.lines_before + self.header.position().map_or(1, csv::Position::line)
     }
 
+    /// The header as a row, for tables that have none.
+    pub(crate) fn header_row(&self) -> Row {
+        let decimal_comma = self.separator != b',';
+        Row { record: self.header.clone(), line: self.header_line(), decimal_comma }
+    }
+
     /// The rows in their order.
     pub(crate) fn rows(&mut self) -> impl Iterator<Item = Result<Row, csv::Error>> {
         let before = self.lines_before;
+        let decimal_comma = self.separator != b',';
         self.reader.records().map(move |record| {
             let record = record?;
             let line = before + record.position().map_or(0, csv::Position::line);
-            Ok(Row { record, line })
+            Ok(Row { record, line, decimal_comma })
         })
     }
 }
 
 impl Row {
-    /// The finite number in a field, counted from 0.
+    /// The text of a field, counted from 0; empty if there is none.
+    pub(crate) fn field(&self, field: usize) -> &str {
+        self.record.get(field).unwrap_or_default()
+    }
+
+    /// The finite number in a field, counted from 0; between semicolons or tabs with a decimal
+    /// comma or point.
     ///
     /// # Errors
     /// [`NoNumber`] with its place.
     pub(crate) fn number(&self, field: usize) -> Result<f64, NoNumber> {
-        let found = self.record.get(field).unwrap_or_default();
-        let parsed = found.parse::<f64>();
+        let found = self.field(field);
+        let parsed = match self.decimal_comma && !found.contains('.') {
+            true => found.replacen(',', ".", 1).parse::<f64>(),
+            false => found.parse::<f64>(),
+        };
         match parsed {
             Ok(number) if number.is_finite() => Ok(number),
             _ => Err(NoNumber {

@@ -9,7 +9,7 @@ use crate::common::root;
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 25] = [
+const MAY_NAME: [(&str, &[&str]); 26] = [
     ("unit", &[]),
     ("history", &[]),
     ("signal", &[]),
@@ -32,8 +32,20 @@ const MAY_NAME: [(&str, &[&str]); 25] = [
     ("nsdm", &["curve", "signal", "stream"]),
     (
         "formats",
-        &["multibody", "surrogate", "dataset", "forest", "curve", "table", "hdf5", "file", "unit"],
+        &[
+            "multibody",
+            "surrogate",
+            "dataset",
+            "forest",
+            "curve",
+            "signal",
+            "table",
+            "hdf5",
+            "file",
+            "unit",
+        ],
     ),
+    ("import", &["formats", "database", "curve", "file", "unit"]),
     ("plan", &["stream", "unit"]),
     (
         "scenario",

@@ -16,6 +16,7 @@ mod fmu;
 mod forest;
 mod growing;
 mod house_rules;
+mod import;
 mod known_solutions;
 mod models;
 mod nsdm;

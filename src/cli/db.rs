@@ -1,4 +1,4 @@
-//! `crumple db`: look into a curve database.
+//! `crumple db`: look into a curve database, and add curves to it.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -12,15 +12,16 @@ use crumple::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
 
 use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, db_add};
 
-/// List, show and check the cases of a curve database
+/// List, show, check and add cases of a curve database
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple db ls curves.h5
   crumple db show curves.h5 --group lead-car-wall --case 36kmh
   crumple db show curves.h5 --json > curves.json
-  crumple db check curves.h5 --strict")]
+  crumple db check curves.h5 --strict
+  crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -63,6 +64,19 @@ enum Command {
         /// Curve database
         database: PathBuf,
     },
+    /// Add measured and legacy curves from files
+    ///
+    /// Every file becomes a case of the study "imported", with its path, size and hash. A curve
+    /// without times is given the motion that its own force asks for: its largest deflection is
+    /// taken as the largest crush. All files are read before anything is written.
+    #[command(after_help = "Examples:
+  crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t
+  crumple db add curves.h5 25.json 36.json 50.json --group legacy
+  crumple db add curves.h5 a.k b.k --group pairs --speed 36km/h --speed 54km/h --kind closing --mass 24t --units mm-t-s
+  crumple db add curves.h5 T123.mme --group tests --speed 36km/h --mass 24t
+  crumple db add --list
+Headers of columns name quantity and unit: d_mm, displacement [mm], F_kN, Force [N], time (ms).")]
+    Add(Box<db_add::Args>),
 }
 
 /// What a list says of one case.
@@ -180,6 +194,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             show(&shown, options)
         }
         Command::Check { database } => check(database, options),
+        Command::Add(args) => db_add::run(args, options),
     }
 }
 

@@ -8,7 +8,7 @@ use crumple::database::Database;
 use crumple::dataset::is_same_speed;
 use crumple::file;
 use crumple::formats::ExportInput;
-use crumple::formats::json::{self, CurveFileError};
+use crumple::formats::read::json::{self, CurveFileError};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
@@ -49,7 +49,7 @@ impl Input {
         let text = String::from_utf8_lossy(&head);
         match text.contains("\"crumple model\"") {
             true => Ok(Self::Model(Box::new(Model::read(path)?))),
-            false => Ok(Self::Curve(Box::new(json::read(path)?))),
+            false => Ok(Self::Curve(Box::new(json::predicted(path)?))),
         }
     }
 

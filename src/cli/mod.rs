@@ -4,6 +4,7 @@ mod arguments;
 mod build;
 mod compare;
 mod db;
+mod db_add;
 mod deck_report;
 mod demo;
 mod export;

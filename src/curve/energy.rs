@@ -79,6 +79,11 @@ impl Impossible {
     pub(crate) fn found(&self) -> &str {
         &self.found
     }
+
+    /// The likely cause, in words that say what to look at.
+    pub fn cause(&self) -> &str {
+        &self.cause
+    }
 }
 
 impl Claim<'_> {

@@ -8,8 +8,10 @@ pub(crate) mod driving;
 pub mod energy;
 pub(crate) mod envelope;
 pub mod extract;
+pub mod from_table;
 pub mod loading;
 pub mod recipe;
+pub mod retrace;
 
 use std::collections::BTreeMap;
 

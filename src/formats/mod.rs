@@ -1,4 +1,5 @@
-//! Curves to and from files of other tools: one file per format, one line in [`FORMATS`].
+//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] takes them
+//! back.
 //!
 //! What all targets share stands once: the curve made ready ([`ExportCurve`]), its tail, thinning, softening, numbers and
 //! titles as text.
@@ -16,6 +17,7 @@ mod mat;
 mod modelica;
 pub mod onnx;
 mod radioss;
+pub mod read;
 mod table;
 mod tail;
 mod text;

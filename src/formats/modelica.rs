@@ -63,7 +63,8 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
         let reach = curve.loading.end_m();
         let guards = [(-0.02 * reach, 0.0), (-0.01 * reach, 0.0)];
         let points = curve.deflection_m().iter().copied().zip(curve.force_n().iter().copied());
-        let held = (curve.tail != Tail::Bottom).then(|| (1.1 * reach, curve.loading.force_at(reach)));
+        let held =
+            (curve.tail != Tail::Bottom).then(|| (1.1 * reach, curve.loading.force_at(reach)));
         let loading: Vec<(f64, f64)> = guards.into_iter().chain(points).chain(held).collect();
         let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
         let open_m = end_m - end_n / curve.stiffness_n_per_m();

@@ -20,7 +20,7 @@ pub use spring::SpringError;
 pub use tables::*;
 
 use crate::database::DatabaseError;
-use crate::formats::{csv, json};
+use crate::formats::read::{ReadCurveError, json};
 use crate::manifest::{self, ManifestError};
 use crate::multibody::{Chain, ChainError, RunSettings, SimulationError};
 use crate::surrogate::ModelError;
@@ -105,7 +105,7 @@ pub enum ScenarioError {
     CurveFile(#[from] json::CurveFileError),
     /// A table of a curve cannot be used.
     #[error(transparent)]
-    Csv(#[from] csv::CsvError),
+    Csv(#[from] ReadCurveError),
     /// Its bodies make no chain.
     #[error("{path}: {source}")]
     Chain {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{CurveTable, Scenario, ScenarioError, StageTable};
 use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError};
 use crate::database::Database;
-use crate::formats::{csv, json};
+use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
@@ -149,9 +149,9 @@ impl CurveSource {
             (None, Some(file), None, None) => {
                 let file = folder.join(file);
                 if file.extension().is_some_and(|e| e == "json") {
-                    return Ok(Self::Predicted(Box::new(json::read(&file)?)));
+                    return Ok(Self::Predicted(Box::new(json::predicted(&file)?)));
                 }
-                let mut held = csv::read(&file)?;
+                let mut held = csv::driving(&file)?;
                 let stated = table.force.or(held.force);
                 if held.force.is_some() && stated != held.force {
                     return Err(wrong(SourceError::OtherForce { curve: curve(), file }));

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::manifest::{Head, Manifest, RunEntry, StudyKind};
 use crate::curve::Parameter;
+use crate::curve::from_table::IMPORTED;
 use crate::curve::recipe::{ForceSource, Recipe};
 
 /// What does not fit in a study manifest.
@@ -87,6 +88,11 @@ pub enum InvalidStudy {
         /// Name of the parameter.
         name: String,
     },
+    /// The name of what comes from files.
+    #[error(
+        "study.name = \"{IMPORTED}\" is the name of the curves that crumple db add takes from files: give the study another"
+    )]
+    NameOfImported,
     /// A name is empty or blank.
     #[error("{key} = \"{name}\" is no name", name = name.escape_debug())]
     NoName {
@@ -111,6 +117,10 @@ pub enum InvalidStudy {
 pub(super) fn check(manifest: &Manifest) -> Result<(), InvalidStudy> {
     let Head { name, group, kind, half_model, .. } = &manifest.study;
     check_name("study.name", name, true)?;
+    // A build removes the cases of its study that it does not know.
+    if name == IMPORTED {
+        return Err(InvalidStudy::NameOfImported);
+    }
     check_name("study.group", group, false)?;
     let minus_node = manifest.recipe.deflection.minus_node.is_some();
     match (kind, half_model, minus_node) {

@@ -1,0 +1,410 @@
+//! From a table of force over deflection to the curve of a case: with times as of an FE record,
+//! without them by the motion that the table itself asks for.
+//!
+//! **Without times** the largest deflection of the table is taken as the largest crush. A body
+//! that starts at the impact speed `v0` and is stopped there by the table's own force has
+//! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. Behind it the table's own
+//! unloading branch, or a line of the unloading stiffness, drives the body back; then both part.
+//! Every point of the table is a state, with states between them at an eighth of the common
+//! interval, so that straight lines over time follow the motion.
+
+use std::sync::Arc;
+
+use super::contact;
+use super::extract::{self, ExtractError, Measured, MeasuredForce, Setup, Stated, StatedContact};
+use super::recipe::{
+    DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
+};
+use super::retrace::{MotionError, retrace};
+use super::{Curve, CurveError, EnergyAudit, Masses, energy, loading};
+use crate::history::{EntityId, History};
+use crate::signal::resample::interpolate;
+use crate::unit::{Speed, UnitSystem};
+
+/// Study of the cases that were added from files and not built of FE runs.
+pub const IMPORTED: &str = "imported";
+
+/// A table of force over deflection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table<'a> {
+    /// In m. Without times: from 0 to the largest, then falling if it holds the unloading.
+    pub deflection_m: &'a [f64],
+    /// In N, one per deflection.
+    pub force_n: &'a [f64],
+    /// In s, one per deflection.
+    pub time_s: Option<&'a [f64]>,
+    /// In N, one per deflection: the force that moves the body, where that is another.
+    pub body_force_n: Option<&'a [f64]>,
+}
+
+/// The impact that a table belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Speed at contact.
+    pub speed: Speed,
+    /// Of the body, or of both bodies.
+    pub masses: Masses,
+    /// From the largest deflection, in N/m, if it is known.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// The same of the force that moves the body, where that is another.
+    pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Units that the table's values were read in, to tell what was mistaken.
+    pub units: UnitSystem,
+    /// Take the table whatever its energy says.
+    pub accept_energy: bool,
+}
+
+/// What a case needs of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FromTable {
+    /// At the common interval, from contact on.
+    pub sampled: Curve,
+    /// Rate of the deflection at the sampled times, in m/s.
+    pub closing_speed_m_per_s: Vec<f64>,
+    /// With every point of the table.
+    pub original: Curve,
+    /// Time of the table at which the curve begins, in s.
+    pub contact_time_s: f64,
+    /// In N/m; `None` if the record ends before the force has fallen.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// Work of the loading branch against the kinetic energy.
+    pub audit: EnergyAudit,
+    /// What was done.
+    pub notes: Vec<String>,
+    /// What the user should look at.
+    pub warnings: Vec<String>,
+}
+
+/// Why a table is no curve of that impact.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FromTableError {
+    /// Its energy is not that of the impact.
+    #[error(
+        "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+    )]
+    Impossible {
+        /// What was found.
+        found: String,
+        /// What it likely comes from.
+        cause: String,
+    },
+    /// Its motion cannot be told.
+    #[error("{0}")]
+    Motion(#[from] MotionError),
+    /// Its record cannot be used.
+    #[error("{0}")]
+    Extract(ExtractError),
+    /// Its states are none of a curve.
+    #[error("{0}")]
+    Curve(#[from] CurveError),
+}
+
+impl From<energy::Impossible> for FromTableError {
+    fn from(impossible: energy::Impossible) -> Self {
+        Self::Impossible { found: impossible.found().into(), cause: impossible.cause().into() }
+    }
+}
+
+impl From<ExtractError> for FromTableError {
+    fn from(error: ExtractError) -> Self {
+        match error {
+            ExtractError::Impossible(impossible) => impossible.into(),
+            other => Self::Extract(other),
+        }
+    }
+}
+
+/// The curve of a table under an impact.
+///
+/// # Errors
+/// [`FromTableError`] says what cannot be, and what to change.
+pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableError> {
+    match table.time_s {
+        Some(time_s) => recorded(table, time_s, impact),
+        None => retraced(table, impact),
+    }
+}
+
+/// Most states at the common interval: 15 s of 0.75 ms.
+const MOST_STATES: usize = 20_000;
+
+/// The motion that the table asks for.
+fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableError> {
+    let interval_s = Sampling::default().interval_s;
+    let motion = retrace(table, impact, interval_s)?;
+    let (mut notes, mut warnings) = (motion.notes, motion.warnings);
+    let original = Curve::new(motion.time_s, motion.deflection_m, motion.force_n)?;
+    let claim = energy::Claim {
+        curve: &original,
+        masses: impact.masses,
+        speed: impact.speed,
+        closing_m_per_s: None,
+        recorded_m_per_s: None,
+        units: impact.units,
+        is_body_force: false,
+        others: &[],
+    };
+    match claim.check() {
+        Ok(_) => {}
+        Err(impossible) if impact.accept_energy => {
+            warnings.push(format!("accept_energy: {}", impossible.found()));
+        }
+        Err(impossible) => return Err(impossible.into()),
+    }
+    let audit = energy::audit(&original, impact.masses, impact.speed);
+    if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
+        warnings.push(format!(
+            "energy: the curve takes up {:.1} % of the kinetic energy",
+            audit.ratio() * 100.0
+        ));
+    }
+    let at = original.time_s();
+    let last_s = at[at.len() - 1];
+    let times: Vec<f64> =
+        (0..MOST_STATES).map(|i| i as f64 * interval_s).take_while(|&t| t <= last_s).collect();
+    if times.len() == MOST_STATES {
+        warnings.push(format!(
+            "short: the motion takes {last_s:.1} s, of which the first {MOST_STATES} states are sampled"
+        ));
+    }
+    let of = |values: &[f64]| interpolate(at, values, &times).map_err(|_| MotionError::Endless);
+    let sampled = (of(original.deflection_m())?, of(original.force_n())?);
+    let closing_speed_m_per_s = of(&motion.closing_m_per_s)?;
+    if let Ok(branch) = loading::loading_branch(&original)
+        && branch.dropped > 0
+    {
+        notes.push(format!(
+            "loading branch: {} states removed because the deflection hardly advanced",
+            branch.dropped
+        ));
+    }
+    Ok(FromTable {
+        sampled: Curve::new(times, sampled.0, sampled.1)?,
+        closing_speed_m_per_s,
+        contact_time_s: 0.0,
+        unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
+        audit,
+        original,
+        notes,
+        warnings,
+    })
+}
+
+/// A record over time is extracted as that of an FE run, without a filter.
+fn recorded(
+    table: &Table<'_>,
+    time_s: &[f64],
+    impact: &Impact,
+) -> Result<FromTable, FromTableError> {
+    let recipe = recipe();
+    let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
+    // In the units that were given, so that a mistaken unit is found as in a build.
+    let units = impact.units;
+    let history = |component: &str, values: &[f64], size: f64| History {
+        entity: Some(EntityId::new(1)),
+        component: component.into(),
+        time: time_s.iter().map(|t| t / units.time_s).collect::<Arc<[f64]>>(),
+        values: values.iter().map(|v| v / size).collect(),
+    };
+    let deflection = history("x_displacement", table.deflection_m, units.length_m);
+    let force = history("x_force", table.force_n, units.force());
+    let contact = begins_in_contact(time_s, table.force_n).then(|| {
+        notes.push("contact: the record begins with it".into());
+        StatedContact::Time { s: time_s[0] }
+    });
+    let measured = Measured {
+        units,
+        displacement: &deflection,
+        minus_displacement: None,
+        velocity: None,
+        minus_velocity: None,
+        force: MeasuredForce::Contact(&force),
+        contact: None,
+    };
+    let setup = Setup {
+        recipe: &recipe,
+        kind: impact.speed.kind,
+        half_model: false,
+        masses: impact.masses,
+        manifest_speed_m_per_s: Some(impact.speed.m_per_s),
+        deck_speed: None,
+        stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
+        others: &[],
+    };
+    let extracted = extract::extract(&measured, &setup)?;
+    let mut warnings = extracted.warnings;
+    if let Some(stiffness) = impact.unloading_stiffness_n_per_m {
+        let found = extracted.unloading_stiffness_n_per_m;
+        match found {
+            Some(found) => notes.push(format!(
+                "unloading: {:.4} MN/m as the record has it, {:.4} MN/m is stated",
+                found / 1e6,
+                stiffness / 1e6
+            )),
+            None => warnings.push(
+                "unloading: a record over time keeps its own, which it does not hold; the stated one is not used"
+                    .into(),
+            ),
+        }
+    }
+    notes.extend(extracted.notes);
+    Ok(FromTable {
+        sampled: extracted.sampled,
+        closing_speed_m_per_s: extracted.closing_speed_m_per_s,
+        original: extracted.original,
+        contact_time_s: extracted.contact_time_s,
+        unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
+        audit: extracted.audit,
+        notes,
+        warnings,
+    })
+}
+
+/// Whether the force of a record rises above its threshold within the first interval: what lies
+/// before contact is then not in it, and its deflection counts from contact already.
+fn begins_in_contact(time_s: &[f64], force_n: &[f64]) -> bool {
+    let impulse: f64 = (1..time_s.len())
+        .map(|i| (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
+        .sum();
+    let positive: Vec<f64> = force_n.iter().map(|f| f * impulse.signum()).collect();
+    let threshold_n = contact::threshold_n(&positive);
+    positive.iter().take(2).any(|f| *f > threshold_n)
+}
+
+/// What an extraction needs to know beside the histories.
+fn recipe() -> Recipe {
+    Recipe {
+        deflection: DeflectionSource {
+            file: String::new(),
+            node: 1,
+            minus_node: None,
+            component: DisplacementComponent::XDisplacement,
+        },
+        force: ForceSource::Contact {
+            file: String::new(),
+            id: 1,
+            side: None,
+            component: "x_force".into(),
+        },
+        contact: None,
+        filter: Filter::None,
+        sampling: Sampling::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::unit::SpeedKind;
+
+    fn impact(v: f64, m: f64) -> Impact {
+        Impact {
+            speed: Speed { m_per_s: v, kind: SpeedKind::Wall },
+            masses: Masses { body_kg: m, other_kg: None },
+            unloading_stiffness_n_per_m: None,
+            body_unloading_stiffness_n_per_m: None,
+            units: UnitSystem::SI,
+            accept_energy: false,
+        }
+    }
+
+    /// A mass on a linear spring: d = d_max sin ωt, stopped after a quarter of the period, and
+    /// thrown back with its own speed by the same stiffness.
+    #[test]
+    fn a_linear_spring_gives_a_sine() {
+        let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 40e6);
+        let omega = (k / m).sqrt();
+        let end = v / omega;
+        let d: Vec<f64> = (0..=4).map(|i| end * f64::from(i) / 4.0).collect();
+        let f: Vec<f64> = d.iter().map(|d| k * d).collect();
+        let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
+        let case = from_table(&table, &impact(v, m)).unwrap();
+        assert!((case.audit.ratio() - 1.0).abs() < 1e-12);
+        let stiffness = case.unloading_stiffness_n_per_m.unwrap();
+        assert!((stiffness / k - 1.0).abs() < 1e-9, "{stiffness}");
+        assert_eq!(case.warnings.len(), 1, "the steepest rise stands for the unloading");
+        let half = std::f64::consts::PI / omega;
+        for ((t, d), v_is) in case
+            .sampled
+            .time_s()
+            .iter()
+            .zip(case.sampled.deflection_m())
+            .zip(&case.closing_speed_m_per_s)
+            .filter(|((t, _), _)| **t < half)
+        {
+            assert!((d - end * (omega * t).sin()).abs() < 2e-5 * end, "{d} at {t}");
+            assert!((v_is - v * (omega * t).cos()).abs() < 2e-4 * v, "{v_is} at {t}");
+        }
+        let last = case.closing_speed_m_per_s.last().unwrap();
+        assert!((last + v).abs() < 1e-9 * v, "thrown back at {last}");
+        // Every point of the table is a state.
+        for point in &d {
+            assert!(case.original.deflection_m().contains(point), "{point}");
+        }
+    }
+
+    /// A constant force: v falls linearly with time, in 2 d/v.
+    #[test]
+    fn a_constant_force_stops_in_twice_the_crush_over_the_speed() {
+        let (d, f) = ([0.0, 0.2, 0.4, 0.5], [2.4e6; 4]);
+        let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
+        let mut impact = impact(10.0, 24e3);
+        let error = from_table(&table, &impact).unwrap_err().to_string();
+        assert!(error.contains("never rises, so its unloading stiffness must be given"), "{error}");
+        impact.unloading_stiffness_n_per_m = Some(1e8);
+        let case = from_table(&table, &impact).unwrap();
+        let end = loading::loading_end(&case.original);
+        assert!((case.original.time_s()[end] - 0.1).abs() < 1e-12);
+        assert!((case.unloading_stiffness_n_per_m.unwrap() - 1e8).abs() < 1.0);
+        assert_eq!(case.warnings, [""; 0]);
+    }
+
+    /// An unloading branch of the table is followed; its area is what comes back.
+    #[test]
+    fn an_unloading_branch_tells_the_rebound() {
+        let (d, f) = ([0.0, 0.5, 1.0, 0.99, 0.98], [2.4e6, 2.4e6, 2.4e6, 1.2e6, 0.0]);
+        let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
+        let v = (2.0 * 2.4e6 / 24e3_f64).sqrt();
+        let case = from_table(&table, &impact(v, 24e3)).unwrap();
+        let back = case.closing_speed_m_per_s.last().unwrap();
+        assert!((back + (2.0 * 2.4e4 / 24e3_f64).sqrt()).abs() < 1e-9, "{back}");
+        assert!((case.unloading_stiffness_n_per_m.unwrap() / 1.2e8 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_motion_follows_the_force_of_the_body() {
+        let (d, f) = ([0.0, 0.1, 0.3, 0.5], [0.0, 8e6, 1e6, 3e6]);
+        let body = [0.0, 3e6, 3e6, 3e6];
+        let table =
+            Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: Some(&body) };
+        let case = from_table(&table, &impact(10.0, 24e3)).unwrap();
+        let at = case.original.deflection_m().iter().position(|d| *d == 0.3).unwrap();
+        let work = 0.15e6 + 0.6e6;
+        let expected = 10.0 * (1.0_f64 - work / (work + 0.6e6)).sqrt();
+        let t = case.original.time_s();
+        let rate = (case.original.deflection_m()[at + 1] - case.original.deflection_m()[at - 1])
+            / (t[at + 1] - t[at - 1]);
+        assert!((rate / expected - 1.0).abs() < 1e-2, "{rate} instead of {expected}");
+    }
+
+    #[test]
+    fn what_no_impact_can_be_is_refused() {
+        let (d, f) = ([0.0, 0.2, 0.4, 0.5], [0.0, 1e6, 2e6, 3e6]);
+        let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
+        let error = from_table(&table, &impact(10.0, 24e3)).unwrap_err().to_string();
+        assert!(error.contains("the curve takes up 0.5417 times the kinetic energy"), "{error}");
+        assert!(error.contains("--accept-energy"), "{error}");
+        let accepted = Impact { accept_energy: true, ..impact(10.0, 24e3) };
+        assert!(from_table(&table, &accepted).unwrap().warnings[1].starts_with("accept_energy"));
+        let ends = Table { force_n: &[0.0, 1e6, 2e6, 0.0], ..table };
+        let error = from_table(&ends, &accepted).unwrap_err().to_string();
+        assert!(error.contains("the force at the largest deflection is 0"), "{error}");
+        // A force of next to nothing at the end would take for ever.
+        let crawls = Table { force_n: &[1e6, 1e-9, 1e-9, 1e-9], ..table };
+        let error = from_table(&crawls, &accepted).unwrap_err().to_string();
+        assert!(error.contains("a body hardly moves any more"), "{error}");
+        let soft = Impact { unloading_stiffness_n_per_m: Some(1e6), ..accepted };
+        let error = from_table(&table, &soft).unwrap_err().to_string();
+        assert!(error.contains("1000000 N/m is softer than the line"), "{error}");
+    }
+}

@@ -1,0 +1,285 @@
+//! The motion of a body that a table of force over deflection stops and throws back.
+//!
+//! Speeds follow from the work of the piecewise linear force and are exact at every state. Times
+//! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
+//! stands still.
+
+use super::from_table::{Impact, Table};
+
+/// Why a table tells no motion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The body would stop before.
+    #[error(
+        "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points behind the end of the force, or give the record with its times"
+    )]
+    NoForceAtEnd {
+        /// Where the force ends.
+        from_m: f64,
+    },
+    /// Nothing tells how the body leaves.
+    #[error("the curve never rises, so its unloading stiffness must be given: --unloading 80MN/m")]
+    NeverRises,
+    /// The body would leave beyond zero deflection.
+    #[error(
+        "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which no crash is: give a stiffer one with --unloading"
+    )]
+    TooSoft {
+        /// As stated.
+        stiffness_n_per_m: f64,
+        /// Of that line.
+        least_n_per_m: f64,
+    },
+    /// The force is so small somewhere that the body hardly moves.
+    #[error(
+        "along this curve a body hardly moves any more before it has stopped: remove the points whose force is next to nothing, or give the record with its times"
+    )]
+    Endless,
+}
+
+/// States of a motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Motion {
+    pub time_s: Vec<f64>,
+    pub deflection_m: Vec<f64>,
+    pub force_n: Vec<f64>,
+    /// Rate of the deflection.
+    pub closing_m_per_s: Vec<f64>,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+/// Free motion behind the unloading, in s: the speed of the separation is a mean over 20 ms, and
+/// filters need some time behind it.
+const FREE_S: f64 = 0.040;
+/// States between two samples at the common interval.
+const FINER: f64 = 8.0;
+/// The longest of a slow motion's steps is this share of its time.
+const STEPS: f64 = 20_000.0;
+/// Most states beside the points of the table.
+const MOST_STATES: usize = 200_000;
+/// No step is shorter than this share of its segment, so that a crawl ends.
+const SHORTEST: f64 = 1e-6;
+
+/// The motion of a table under an impact.
+///
+/// # Errors
+/// [`MotionError`] says what of the table tells none.
+pub(super) fn retrace(
+    table: &Table<'_>,
+    impact: &Impact,
+    interval_s: f64,
+) -> Result<Motion, MotionError> {
+    let (d, f) = (table.deflection_m, table.force_n);
+    let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
+    let moving = table.body_force_n.unwrap_or(f);
+    let loading = Path { d: &d[..=end], f: &f[..=end], moving: &moving[..=end] };
+    let work = loading.work();
+    if moving[end] <= 0.0 || f[end] <= 0.0 {
+        let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
+        return Err(MotionError::NoForceAtEnd { from_m: d[last.map_or(0, |i| i + 1)] });
+    }
+    let v0 = impact.speed.m_per_s;
+    let step_s = (interval_s / FINER).max(2.0 * d[end] / v0 / STEPS);
+    let mut march = March { motion: Motion::default(), step_s, mass: 2.0 * work[end] / (v0 * v0) };
+    march.motion.notes.push(
+        "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
+            .into(),
+    );
+    if table.body_force_n.is_some() {
+        march.motion.notes.push("motion: by the work of the body force".into());
+    }
+    march.begin(0.0, f[0], v0);
+    let speeds: Vec<f64> =
+        work.iter().map(|w| v0 * (1.0 - w / work[end]).max(0.0).sqrt()).collect();
+    march.along(&loading, &speeds, 1.0)?;
+    let (d, f, moving) = march.unloading(table, impact, end)?;
+    let unloading = Path { d: &d, f: &f, moving: &moving };
+    let (back, mass) = (unloading.work(), march.mass);
+    let speeds: Vec<f64> = back.iter().map(|w| -(2.0 * -w / mass).max(0.0).sqrt()).collect();
+    march.along(&unloading, &speeds, -1.0)?;
+    if f.last().is_some_and(|f| *f <= 0.0) {
+        march.free()?;
+    } else {
+        march.motion.warnings.push(
+            "unloading: the table ends before its force has fallen to 0; so does the motion".into(),
+        );
+    }
+    Ok(march.motion)
+}
+
+/// Points along which a body moves in one direction: deflection, force, and what moves it.
+struct Path<'a> {
+    d: &'a [f64],
+    f: &'a [f64],
+    moving: &'a [f64],
+}
+
+impl Path<'_> {
+    /// Work of the moving force from the first point to each, in J; below 0 where it falls.
+    fn work(&self) -> Vec<f64> {
+        let mut work = vec![0.0];
+        for i in 1..self.d.len() {
+            let mean = 0.5 * (self.moving[i - 1] + self.moving[i]);
+            work.push(work[i - 1] + mean * (self.d[i] - self.d[i - 1]));
+        }
+        work
+    }
+}
+
+/// Three columns of an unloading branch: deflection, force, and what moves the body.
+type Branch = (Vec<f64>, Vec<f64>, Vec<f64>);
+
+/// A motion that is being made.
+struct March {
+    motion: Motion,
+    step_s: f64,
+    /// The mass whose kinetic energy is the table's work: that of the impact if both agree.
+    mass: f64,
+}
+
+impl March {
+    fn begin(&mut self, d: f64, f: f64, v: f64) {
+        self.motion.time_s.push(0.0);
+        self.push_columns(d, f, v);
+    }
+
+    fn push_columns(&mut self, d: f64, f: f64, v: f64) {
+        self.motion.deflection_m.push(d);
+        self.motion.force_n.push(f);
+        self.motion.closing_m_per_s.push(v);
+    }
+
+    /// Adds a state behind the last; an error if the body does not get there.
+    fn push(&mut self, d: f64, f: f64, v: f64) -> Result<(), MotionError> {
+        let last = self.motion.time_s.len() - 1;
+        let way = (d - self.motion.deflection_m[last]).abs();
+        let sum = (v + self.motion.closing_m_per_s[last]).abs();
+        let time_s = self.motion.time_s[last] + 2.0 * way / sum;
+        // A step of no time would be no state, and one of endless time none either.
+        if !(time_s.is_finite() && time_s > self.motion.time_s[last]) {
+            return Err(MotionError::Endless);
+        }
+        self.motion.time_s.push(time_s);
+        self.push_columns(d, f, v);
+        Ok(())
+    }
+
+    /// Follows a path whose points are passed at `speeds`; `direction` is 1 where the deflection
+    /// grows.
+    fn along(
+        &mut self,
+        path: &Path<'_>,
+        speeds: &[f64],
+        direction: f64,
+    ) -> Result<(), MotionError> {
+        let most = self.motion.time_s.len() + path.d.len() + MOST_STATES;
+        for i in 1..path.d.len() {
+            let length = (path.d[i] - path.d[i - 1]).abs();
+            let between =
+                |values: &[f64], s: f64| values[i - 1] + (values[i] - values[i - 1]) * (s / length);
+            let mut s = 0.0;
+            loop {
+                let v = self.motion.closing_m_per_s[self.motion.time_s.len() - 1].abs();
+                let a = -direction * between(path.moving, s) / self.mass;
+                let step = v * self.step_s + 0.5 * a * self.step_s * self.step_s;
+                let step = step.max(SHORTEST * length);
+                // The last steps share what is left, and a body that would stop goes to the end.
+                if s + 1.25 * step >= length || v + a * self.step_s <= 0.0 {
+                    break;
+                }
+                s += step;
+                let moving = 0.5 * (path.moving[i - 1] + between(path.moving, s));
+                let square = speeds[i - 1].powi(2) - direction * 2.0 * moving * s / self.mass;
+                let d = path.d[i - 1] + direction * s;
+                self.push(d, between(path.f, s), direction * square.max(0.0).sqrt())?;
+                if self.motion.time_s.len() > most {
+                    return Err(MotionError::Endless);
+                }
+            }
+            self.push(path.d[i], path.f[i], speeds[i])?;
+        }
+        Ok(())
+    }
+
+    /// The unloading branch from the largest deflection: the table's own, else a line.
+    fn unloading(
+        &mut self,
+        table: &Table<'_>,
+        impact: &Impact,
+        end: usize,
+    ) -> Result<Branch, MotionError> {
+        let (d, f) = (table.deflection_m, table.force_n);
+        let stated = impact.unloading_stiffness_n_per_m;
+        if end + 1 < d.len() {
+            let stated = stated.map_or("", |_| "; the stated stiffness is not used");
+            self.motion.notes.push(format!("unloading: the table's own branch{stated}"));
+            let moving = table.body_force_n.unwrap_or(f);
+            return Ok((d[end..].to_vec(), f[end..].to_vec(), moving[end..].to_vec()));
+        }
+        let stiffness = match stated {
+            Some(stiffness) => {
+                self.motion.notes.push(format!(
+                    "unloading: a line of {:.4} MN/m from the largest deflection",
+                    stiffness / 1e6
+                ));
+                stiffness
+            }
+            None => {
+                let steepest = steepest_rise(d, f);
+                if steepest <= 0.0 {
+                    return Err(MotionError::NeverRises);
+                }
+                self.motion.warnings.push(format!(
+                    "unloading: neither file nor --unloading tell it; the steepest rise stands for it, {:.4} MN/m: say --unloading …MN/m",
+                    steepest / 1e6
+                ));
+                steepest
+            }
+        };
+        let moving = table.body_force_n.unwrap_or(f)[end];
+        let (d, f) = (d[end], f[end]);
+        let body = impact.body_unloading_stiffness_n_per_m.filter(|_| table.body_force_n.is_some());
+        let body = body.unwrap_or(stiffness * moving / f);
+        let (ends, moving_ends) = (f / stiffness, moving / body);
+        if ends.max(moving_ends) > d * (1.0 + 1e-9) {
+            let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
+            return Err(MotionError::TooSoft { stiffness_n_per_m, least_n_per_m });
+        }
+        let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];
+        // Two ends a rounding error apart are one.
+        way.dedup_by(|b, a| (*b - *a).abs() <= 1e-9 * d);
+        let falls = |top: f64, end: f64| {
+            way.iter().map(|x| (top * (1.0 - x / end)).max(0.0)).collect::<Vec<f64>>()
+        };
+        let mut branch = (
+            way.iter().map(|x| d - x).collect::<Vec<_>>(),
+            falls(f, ends),
+            falls(moving, moving_ends),
+        );
+        // Behind both ends there is no force, whatever rounding leaves of it.
+        if let (Some(f), Some(moving)) = (branch.1.last_mut(), branch.2.last_mut()) {
+            (*f, *moving) = (0.0, 0.0);
+        }
+        Ok(branch)
+    }
+
+    /// Free motion at the last speed.
+    fn free(&mut self) -> Result<(), MotionError> {
+        let last = self.motion.time_s.len() - 1;
+        let (d, v) = (self.motion.deflection_m[last], self.motion.closing_m_per_s[last]);
+        let begin_s = self.motion.time_s[last];
+        let steps = (FREE_S / self.step_s).ceil().max(2.0) as usize;
+        for k in 1..=steps {
+            let after_s = k as f64 * self.step_s;
+            self.motion.time_s.push(begin_s + after_s);
+            self.push_columns(d + v * after_s, 0.0, v);
+        }
+        Ok(())
+    }
+}
+
+/// Steepest rise of the loading branch, in N/m.
+fn steepest_rise(d: &[f64], f: &[f64]) -> f64 {
+    (1..d.len()).map(|i| (f[i] - f[i - 1]) / (d[i] - d[i - 1])).fold(0.0, f64::max)
+}

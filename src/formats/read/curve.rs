@@ -1,0 +1,181 @@
+//! A curve as its file has it, in SI, with what the file says of it.
+
+use std::path::{Path, PathBuf};
+
+use super::error::{ContentError, Place, ReadCurveError, shown};
+use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind};
+use crate::unit::{SpeedKind, UnitSystem};
+
+/// A curve read from a file: the loading branch, behind it the unloading branch if the file has
+/// one; or a record over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadCurve {
+    /// In m; without times increasing from 0 to the largest, then falling.
+    pub deflection_m: Vec<f64>,
+    /// In N, one per deflection; without times positive in compression.
+    pub force_n: Vec<f64>,
+    /// In s, one per deflection, if the file has them.
+    pub time_s: Option<Vec<f64>>,
+    /// In N, one per deflection: the force that moves the body, where the file has it beside the
+    /// one that the obstacle feels.
+    pub body_force_n: Option<Vec<f64>>,
+    /// What the file says of the curve.
+    pub facts: Facts,
+    /// Title of the curve in the file.
+    pub title: Option<String>,
+    /// Units of the file, if they are one system.
+    pub units: Option<UnitSystem>,
+    /// What was taken how.
+    pub notes: Vec<String>,
+    /// The files that were read.
+    pub files: Vec<ReadFile>,
+}
+
+/// A file as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadFile {
+    /// As it was given, or found from what was.
+    pub path: PathBuf,
+    /// Bytes that were read.
+    pub size_bytes: u64,
+    /// Their hash, in hexadecimal.
+    pub blake3: String,
+}
+
+impl ReadFile {
+    pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
+        Self {
+            path: path.into(),
+            size_bytes: bytes.len() as u64,
+            blake3: blake3::hash(bytes).to_hex().to_string(),
+        }
+    }
+}
+
+/// What a file says of its curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Facts {
+    /// Which force it is.
+    pub force: Option<ForceKind>,
+    /// Impact speed in m/s.
+    pub speed_m_per_s: Option<f64>,
+    /// What the speed is measured against.
+    pub speed_kind: Option<SpeedKind>,
+    /// From the largest deflection, in N/m.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// The same of the force that moves the body, where that is another.
+    pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Mass of the body in kg.
+    pub mass_kg: Option<f64>,
+    /// Mass of the other body in kg.
+    pub other_mass_kg: Option<f64>,
+    /// Largest crush in m; points behind it are what other tools need beyond it.
+    pub max_deflection_m: Option<f64>,
+}
+
+impl Facts {
+    /// Takes what a comment `key: value` says; other comments say nothing. `mark` is the
+    /// comment's, for messages.
+    ///
+    /// # Errors
+    /// [`ContentError::Fact`] if the key is known and the value is none of its.
+    pub(super) fn take(
+        &mut self,
+        mark: &str,
+        comment: &str,
+        place: Place,
+    ) -> Result<(), ContentError> {
+        let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
+        let (key, value) = (key.trim(), value.trim());
+        let wrong = |expected| ContentError::Fact {
+            place: place.clone(),
+            key: format!("{mark} {key}"),
+            found: shown(value),
+            expected,
+        };
+        let above_zero = || {
+            let number = value.parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
+            number.map(Some).ok_or_else(|| wrong("a number above 0"))
+        };
+        match key {
+            "unloading_stiffness_N_per_m" => self.unloading_stiffness_n_per_m = above_zero()?,
+            "speed_m_per_s" => self.speed_m_per_s = above_zero()?,
+            "mass_kg" => self.mass_kg = above_zero()?,
+            "other_mass_kg" => self.other_mass_kg = above_zero()?,
+            "max_deflection_m" => self.max_deflection_m = above_zero()?,
+            "force_kind" => {
+                let kind = ForceKind::parse(value);
+                self.force = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);
+            }
+            "speed_kind" => {
+                let kind = SpeedKind::parse(value);
+                self.speed_kind = Some(kind.ok_or_else(|| wrong("\"wall\" or \"closing\""))?);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A loading branch with what drives need to know of it.
+    pub(super) fn driving(&self, loading: Envelope) -> DrivingCurve {
+        DrivingCurve {
+            unloading: CurveUnloading::of(self.unloading_stiffness_n_per_m),
+            force: self.force,
+            speed_kind: self.speed_kind,
+            speed_m_per_s: self.speed_m_per_s,
+            ..DrivingCurve::bare(loading)
+        }
+    }
+}
+
+/// Characters of a title that are kept.
+const TITLE: usize = 200;
+
+/// A title, cut to what a list can show; `None` if it is empty.
+pub(super) fn title(text: &str, notes: &mut Vec<String>) -> Option<String> {
+    let text: String = text.trim().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let kept: String = text.chars().take(TITLE).collect();
+    if kept.len() < text.len() {
+        notes.push(format!("title: cut to its first {TITLE} characters"));
+    }
+    (!kept.is_empty()).then_some(kept)
+}
+
+/// The system that a comment such as `units of the points: mm-t-s (…)` names.
+pub(super) fn stated_units(comment: &str) -> Option<UnitSystem> {
+    let (key, value) = comment.split_once(':')?;
+    if !key.trim().to_ascii_lowercase().starts_with("units") {
+        return None;
+    }
+    UnitSystem::parse(value.split_whitespace().next()?).ok()
+}
+
+/// The units of a file without columns that name them: those of its own comment, else those that
+/// were given; which it is goes to the notes.
+pub(super) fn units(
+    stated: Option<(UnitSystem, u64)>,
+    given: Option<UnitSystem>,
+    remedy: &'static str,
+    notes: &mut Vec<String>,
+) -> Result<UnitSystem, ContentError> {
+    match (stated, given) {
+        (Some((units, line)), None) => {
+            notes.push(format!("units: {units} by line {line} of the file"));
+            Ok(units)
+        }
+        (Some((stated, line)), Some(given)) if stated != given => {
+            notes.push(format!("units: {given} as given; line {line} of the file says {stated}"));
+            Ok(given)
+        }
+        (_, Some(given)) => {
+            notes.push(format!("units: {given} as given"));
+            Ok(given)
+        }
+        (None, None) => Err(ContentError::NoUnits { remedy }),
+    }
+}
+
+/// An error of content, of the file at `path`.
+pub(super) fn content(path: &Path) -> impl Fn(ContentError) -> ReadCurveError {
+    move |source| ReadCurveError::Content { path: path.into(), source }
+}

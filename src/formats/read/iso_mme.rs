@@ -1,0 +1,351 @@
+//! Curve of an ISO-MME test (ISO/TS 13499): a channel of displacement and one of force over time.
+//!
+//! A channel file has lines `name :value`, then one value a line. Characters 13 and 14 of its
+//! channel code are the dimension: `DS` for displacement, `FO` for force. With the implicit
+//! reference channel, times are the time of the first sample and multiples of the interval, in s.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::columns::{Columns, MAX_POINTS, Places};
+use super::curve::{Facts, ReadFile, title};
+use super::error::{ContentError, Place, shown};
+use super::label::Quantity;
+use super::text::{lines, number};
+use super::{Input, MAX_CURVE_BYTES};
+use crate::file;
+use crate::signal::resample::interpolate;
+
+/// Files of a folder that are looked at: a test has some hundred channels.
+const MOST_FILES: usize = 1_000;
+
+/// Whether a folder holds a test.
+pub(super) fn is_test(folder: &Path) -> bool {
+    names(folder).is_ok_and(|names| names.iter().any(|path| has_extension(path, "mme")))
+}
+
+pub(super) fn recognise(input: &Input<'_>) -> bool {
+    let is_header = |line: &str| line.to_ascii_lowercase().starts_with("channel code");
+    input.path.is_dir()
+        || has_extension(input.path, "mme")
+        || lines(input.beginning()).any(|(_, line)| is_header(&line))
+}
+
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+    let mut columns = Columns::at(Places::Rows);
+    test_facts(input, &mut columns)?;
+    let (mut found, mut bytes_left) = (Vec::new(), MAX_CURVE_BYTES);
+    for path in channel_files(input.path)? {
+        let named = |source: ContentError| ContentError::Beside {
+            file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            source: Box::new(source),
+        };
+        let bytes = file::read(&path, bytes_left).map_err(|e| named(e.into()))?;
+        bytes_left -= bytes.len() as u64;
+        if let Some(channel) = Channel::read(&path, &bytes).map_err(named)? {
+            found.push(channel);
+        }
+    }
+    let (deflection, force) = choose(found, input.options.curve.as_deref())?;
+    for channel in [&deflection, &force] {
+        let (code, what) = (&channel.code, channel.quantity.name());
+        columns.notes.push(format!("{what}: channel {code} in {}", channel.unit));
+        if channel.file.path != input.path {
+            columns.files.push(channel.file.clone());
+        }
+    }
+    columns.facts = merged(columns.facts, &[deflection.facts, force.facts]);
+    columns.title = title(&force.name, &mut columns.notes);
+    let at_s = force.times();
+    if deflection.times() == at_s {
+        columns.deflection_m = deflection.values;
+        columns.force_n = force.values;
+        columns.time_s = Some(at_s);
+        columns.places = Places::Lines(force.lines);
+        return Ok(columns);
+    }
+    let (from_s, motion_s) = (deflection.first_s, deflection.times());
+    let to_s = motion_s.last().copied().unwrap_or(from_s);
+    let common: Vec<usize> =
+        (0..at_s.len()).filter(|&i| (from_s..=to_s).contains(&at_s[i])).collect();
+    let time_s: Vec<f64> = common.iter().map(|&i| at_s[i]).collect();
+    if motion_s.len() > 1 && !time_s.is_empty() {
+        columns.deflection_m =
+            interpolate(&motion_s, &deflection.values, &time_s).map_err(|e| {
+                ContentError::NoCurve { expected: "common times", found: e.to_string() }
+            })?;
+    }
+    columns.notes.push(format!(
+        "times: the channels differ in them; the displacement was interpolated to {} of the force's",
+        time_s.len()
+    ));
+    columns.force_n = common.iter().map(|&i| force.values[i]).collect();
+    columns.places = Places::Lines(common.iter().map(|&i| force.lines[i]).collect());
+    columns.deflection_m.truncate(time_s.len());
+    columns.time_s = Some(time_s);
+    Ok(columns)
+}
+
+/// Takes what the test's `.mme` file says: of the folder, or the one that was given.
+fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), ContentError> {
+    if !input.path.is_dir() {
+        described(input.bytes, &mut columns.facts);
+        return comments(input.bytes, &mut columns.facts);
+    }
+    let Some(path) = names(input.path)?.into_iter().find(|p| has_extension(p, "mme")) else {
+        return Ok(());
+    };
+    let bytes = file::read(&path, MAX_CURVE_BYTES)?;
+    columns.files.push(ReadFile::of(&path, &bytes));
+    described(&bytes, &mut columns.facts);
+    comments(&bytes, &mut columns.facts)
+}
+
+/// Takes masses (kg) and velocities (m/s) of the test objects.
+fn described(bytes: &[u8], facts: &mut Facts) {
+    let header = Header::read(bytes);
+    let of = |what: &str, k: usize| {
+        let text = |key: String| number(header.text(&key));
+        text(format!("{what} test object {k}"))
+            .or_else(|| text(format!("{what} of test object {k}")))
+    };
+    facts.mass_kg = of("mass", 1).filter(|m| *m > 0.0);
+    facts.other_mass_kg = of("mass", 2).filter(|m| *m > 0.0);
+    let closing = of("velocity", 1).map(|v| (v - of("velocity", 2).unwrap_or(0.0)).abs());
+    facts.speed_m_per_s = closing.filter(|v| *v > 0.0);
+}
+
+/// What the first that says anything says.
+fn merged(first: Facts, others: &[Facts]) -> Facts {
+    others.iter().fold(first, |a, b| Facts {
+        force: a.force.or(b.force),
+        speed_m_per_s: a.speed_m_per_s.or(b.speed_m_per_s),
+        speed_kind: a.speed_kind.or(b.speed_kind),
+        mass_kg: a.mass_kg.or(b.mass_kg),
+        other_mass_kg: a.other_mass_kg.or(b.other_mass_kg),
+        ..a
+    })
+}
+
+/// Takes the facts of lines `Comments :key: value`.
+fn comments(bytes: &[u8], facts: &mut Facts) -> Result<(), ContentError> {
+    for (at, line) in lines(bytes) {
+        if let Some((key, value)) = line.split_once(':')
+            && key.trim().eq_ignore_ascii_case("comments")
+        {
+            facts.take("Comments :", value, Place::Line(at))?;
+        }
+    }
+    Ok(())
+}
+
+fn has_extension(path: &Path, wanted: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
+}
+
+/// What stands in a folder, in order.
+fn names(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?.filter_map(Result::ok).take(MOST_FILES);
+    let mut names: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    names.sort();
+    Ok(names)
+}
+
+/// The channel files of a test: of its folder, of its `.mme` file, or beside one of them.
+fn channel_files(path: &Path) -> Result<Vec<PathBuf>, ContentError> {
+    let is_channel = |p: &Path| {
+        let digits = |e: &std::ffi::OsStr| e.to_string_lossy().bytes().all(|b| b.is_ascii_digit());
+        p.extension().is_some_and(digits) && p.is_file()
+    };
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let is_folder = path.is_dir();
+    if !is_folder && !has_extension(path, "mme") {
+        let same = |p: &PathBuf| p.file_stem() == path.file_stem() && is_channel(p);
+        // What was named is a channel whatever it is called.
+        let mut beside: Vec<PathBuf> = names(parent)?.into_iter().filter(same).collect();
+        if !beside.iter().any(|p| p.file_name() == path.file_name()) {
+            beside.push(path.into());
+        }
+        let own = beside.iter_mut().find(|p| p.file_name() == path.file_name());
+        own.into_iter().for_each(|own| *own = path.into());
+        return Ok(beside);
+    }
+    let folder = if is_folder { path } else { parent };
+    let is_named = |p: &PathBuf| {
+        p.is_dir() && p.file_name().is_some_and(|n| n.eq_ignore_ascii_case("channel"))
+    };
+    let within = names(folder)?.into_iter().find(is_named);
+    let all = names(within.as_deref().unwrap_or(folder))?;
+    Ok(all.into_iter().filter(|p| is_channel(p)).collect())
+}
+
+/// A channel of displacement or force, in SI.
+struct Channel {
+    code: String,
+    name: String,
+    quantity: Quantity,
+    unit: String,
+    first_s: f64,
+    interval_s: f64,
+    values: Vec<f64>,
+    lines: Vec<u64>,
+    facts: Facts,
+    file: ReadFile,
+}
+
+impl Channel {
+    fn times(&self) -> Vec<f64> {
+        (0..self.values.len()).map(|i| self.first_s + i as f64 * self.interval_s).collect()
+    }
+
+    /// The channel of a file; `None` if it is of another dimension.
+    fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ContentError> {
+        let header = Header::read(bytes);
+        let code = header.text("channel code");
+        let quantity = match code.get(12..14) {
+            Some("DS") => Quantity::Deflection,
+            Some("FO") => Quantity::Force,
+            _ => return Ok(None),
+        };
+        let (line, unit) = header.entry("unit");
+        let size = quantity.dimension().size_of(unit).ok_or_else(|| ContentError::UnknownUnit {
+            place: Place::Line(line),
+            what: quantity.name(),
+            unit: shown(unit),
+            known: quantity.dimension().known_units(),
+        })?;
+        let (line, reference) = header.entry("reference channel");
+        if !reference.eq_ignore_ascii_case("implicit") {
+            return Err(ContentError::Expected {
+                place: Place::Line(line),
+                expected: "\"Reference channel :implicit\" (times by an interval)".into(),
+                found: shown(reference),
+            });
+        }
+        let first_s = header.number("time of first sample")?;
+        let interval_s = header.number("sampling interval")?;
+        if interval_s <= 0.0 {
+            let (line, found) = header.entry("sampling interval");
+            let expected = "an interval above 0 in s".into();
+            let place = Place::Line(line);
+            return Err(ContentError::Expected { place, expected, found: shown(found) });
+        }
+        let (values, lines) = header.values(bytes, size)?;
+        let mut facts = Facts::default();
+        comments(bytes, &mut facts)?;
+        Ok(Some(Self {
+            code: code.into(),
+            name: header.text("name of the channel").into(),
+            quantity,
+            unit: unit.into(),
+            first_s,
+            interval_s,
+            values,
+            lines,
+            facts,
+            file: ReadFile::of(path, bytes),
+        }))
+    }
+}
+
+/// The lines `name :value` of a channel file.
+struct Header {
+    /// Line, name in lower case, value.
+    entries: Vec<(u64, String, String)>,
+}
+
+/// Lines of a header: a few dozen.
+const HEADER_LINES: usize = 1_000;
+
+impl Header {
+    fn read(bytes: &[u8]) -> Self {
+        let entries = lines(bytes).take(HEADER_LINES).filter_map(|(at, line)| {
+            let (name, value) = line.split_once(':')?;
+            Some((at, name.trim().to_ascii_lowercase(), value.trim().to_string()))
+        });
+        Self { entries: entries.collect() }
+    }
+
+    /// Line and value of an entry; line 1 and nothing if there is none.
+    fn entry(&self, name: &str) -> (u64, &str) {
+        let found = self.entries.iter().find(|(_, n, _)| n == name);
+        found.map_or((1, ""), |(line, _, value)| (*line, value))
+    }
+
+    fn text(&self, name: &str) -> &str {
+        self.entry(name).1
+    }
+
+    fn number(&self, name: &str) -> Result<f64, ContentError> {
+        let (line, text) = self.entry(name);
+        number(text).ok_or_else(|| ContentError::Expected {
+            place: Place::Line(line),
+            expected: format!("\"{name} :\" with a number"),
+            found: shown(text),
+        })
+    }
+
+    /// The values, in SI, and their lines.
+    fn values(&self, bytes: &[u8], size: f64) -> Result<(Vec<f64>, Vec<u64>), ContentError> {
+        let (mut values, mut at) = (Vec::new(), Vec::new());
+        for (line, text) in lines(bytes).filter(|(_, t)| !t.contains(':') && !t.trim().is_empty()) {
+            let value = number(&text).ok_or_else(|| {
+                let place = Place::Line(line);
+                ContentError::Number { place, found: shown(&text) }
+            })?;
+            values.push(value * size);
+            at.push(line);
+            if values.len() > MAX_POINTS {
+                return Err(ContentError::TooMany { most: MAX_POINTS });
+            }
+        }
+        let (line, declared) = self.entry("number of samples");
+        match declared.parse::<usize>() {
+            Ok(count) if count == values.len() => Ok((values, at)),
+            _ => Err(ContentError::Declared {
+                place: Place::Line(line),
+                what: "number of samples".into(),
+                declared: shown(declared),
+                found: format!("{} values", values.len()),
+                remedy: "write the file anew, it may be cut",
+            }),
+        }
+    }
+}
+
+/// The channels of the codes that were asked for, or the only ones.
+fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel), ContentError> {
+    let codes = |quantity: Quantity, from: &[Channel]| {
+        let of = from.iter().filter(|c| c.quantity == quantity);
+        let codes: Vec<String> = of.map(|c| c.code.clone()).take(20).collect();
+        if codes.is_empty() { "none".into() } else { codes.join(", ") }
+    };
+    let known = format!(
+        "displacement {}; force {} (both codes, with a comma between)",
+        codes(Quantity::Deflection, &found),
+        codes(Quantity::Force, &found)
+    );
+    let is_asked = |channel: &Channel| {
+        asked.is_none_or(|asked| asked.split(',').any(|code| code.trim() == channel.code))
+    };
+    let (deflections, forces): (Vec<Channel>, Vec<Channel>) = found
+        .into_iter()
+        .filter(is_asked)
+        .partition(|channel| channel.quantity == Quantity::Deflection);
+    let (mut deflections, mut forces) = (deflections.into_iter(), forces.into_iter());
+    match (
+        deflections.next(),
+        forces.next(),
+        deflections.next().is_some() || forces.next().is_some(),
+    ) {
+        (Some(deflection), Some(force), false) => Ok((deflection, force)),
+        (Some(_), Some(_), true) => Err(ContentError::WhichCurve { known }),
+        _ => match asked {
+            Some(asked) => Err(ContentError::NoSuchCurve { asked: shown(asked), known }),
+            None => Err(ContentError::NoCurve {
+                expected: "a channel of displacement (code …DS…) and one of force (…FO…)",
+                found: known,
+            }),
+        },
+    }
+}

@@ -1,0 +1,118 @@
+//! Curve of a JSON file made by `crumple predict`: the master format of exports.
+
+use std::path::{Path, PathBuf};
+
+use super::curve::{Facts, ReadCurve, title};
+use super::error::{ContentError, ReadCurveError};
+use super::{Input, MIN_POINTS, curve};
+use crate::curve::{ForceKind, Parameter};
+use crate::dataset::OTHER_MASS;
+use crate::file;
+use crate::formats::MAX_CURVE_BYTES;
+use crate::surrogate::PredictedCurve;
+use crate::surrogate::predict::PredictError;
+use crate::unit::UnitSystem;
+
+/// Why a file is no predicted curve.
+#[derive(Debug, thiserror::Error)]
+pub enum CurveFileError {
+    /// It cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no such JSON.
+    #[error(
+        "{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict"
+    )]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit, with line and column.
+        source: serde_json::Error,
+    },
+    /// It breaks a promise of predicted curves.
+    #[error("{path}: {source}")]
+    Curve {
+        /// The file.
+        path: PathBuf,
+        /// Which promise.
+        source: PredictError,
+    },
+}
+
+/// Reads a predicted curve and checks its promises.
+///
+/// # Errors
+/// [`CurveFileError`] with line and column, or with the promise that is broken.
+pub fn predicted(path: &Path) -> Result<PredictedCurve, CurveFileError> {
+    let bytes = file::read(path, MAX_CURVE_BYTES)
+        .map_err(|source| CurveFileError::Io { path: path.into(), source })?;
+    parse(path, &bytes)
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, CurveFileError> {
+    let curve: PredictedCurve = serde_json::from_slice(bytes)
+        .map_err(|source| CurveFileError::Json { path: path.into(), source })?;
+    curve.envelope().map_err(|source| CurveFileError::Curve { path: path.into(), source })?;
+    Ok(curve)
+}
+
+/// Whether the first byte that is no blank opens an object.
+pub(super) fn recognise(input: &Input<'_>) -> bool {
+    let text = input.bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(input.bytes);
+    text.trim_ascii_start().starts_with(b"{")
+}
+
+/// The declared force, with the body's beside it where the file has both; or the force that was
+/// asked for, alone.
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, ReadCurveError> {
+    let damaged = |source| CurveFileError::Curve { path: input.path.into(), source };
+    let mut curve = parse(input.path, input.bytes)?;
+    let both = curve.body_force_n.is_some();
+    let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
+    if let Some(asked) = input.options.force {
+        curve = curve.of_force(asked).map_err(damaged)?;
+    }
+    let points = curve.deflection_m.len();
+    if points < MIN_POINTS {
+        let few = ContentError::TooFew { points, of: "", least: MIN_POINTS };
+        return Err(curve::content(input.path)(few));
+    }
+    if both {
+        notes.push(match curve.body_force_n {
+            Some(_) => "force: the contact force, and the body force for the motion".into(),
+            None => "force: the one that was asked for; the file has another beside it".into(),
+        });
+    }
+    // The body's force along the deflection is what tells the motion; a contact force alone is
+    // the best there is.
+    let has_contact = curve.provenance.force_kind == ForceKind::Contact;
+    let other_mass_kg = match curve.provenance.parameters.get(OTHER_MASS) {
+        Some(Parameter::Number(mass)) => Some(*mass),
+        _ => None,
+    };
+    let facts = Facts {
+        force: Some(curve.provenance.force_kind),
+        speed_m_per_s: Some(curve.speed_m_per_s),
+        speed_kind: Some(curve.speed_kind),
+        unloading_stiffness_n_per_m: Some(curve.unloading_stiffness_n_per_m),
+        body_unloading_stiffness_n_per_m: curve.body_unloading_stiffness_n_per_m,
+        mass_kg: Some(curve.mass_kg),
+        other_mass_kg,
+        max_deflection_m: None,
+    };
+    Ok(ReadCurve {
+        title: title(&format!("{}, {}", curve.provenance.group, curve.model), &mut notes),
+        deflection_m: curve.deflection_m,
+        force_n: curve.force_n,
+        body_force_n: curve.body_force_n.filter(|_| has_contact),
+        facts,
+        units: Some(UnitSystem::SI),
+        notes,
+        ..ReadCurve::default()
+    })
+}

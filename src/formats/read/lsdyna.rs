@@ -1,0 +1,292 @@
+//! Curve of an LS-DYNA deck: `*DEFINE_CURVE`, with a title or without.
+//!
+//! Card 1 has eight fields of 10 columns (20 in the long format, `*DEFINE_CURVE+` or `LONG=Y`):
+//! LCID, SIDR, SFA, SFO, OFFA, OFFO, DATTYP, LCINT; points have two fields of 20. Lines with a
+//! comma are free format. A value is `SFA (abscissa + OFFA)`, likewise the ordinate; a scale factor
+//! of 0 means 1. Lines that begin with `$` are comments, also where a title should stand.
+
+use super::Input;
+use super::columns::{Columns, MAX_POINTS, Places};
+use super::curve::{stated_units, title, units};
+use super::error::{ContentError, Place, shown};
+use super::text::{lines, number};
+
+const REMEDY: &str = " (or in a comment of the file: \"$ units: mm-t-s\")";
+
+pub(super) fn recognise(input: &Input<'_>) -> bool {
+    lines(input.beginning()).any(|(_, line)| {
+        let line = line.to_ascii_uppercase();
+        line.starts_with("*KEYWORD") || line.starts_with("*DEFINE_CURVE")
+    })
+}
+
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+    let mut deck = Deck::read(input.bytes)?;
+    let found = deck.choose(input.options.curve.as_deref())?;
+    let Found { id, title: found, scale, points, lines, facts, units: stated } = found;
+    let mut notes = vec![format!("curve: {id} of the deck")];
+    let system = units(stated, input.options.units, REMEDY, &mut notes)?;
+    if scale != Scale::default() {
+        notes.push(format!(
+            "scale: abscissas times {} after {} is added, ordinates times {} after {}",
+            scale.sfa, scale.offa, scale.sfo, scale.offo
+        ));
+    }
+    let (length, force) = (system.length_m, system.force());
+    Ok(Columns {
+        deflection_m: points.iter().map(|(a, _)| scale.sfa * (a + scale.offa) * length).collect(),
+        force_n: points.iter().map(|(_, o)| scale.sfo * (o + scale.offo) * force).collect(),
+        facts,
+        title: title(&found, &mut notes),
+        units: Some(system),
+        notes,
+        ..Columns::at(Places::Lines(lines))
+    })
+}
+
+/// Curves that a message lists.
+const LISTED: usize = 20;
+
+/// Factors and offsets of card 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Scale {
+    sfa: f64,
+    sfo: f64,
+    offa: f64,
+    offo: f64,
+}
+
+impl Default for Scale {
+    fn default() -> Self {
+        Self { sfa: 1.0, sfo: 1.0, offa: 0.0, offo: 0.0 }
+    }
+}
+
+/// A curve of the deck, as it is written.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    id: u64,
+    title: String,
+    scale: Scale,
+    points: Vec<(f64, f64)>,
+    lines: Vec<u64>,
+    /// What the comments in front of its points say.
+    facts: super::Facts,
+    units: Option<(crate::unit::UnitSystem, u64)>,
+}
+
+/// What the next line of a curve is.
+#[derive(Clone, Copy, PartialEq)]
+enum Next {
+    /// Nothing of a curve.
+    Other,
+    Title,
+    Card,
+    Point,
+}
+
+/// The curves of a deck, and what its comments say.
+#[derive(Default)]
+struct Deck {
+    curves: Vec<Found>,
+    facts: super::Facts,
+    units: Option<(crate::unit::UnitSystem, u64)>,
+    /// The last comment between a keyword and its first card: it may have been meant as a title.
+    comment_line: Option<u64>,
+    is_long: bool,
+}
+
+impl Deck {
+    fn read(bytes: &[u8]) -> Result<Self, ContentError> {
+        let mut deck = Self::default();
+        let (mut next, mut is_long) = (Next::Other, false);
+        for (number, line) in lines(bytes) {
+            if let Some(comment) = line.strip_prefix('$') {
+                deck.comment(comment, number)?;
+                if next != Next::Point {
+                    deck.comment_line = Some(number);
+                }
+                continue;
+            }
+            if line.starts_with('*') {
+                (next, is_long) = deck.keyword(&line);
+                continue;
+            }
+            next = match next {
+                Next::Other => Next::Other,
+                Next::Title => {
+                    deck.curves.push(Found { title: line.trim().into(), ..Found::default() });
+                    Next::Card
+                }
+                Next::Card => {
+                    deck.card(&line, number, if is_long { 20 } else { 10 })?;
+                    Next::Point
+                }
+                Next::Point => {
+                    deck.point(&line, number)?;
+                    Next::Point
+                }
+            };
+        }
+        // A curve whose card never came has no number.
+        deck.curves.retain(|curve| curve.id > 0);
+        Ok(deck)
+    }
+
+    fn comment(&mut self, comment: &str, line: u64) -> Result<(), ContentError> {
+        let comment = comment.trim_start_matches(['$', '#']);
+        if let Some(units) = stated_units(comment) {
+            self.units = Some((units, line));
+        }
+        self.facts.take("$", comment, Place::Line(line))
+    }
+
+    /// What follows a keyword, and whether its cards are long.
+    fn keyword(&mut self, line: &str) -> (Next, bool) {
+        self.comment_line = None;
+        let line = line.trim_end().to_ascii_uppercase();
+        if line.starts_with("*KEYWORD") {
+            self.is_long = line.contains("LONG=Y");
+        }
+        let (name, is_long) = match line.strip_suffix('+') {
+            Some(name) => (name.trim_end(), true),
+            None => (line.as_str(), self.is_long),
+        };
+        match name {
+            "*DEFINE_CURVE" => {
+                self.curves.push(Found::default());
+                (Next::Card, is_long)
+            }
+            "*DEFINE_CURVE_TITLE" => (Next::Title, is_long),
+            _ => (Next::Other, false),
+        }
+    }
+
+    fn card(&mut self, line: &str, number: u64, width: usize) -> Result<(), ContentError> {
+        let (comment_line, facts, units) = (self.comment_line, self.facts, self.units);
+        let Some(curve) = self.curves.last_mut() else { return Ok(()) };
+        (curve.facts, curve.units) = (facts, units);
+        let fields = Fields::of(line, number, width);
+        let id = fields.text(0).trim();
+        curve.id = id.parse().ok().filter(|id| *id > 0).ok_or_else(|| {
+            let hint = match comment_line {
+                Some(line) => {
+                    format!(" (line {line} begins with $, which makes it a comment and no title)")
+                }
+                None => String::new(),
+            };
+            ContentError::Expected {
+                place: fields.place(0),
+                expected: format!("the number of a curve (LCID){hint}"),
+                found: shown(id),
+            }
+        })?;
+        let or_one = |value: f64| if value == 0.0 { 1.0 } else { value };
+        curve.scale = Scale {
+            sfa: or_one(fields.number(2, true)?),
+            sfo: or_one(fields.number(3, true)?),
+            offa: fields.number(4, true)?,
+            offo: fields.number(5, true)?,
+        };
+        Ok(())
+    }
+
+    fn point(&mut self, line: &str, number: u64) -> Result<(), ContentError> {
+        let Some(curve) = self.curves.last_mut() else { return Ok(()) };
+        if line.trim().is_empty() {
+            return Ok(());
+        }
+        let fields = Fields::of(line, number, 20);
+        curve.points.push((fields.number(0, false)?, fields.number(1, false)?));
+        curve.lines.push(number);
+        match curve.points.len() > MAX_POINTS {
+            true => Err(ContentError::TooMany { most: MAX_POINTS }),
+            false => Ok(()),
+        }
+    }
+
+    /// The curve of that number, or the only one.
+    fn choose(&mut self, asked: Option<&str>) -> Result<Found, ContentError> {
+        let known = || {
+            let shown = |c: &Found| match c.title.is_empty() {
+                true => c.id.to_string(),
+                false => format!("{} (\"{}\")", c.id, shown(&c.title)),
+            };
+            self.curves.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
+        };
+        let at = match (asked, self.curves.len()) {
+            (_, 0) => {
+                let found = "none in this deck".into();
+                return Err(ContentError::NoCurve { expected: "a *DEFINE_CURVE", found });
+            }
+            (None, 1) => 0,
+            (None, _) => return Err(ContentError::WhichCurve { known: known() }),
+            (Some(asked), _) => {
+                let is_asked = |c: &Found| c.id.to_string() == asked.trim();
+                self.curves.iter().position(is_asked).ok_or_else(|| ContentError::NoSuchCurve {
+                    asked: shown(asked),
+                    known: known(),
+                })?
+            }
+        };
+        Ok(self.curves.swap_remove(at))
+    }
+}
+
+/// The fields of a line: between commas, or of one width.
+struct Fields<'a> {
+    line: u64,
+    width: usize,
+    list: Vec<&'a str>,
+    is_free: bool,
+}
+
+/// Fields of a line that are looked at: card 1 has eight.
+const FIELDS: usize = 8;
+
+impl<'a> Fields<'a> {
+    fn of(text: &'a str, line: u64, width: usize) -> Self {
+        if text.contains(',') {
+            let list = text.split(',').take(FIELDS).collect();
+            return Self { line, width, list, is_free: true };
+        }
+        // By characters: a column of a text that is no ASCII may lie within one.
+        let at = |k: usize| text.char_indices().nth(k * width).map_or(text.len(), |(at, _)| at);
+        let list = (0..FIELDS).map(|k| &text[at(k)..at(k + 1)]).take_while(|f| !f.is_empty());
+        Self { line, width, list: list.collect(), is_free: false }
+    }
+
+    fn text(&self, field: usize) -> &'a str {
+        self.list.get(field).copied().unwrap_or_default()
+    }
+
+    fn place(&self, field: usize) -> Place {
+        match self.is_free {
+            true => Place::Field { line: self.line, field: field + 1 },
+            false => Place::Columns {
+                line: self.line,
+                from: field * self.width + 1,
+                to: (field + 1) * self.width,
+            },
+        }
+    }
+
+    /// A number; 0 for an empty field where that may be.
+    fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, ContentError> {
+        let text = self.text(field).trim();
+        if text.is_empty() && may_be_empty {
+            return Ok(0.0);
+        }
+        number(text).ok_or_else(|| match text.split_whitespace().count() {
+            0 | 1 => ContentError::Number { place: self.place(field), found: shown(text) },
+            _ => ContentError::Expected {
+                place: self.place(field),
+                expected: format!(
+                    "one number in each field of {} columns, or fields with commas between",
+                    self.width
+                ),
+                found: shown(text),
+            },
+        })
+    }
+}

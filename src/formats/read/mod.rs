@@ -1,0 +1,193 @@
+//! Curves of other tools: one file per format, each giving a [`ReadCurve`] in SI that says what
+//! was taken how.
+//!
+//! **Units** are those of the column's header (`d_mm`, `Force [kN]`), of a comment
+//! (`units: mm-t-s`), or those that are given ([`ReadOptions::units`]); without any, a file is
+//! refused. **Comments** `key: value` that our own exports write tell force kind, speed, speed
+//! kind, mass and unloading stiffness. **Signs**: compression becomes positive. **Points** that
+//! repeat the one before, and guard points (below zero deflection with no force; the last force
+//! repeated as far behind the end) are removed. Each of these leaves a note.
+
+mod columns;
+pub mod csv;
+mod curve;
+mod error;
+mod iso_mme;
+pub mod json;
+mod label;
+mod lsdyna;
+mod mat;
+mod modelica;
+mod text;
+mod two_columns;
+
+use std::path::Path;
+
+use super::{MAX_CURVE_BYTES, MIN_POINTS};
+use crate::curve::ForceKind;
+use crate::file;
+use crate::unit::UnitSystem;
+use columns::Columns;
+pub use curve::{Facts, ReadCurve, ReadFile};
+pub use error::{ContentError, Place, ReadCurveError};
+
+/// One format of curves.
+#[derive(Debug)]
+pub struct Reader {
+    /// Its name.
+    pub name: &'static str,
+    /// Without the dot; the first is the usual one.
+    pub extensions: &'static [&'static str],
+    /// What it is.
+    pub description: &'static str,
+    /// Whether a file's content is of this format.
+    recognise: fn(&Input<'_>) -> bool,
+    read: Read,
+}
+
+/// What a reader gives.
+#[derive(Debug)]
+enum Read {
+    /// Columns, of which the curve is made.
+    Columns(fn(&Input<'_>) -> Result<Columns, ContentError>),
+    /// The curve itself.
+    Curve(fn(&Input<'_>) -> Result<ReadCurve, ReadCurveError>),
+}
+
+/// Every format we read, in the order in which content is tried. To add one: write its module, add
+/// its line here.
+pub const READERS: &[Reader] = &[
+    Reader {
+        name: "mat",
+        extensions: &["mat"],
+        description: "MAT file of version 4: fd_load, or the only matrix of two columns",
+        recognise: mat::recognise,
+        read: Read::Columns(mat::read),
+    },
+    Reader {
+        name: "json",
+        extensions: &["json"],
+        description: "predicted curve (of crumple predict)",
+        recognise: json::recognise,
+        read: Read::Curve(json::read),
+    },
+    Reader {
+        name: "lsdyna",
+        extensions: &["k", "key", "dyn"],
+        description: "LS-DYNA *DEFINE_CURVE and *DEFINE_CURVE_TITLE",
+        recognise: lsdyna::recognise,
+        read: Read::Columns(lsdyna::read),
+    },
+    Reader {
+        name: "modelica",
+        extensions: &["txt"],
+        description: "Modelica CombiTable text (#1, double name(n,2))",
+        recognise: modelica::recognise,
+        read: Read::Columns(modelica::read),
+    },
+    Reader {
+        name: "iso-mme",
+        extensions: &["mme", "001", "002"],
+        description: "ISO-MME: a test's folder or .mme file, or one of its channel files",
+        recognise: iso_mme::recognise,
+        read: Read::Columns(iso_mme::read),
+    },
+    Reader {
+        name: "csv",
+        extensions: &["csv", "tsv"],
+        description: "columns with a header, separated by commas, semicolons or tabs",
+        recognise: csv::recognise,
+        read: Read::Columns(csv::read),
+    },
+    Reader {
+        name: "two-columns",
+        extensions: &["cur", "crv", "dat", "xy"],
+        description: "two columns below titles and labels, as T/HIS .cur files have them",
+        recognise: two_columns::recognise,
+        read: Read::Columns(two_columns::read),
+    },
+];
+
+/// What the user says beside the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// Name of a reader, where the content shall not tell.
+    pub format: Option<String>,
+    /// Units of values that do not say their own.
+    pub units: Option<UnitSystem>,
+    /// Number or name of the curve in a file of several.
+    pub curve: Option<String>,
+    /// The force, where the file has both.
+    pub force: Option<ForceKind>,
+}
+
+/// A file, as readers get it.
+pub(super) struct Input<'a> {
+    path: &'a Path,
+    /// Empty for a folder.
+    bytes: &'a [u8],
+    options: &'a ReadOptions,
+}
+
+/// Bytes by which a format is recognised.
+const BEGINNING: usize = 64 << 10;
+
+impl Input<'_> {
+    /// What is looked at to recognise a format.
+    fn beginning(&self) -> &[u8] {
+        &self.bytes[..self.bytes.len().min(BEGINNING)]
+    }
+}
+
+/// Reads the curve at `path`, a file, or for ISO-MME a test's folder.
+///
+/// # Errors
+/// [`ReadCurveError`] names the file, the place in it, what was expected there and what to do.
+pub fn read(
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<(ReadCurve, &'static Reader), ReadCurveError> {
+    let (bytes, own) = match path.is_dir() && iso_mme::is_test(path) {
+        true => (Vec::new(), None),
+        false => open(path).map(|(bytes, own)| (bytes, Some(own)))?,
+    };
+    let input = Input { path, bytes: &bytes, options };
+    if bytes.is_empty() && own.is_some() {
+        let empty = ContentError::NoCurve { expected: "a curve", found: "an empty file".into() };
+        return Err(curve::content(path)(empty));
+    }
+    let reader = reader(&input)?;
+    let mut curve = match reader.read {
+        Read::Columns(read) => {
+            read(&input).and_then(Columns::curve).map_err(curve::content(path))?
+        }
+        Read::Curve(read) => read(&input)?,
+    };
+    curve.files.splice(0..0, own);
+    Ok((curve, reader))
+}
+
+/// The reader that was named, else the first that knows the content, else that of the extension.
+fn reader(input: &Input<'_>) -> Result<&'static Reader, ReadCurveError> {
+    let known = || READERS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
+    if let Some(name) = &input.options.format {
+        let found = READERS.iter().find(|r| r.name == name);
+        return found
+            .ok_or_else(|| ReadCurveError::NoSuchFormat { name: name.clone(), known: known() });
+    }
+    let extension = input.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let extension = extension.to_ascii_lowercase();
+    READERS
+        .iter()
+        .find(|r| (r.recognise)(input))
+        .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
+        .ok_or_else(|| ReadCurveError::Unrecognised { path: input.path.into(), known: known() })
+}
+
+/// The bytes of a file, up to the bound, and what identifies them.
+fn open(path: &Path) -> Result<(Vec<u8>, ReadFile), ReadCurveError> {
+    let bytes = file::read(path, MAX_CURVE_BYTES)
+        .map_err(|source| ReadCurveError::Io { path: path.into(), source })?;
+    let own = ReadFile::of(path, &bytes);
+    Ok((bytes, own))
+}

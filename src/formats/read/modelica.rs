@@ -1,0 +1,218 @@
+//! Curve of a Modelica table file: `#1`, then `double name(rows,columns)` and the values.
+//!
+//! Values are separated by blanks, tabs, commas or semicolons, wherever lines end; `#` begins a
+//! comment. The first two columns are deflection and force. Units stand in a comment of the
+//! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
+
+use super::Input;
+use super::columns::{Columns, MAX_POINTS, Places};
+use super::curve::{Facts, stated_units, units};
+use super::error::{ContentError, Place, shown};
+use super::label::{Label, Quantity};
+use super::text::{lines, number};
+use crate::unit::UnitSystem;
+
+/// Name of the table and of the matrix that our exports write, in SI.
+pub(super) const OURS: &str = "fd_load";
+
+const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
+
+pub(super) fn recognise(input: &Input<'_>) -> bool {
+    let text = input.bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(input.bytes);
+    text.strip_prefix(b"#1").is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
+}
+
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+    let file = File::read(input.bytes)?;
+    let table = file.choose(input.options.curve.as_deref())?;
+    let mut notes = vec![format!("curve: table {} of the file", table.name)];
+    let (length, force, system) = match table.sizes {
+        Some((length, force)) => {
+            notes.push(format!("units: those of line {}", table.line));
+            (length, force, None)
+        }
+        None => {
+            let own = table.name == OURS && file.units.is_none() && input.options.units.is_none();
+            let stated = if own { Some((UnitSystem::SI, table.line)) } else { file.units };
+            let system = match own {
+                true => {
+                    notes.push(format!("units: SI, as crumple export writes {OURS}"));
+                    UnitSystem::SI
+                }
+                false => units(stated, input.options.units, REMEDY, &mut notes)?,
+            };
+            (system.length_m, system.force(), Some(system))
+        }
+    };
+    let column = |k: usize, size: f64| {
+        table.values.iter().skip(k).step_by(table.columns).map(|v| v * size).collect()
+    };
+    Ok(Columns {
+        deflection_m: column(0, length),
+        force_n: column(1, force),
+        facts: file.facts,
+        title: Some(table.name.clone()),
+        units: system,
+        notes,
+        ..Columns::at(Places::Lines(table.lines.clone()))
+    })
+}
+
+/// A table of the file.
+struct Table {
+    name: String,
+    line: u64,
+    rows: usize,
+    columns: usize,
+    /// SI values of the units in its comment: of deflection and force.
+    sizes: Option<(f64, f64)>,
+    /// Row by row.
+    values: Vec<f64>,
+    /// Line of each row's first value.
+    lines: Vec<u64>,
+}
+
+struct File {
+    tables: Vec<Table>,
+    facts: Facts,
+    units: Option<(UnitSystem, u64)>,
+}
+
+impl File {
+    fn read(bytes: &[u8]) -> Result<Self, ContentError> {
+        let mut file = Self { tables: Vec::new(), facts: Facts::default(), units: None };
+        for (at, line) in lines(bytes) {
+            let (text, comment) = line.split_once('#').unwrap_or((&line, ""));
+            if text.trim().is_empty() {
+                file.facts.take("#", comment.trim_start_matches('#'), Place::Line(at))?;
+                let stated = stated_units(comment).map(|units| (units, at));
+                file.units = file.units.or(stated);
+                continue;
+            }
+            match declaration(text, at)? {
+                Some(declared) => {
+                    file.check_last()?;
+                    let (name, rows, columns) = declared;
+                    check_size(&name, rows, columns, bytes.len(), at)?;
+                    let sizes = sizes(comment);
+                    let (values, lines) = (Vec::new(), Vec::new());
+                    file.tables.push(Table { name, line: at, rows, columns, sizes, values, lines });
+                }
+                None => file.values(text, at)?,
+            }
+        }
+        file.check_last()?;
+        Ok(file)
+    }
+
+    fn values(&mut self, text: &str, line: u64) -> Result<(), ContentError> {
+        let words = text.split([' ', '\t', ',', ';', '\r']).filter(|w| !w.is_empty());
+        for (field, word) in words.enumerate() {
+            let place = Place::Field { line, field: field + 1 };
+            let Some(table) = self.tables.last_mut() else {
+                let expected = "a table such as \"double fd_load(4,2)\" in front of values".into();
+                return Err(ContentError::Expected { place, expected, found: shown(word) });
+            };
+            let value = number(word)
+                .ok_or_else(|| ContentError::Number { place: place.clone(), found: shown(word) })?;
+            if table.values.len() == table.rows * table.columns {
+                let expected = format!(
+                    "no more than the {} rows of {} that table {} declares",
+                    table.rows, table.columns, table.name
+                );
+                return Err(ContentError::Expected { place, expected, found: shown(word) });
+            }
+            if table.values.len() % table.columns == 0 {
+                table.lines.push(line);
+            }
+            table.values.push(value);
+        }
+        Ok(())
+    }
+
+    /// Whether the last table has all its values.
+    fn check_last(&self) -> Result<(), ContentError> {
+        let Some(table) = self.tables.last() else { return Ok(()) };
+        match table.values.len() == table.rows * table.columns {
+            true => Ok(()),
+            false => Err(ContentError::Declared {
+                place: Place::Line(table.line),
+                what: format!("table {}", table.name),
+                declared: format!("{} rows of {}", table.rows, table.columns),
+                found: format!("{} values for it", table.values.len()),
+                remedy: "write the file anew, it may be cut",
+            }),
+        }
+    }
+
+    /// The table that was asked for, else ours, else the only one that can be a curve.
+    fn choose(&self, asked: Option<&str>) -> Result<&Table, ContentError> {
+        let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
+        let known = || fitting.iter().map(|t| t.name.clone()).collect::<Vec<_>>().join(", ");
+        if fitting.is_empty() {
+            let found = format!("{} others", self.tables.len());
+            let expected = "a table of two columns, such as \"double fd_load(4,2)\"";
+            return Err(ContentError::NoCurve { expected, found });
+        }
+        let by_name = |name: &str| fitting.iter().find(|t| t.name == name).copied();
+        match (asked, by_name(OURS), &fitting[..]) {
+            (Some(asked), ..) => by_name(asked)
+                .ok_or_else(|| ContentError::NoSuchCurve { asked: shown(asked), known: known() }),
+            (None, Some(ours), _) => Ok(ours),
+            (None, None, [only]) => Ok(only),
+            (None, None, _) => Err(ContentError::WhichCurve { known: known() }),
+        }
+    }
+}
+
+/// Name, rows and columns, if the line declares a table.
+fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, ContentError> {
+    let text = text.trim();
+    let rest = ["double", "float"].iter().find_map(|kind| text.strip_prefix(kind));
+    let Some(rest) = rest.filter(|rest| rest.starts_with([' ', '\t'])) else { return Ok(None) };
+    let parse = || {
+        let (name, size) = rest.trim().split_once('(')?;
+        let (rows, columns) = size.trim().strip_suffix(')')?.split_once(',')?;
+        let (rows, columns) = (rows.trim().parse().ok()?, columns.trim().parse().ok()?);
+        (rows > 0 && columns > 0).then(|| (name.trim().to_string(), rows, columns))
+    };
+    parse().map(Some).ok_or_else(|| ContentError::Expected {
+        place: Place::Line(line),
+        expected: "a table such as \"double fd_load(4,2)\"".into(),
+        found: shown(text),
+    })
+}
+
+/// Refuses sizes that the file cannot hold: a value takes two bytes with its separator.
+fn check_size(
+    name: &str,
+    rows: usize,
+    columns: usize,
+    bytes: usize,
+    line: u64,
+) -> Result<(), ContentError> {
+    if rows > MAX_POINTS {
+        return Err(ContentError::TooMany { most: MAX_POINTS });
+    }
+    match rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
+        true => Ok(()),
+        false => Err(ContentError::Declared {
+            place: Place::Line(line),
+            what: format!("table {}", shown(name)),
+            declared: format!("{rows} rows of {columns}"),
+            found: format!("{bytes} bytes"),
+            remedy: "correct the size",
+        }),
+    }
+}
+
+/// SI values of the units that a comment such as `d [m], F [N]` names.
+fn sizes(comment: &str) -> Option<(f64, f64)> {
+    let of = |wanted: Quantity| {
+        comment.split([',', ';']).find_map(|text| {
+            let label = Label::parse(text).filter(|label| label.quantity == wanted)?;
+            wanted.dimension().size_of(&label.unit?)
+        })
+    };
+    Some((of(Quantity::Deflection)?, of(Quantity::Force)?))
+}

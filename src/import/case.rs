@@ -1,0 +1,192 @@
+//! From a file to its case: read, said, made, and traced.
+
+use serde::Serialize;
+
+use super::said::Said;
+use super::{ImportError, Item, Settings};
+use crate::curve::from_table::{FromTable, IMPORTED, Impact, Table, from_table};
+use crate::curve::recipe::{Filter, Sampling};
+use crate::curve::{Case, ForceKind, Parameter, SourceFile};
+use crate::formats::read::{self, ReadCurve};
+use crate::unit::{SpeedKind, UnitSystem};
+
+/// The case of one file.
+pub(super) fn of(
+    item: &Item,
+    settings: &Settings,
+    group: Option<&Case>,
+) -> Result<Case, ImportError> {
+    let name = case_name(item)?;
+    check_name(item, "group", &settings.group)?;
+    check_name(item, "case", &name)?;
+    let (curve, reader) = read::read(&item.path, &settings.read)?;
+    let said = Said::of(item, settings, &curve, group)?;
+    let stiffness = settings.unloading_stiffness_n_per_m;
+    let impact = Impact {
+        speed: said.speed,
+        masses: said.masses,
+        unloading_stiffness_n_per_m: stiffness.or(curve.facts.unloading_stiffness_n_per_m),
+        // One that was given belongs to the force of the curve.
+        body_unloading_stiffness_n_per_m: match stiffness {
+            Some(_) => None,
+            None => curve.facts.body_unloading_stiffness_n_per_m,
+        },
+        units: curve.units.unwrap_or(UnitSystem::SI),
+        accept_energy: settings.accept_energy,
+    };
+    let table = Table {
+        deflection_m: &curve.deflection_m,
+        force_n: &curve.force_n,
+        time_s: curve.time_s.as_deref(),
+        body_force_n: curve.body_force_n.as_deref(),
+    };
+    let made = from_table(&table, &impact)
+        .map_err(|source| ImportError::Table { path: item.path.clone(), source })?;
+    let recipe = recipe(item, settings, &curve, reader.name, &said);
+    Ok(assembled(name, settings, &curve, reader.name, said, made, recipe))
+}
+
+fn assembled(
+    name: String,
+    settings: &Settings,
+    curve: &ReadCurve,
+    format: &str,
+    said: Said,
+    made: FromTable,
+    recipe: String,
+) -> Case {
+    let mut hash = blake3::Hasher::new();
+    hash.update(recipe.as_bytes());
+    for file in &curve.files {
+        hash.update(file.blake3.as_bytes());
+    }
+    let sources = curve.files.iter().map(|file| SourceFile {
+        path: file.path.display().to_string(),
+        size_bytes: file.size_bytes,
+        blake3: file.blake3.clone(),
+        format: format.into(),
+        solver: None,
+        version: None,
+        title: curve.title.clone(),
+        problems: 0,
+    });
+    let notes = curve.notes.iter().cloned().chain(said.notes).chain(made.notes);
+    Case {
+        study: IMPORTED.into(),
+        group: settings.group.clone(),
+        name,
+        speed: said.speed,
+        masses: said.masses,
+        parameters: settings.parameters.clone(),
+        force_kind: said.force,
+        sampled: made.sampled,
+        closing_speed_m_per_s: made.closing_speed_m_per_s,
+        original: made.original,
+        contact_time_s: made.contact_time_s,
+        solver_wall_time_s: None,
+        unloading_stiffness_n_per_m: made.unloading_stiffness_n_per_m,
+        audit: made.audit,
+        fingerprint: hash.finalize().to_hex().to_string(),
+        recipe,
+        sources: sources.collect(),
+        notes: notes.collect(),
+        warnings: said.warnings.into_iter().chain(made.warnings).collect(),
+    }
+}
+
+/// Everything beside the file that decides the case's numbers.
+#[derive(Serialize)]
+struct Recipe<'a> {
+    study: &'a str,
+    /// Of the file, if they are one system.
+    units: Option<UnitSystem>,
+    kind: SpeedKind,
+    imported: Imported<'a>,
+}
+
+#[derive(Serialize)]
+struct Imported<'a> {
+    path: String,
+    format: &'a str,
+    curve: Option<&'a str>,
+    /// Whether the motion is that of the file's times.
+    has_times: bool,
+    force: ForceKind,
+    speed_m_per_s: f64,
+    mass_kg: f64,
+    other_mass_kg: Option<f64>,
+    #[serde(rename = "unloading_stiffness_N_per_m")]
+    unloading_stiffness_n_per_m: Option<f64>,
+    parameters: &'a std::collections::BTreeMap<String, Parameter>,
+    accept_energy: bool,
+    filter: Filter,
+    sampling_interval_ms: f64,
+}
+
+fn recipe(
+    item: &Item,
+    settings: &Settings,
+    curve: &ReadCurve,
+    format: &str,
+    said: &Said,
+) -> String {
+    let stiffness = settings.unloading_stiffness_n_per_m;
+    let recipe = Recipe {
+        study: IMPORTED,
+        units: curve.units,
+        kind: said.speed.kind,
+        imported: Imported {
+            path: item.path.display().to_string(),
+            format,
+            curve: settings.read.curve.as_deref(),
+            has_times: curve.time_s.is_some(),
+            force: said.force,
+            speed_m_per_s: said.speed.m_per_s,
+            mass_kg: said.masses.body_kg,
+            other_mass_kg: said.masses.other_kg,
+            unloading_stiffness_n_per_m: stiffness.or(curve.facts.unloading_stiffness_n_per_m),
+            parameters: &settings.parameters,
+            accept_energy: settings.accept_energy,
+            filter: Filter::None,
+            sampling_interval_ms: Sampling::default().interval_s * 1e3,
+        },
+    };
+    // A structure of texts and finite numbers is always JSON.
+    serde_json::to_string(&recipe).unwrap_or_default()
+}
+
+/// The name that was given, else the file's without its extension.
+fn case_name(item: &Item) -> Result<String, ImportError> {
+    if let Some(name) = &item.case {
+        return Ok(name.clone());
+    }
+    let stem = match item.path.is_dir() {
+        true => item.path.file_name(),
+        false => item.path.file_stem(),
+    };
+    let name = stem.map(|stem| stem.to_string_lossy().into_owned());
+    name.ok_or_else(|| ImportError::Name {
+        path: item.path.clone(),
+        what: "case",
+        name: String::new(),
+        why: "give one with --case",
+    })
+}
+
+/// Names stand in files, tables and HDF5 paths.
+fn check_name(item: &Item, what: &'static str, name: &str) -> Result<(), ImportError> {
+    let why = if name.trim().is_empty() || name == "." || name == ".." {
+        "it is none"
+    } else if name.contains(|c: char| c.is_control() || c == '/') {
+        "it may not contain \"/\" or control characters"
+    } else if name.len() > MAX_NAME {
+        "it has more than 200 bytes; give a shorter one (--case, --group)"
+    } else {
+        return Ok(());
+    };
+    let name = name.chars().take(MAX_NAME).collect();
+    Err(ImportError::Name { path: item.path.clone(), what, name, why })
+}
+
+/// Longest name of a case or group, in bytes.
+const MAX_NAME: usize = 200;

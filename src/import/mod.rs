@@ -1,0 +1,123 @@
+//! Adding curves of files to a database: each becomes a case of the study [`IMPORTED`].
+//!
+//! All files are read, and all cases made, before anything is written; the database is locked
+//! meanwhile, and written whole.
+
+mod case;
+mod error;
+mod said;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::curve::from_table::IMPORTED;
+use crate::curve::{Case, Parameter};
+use crate::database::Database;
+use crate::file::WriterLock;
+use crate::formats::read::ReadOptions;
+use crate::unit::SpeedKind;
+pub use error::ImportError;
+
+/// One file that is to become a case, and what is said of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// The file, or an ISO-MME test's folder.
+    pub path: PathBuf,
+    /// Name of the case; the file's, without its extension, if absent.
+    pub case: Option<String>,
+    /// Impact speed in m/s; the file's if absent.
+    pub speed_m_per_s: Option<f64>,
+}
+
+/// What is said of all files that are added at once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Group of the database.
+    pub group: String,
+    /// What speeds are measured against; the file's if absent, else the group's.
+    pub kind: Option<SpeedKind>,
+    /// Mass of the body in kg; the file's if absent.
+    pub mass_kg: Option<f64>,
+    /// Mass of the other body of a pair in kg; the file's if absent, else that of the body.
+    pub other_mass_kg: Option<f64>,
+    /// Unloading stiffness in N/m; the file's if absent.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// How the files are read; its force is also which force a curve is, if its file does not say.
+    pub read: ReadOptions,
+    /// Further parameters of the cases.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Replace cases of these names that were added before.
+    pub replace: bool,
+    /// Take curves whose energy cannot be the impact's.
+    pub accept_energy: bool,
+}
+
+/// Adds the curves of `items` to the database at `path`, which is made if it is not there; returns
+/// their cases in the order of the items.
+///
+/// # Errors
+/// [`ImportError`] names the file and what to do; the database is then unchanged.
+pub fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, ImportError> {
+    let _lock = WriterLock::take(path)?;
+    let mut database = match path.try_exists().unwrap_or(true) {
+        true => Database::read(path)?,
+        false => Database::default(),
+    };
+    let mut cases: Vec<Case> = Vec::with_capacity(items.len());
+    for item in items {
+        let case = case::of(item, settings, database.cases(&settings.group).first())?;
+        if let Some(k) = cases.iter().position(|c| c.name == case.name) {
+            let (first, second) = (items[k].path.clone(), item.path.clone());
+            return Err(ImportError::SameName { first, second, name: case.name });
+        }
+        check_place(&database, item, &case, settings.replace)?;
+        if let Some(first) = cases.first() {
+            check_kinds(item, &case, first)?;
+        }
+        cases.push(case);
+    }
+    database.put_all(cases.iter().cloned())?;
+    database.write(path)?;
+    Ok(cases)
+}
+
+/// Whether the case may take its place in the database.
+fn check_place(
+    database: &Database,
+    item: &Item,
+    case: &Case,
+    replace: bool,
+) -> Result<(), ImportError> {
+    let there = database.cases(&case.group);
+    let (path, group, name) = (item.path.clone(), case.group.clone(), case.name.clone());
+    match there.iter().find(|c| c.name == case.name) {
+        Some(other) if other.study != IMPORTED => {
+            return Err(ImportError::OfStudy { path, group, name, study: other.study.clone() });
+        }
+        Some(_) if !replace => return Err(ImportError::Taken { path, group, name }),
+        _ => {}
+    }
+    // A case that is replaced binds nobody.
+    match there.iter().find(|c| c.name != case.name) {
+        Some(other) => check_kinds(item, case, other),
+        None => Ok(()),
+    }
+}
+
+/// Whether two cases of a group are of one kind.
+fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), ImportError> {
+    let kinds = [
+        ("speed", case.speed.kind.name(), other.speed.kind.name()),
+        ("force", case.force_kind.name(), other.force_kind.name()),
+    ];
+    match kinds.into_iter().find(|(_, found, there)| found != there) {
+        None => Ok(()),
+        Some((what, found, there)) => Err(ImportError::OtherKind {
+            path: item.path.clone(),
+            what,
+            found,
+            there,
+            group: case.group.clone(),
+        }),
+    }
+}

@@ -1,0 +1,132 @@
+//! What is said beside a file and what the file says, put together.
+
+use super::{ImportError, Item, Settings};
+use crate::curve::{Case, ForceKind, Masses};
+use crate::formats::read::{Facts, ReadCurve};
+use crate::unit::{Speed, SpeedKind, km_per_h};
+
+/// The impact of a curve, and which force it is.
+pub(super) struct Said {
+    pub speed: Speed,
+    pub masses: Masses,
+    pub force: ForceKind,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+impl Said {
+    /// What is stated wins, and a warning says where the file differs. `group`: a case that is
+    /// there, whose kind of speed holds where nothing else says it.
+    pub fn of(
+        item: &Item,
+        settings: &Settings,
+        curve: &ReadCurve,
+        group: Option<&Case>,
+    ) -> Result<Self, ImportError> {
+        let mut both =
+            Both { item, settings, facts: &curve.facts, notes: Vec::new(), warnings: Vec::new() };
+        let kind = both.kind(group)?;
+        let m_per_s = both.speed()?;
+        let masses = both.masses(kind)?;
+        let force = both.force()?;
+        let (notes, warnings) = (both.notes, both.warnings);
+        Ok(Self { speed: Speed { m_per_s, kind }, masses, force, notes, warnings })
+    }
+}
+
+/// Two values this close are one.
+const SAME: f64 = 0.01;
+
+/// Both sides, and what is to be said of them.
+struct Both<'a> {
+    item: &'a Item,
+    settings: &'a Settings,
+    facts: &'a Facts,
+    notes: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl Both<'_> {
+    fn missing(&self, what: &'static str, option: &'static str) -> ImportError {
+        ImportError::Missing { path: self.item.path.clone(), what, option }
+    }
+
+    /// The stated value, else the file's, above 0.
+    fn either(
+        &mut self,
+        what: &'static str,
+        (stated, found): (Option<f64>, Option<f64>),
+        shown: fn(f64) -> String,
+    ) -> Result<Option<f64>, ImportError> {
+        if let (Some(stated), Some(found)) = (stated, found)
+            && (stated / found - 1.0).abs() > SAME
+        {
+            let (stated, found) = (shown(stated), shown(found));
+            self.warnings.push(format!("{what}: the file says {found}, {stated} is used"));
+        }
+        let value = stated.or(found);
+        match value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            Some(value) => {
+                Err(ImportError::NotPositive { path: self.item.path.clone(), what, value })
+            }
+            None => Ok(value),
+        }
+    }
+
+    fn kind(&mut self, group: Option<&Case>) -> Result<SpeedKind, ImportError> {
+        match (self.settings.kind, self.facts.speed_kind, group) {
+            (Some(kind), ..) | (None, Some(kind), _) => Ok(kind),
+            (None, None, Some(case)) => {
+                self.notes.push(format!("speed: {} as in the group", case.speed.kind.name()));
+                Ok(case.speed.kind)
+            }
+            (None, None, None) => Err(self.missing(
+                "what its speed is measured against",
+                "--kind wall (against a rigid wall) or --kind closing (of two bodies)",
+            )),
+        }
+    }
+
+    fn speed(&mut self) -> Result<f64, ImportError> {
+        let both = (self.item.speed_m_per_s, self.facts.speed_m_per_s);
+        let speed = self.either("speed", both, km_per_h)?;
+        speed.ok_or_else(|| self.missing("its speed", "--speed, such as --speed 36km/h"))
+    }
+
+    fn masses(&mut self, kind: SpeedKind) -> Result<Masses, ImportError> {
+        let tonnes = |kg: f64| format!("{} t", kg / 1e3);
+        let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), tonnes)?;
+        let others = (self.settings.other_mass_kg, self.facts.other_mass_kg);
+        let other = self.either("other mass", others, tonnes)?;
+        let body_kg =
+            mass.ok_or_else(|| self.missing("the mass of the body", "--mass, such as --mass 24t"))?;
+        let other_kg = match (kind, other) {
+            (SpeedKind::Wall, _) if self.settings.other_mass_kg.is_some() => {
+                return Err(ImportError::MassOfWall { path: self.item.path.clone() });
+            }
+            (SpeedKind::Wall, _) => None,
+            (SpeedKind::Closing, Some(other)) => Some(other),
+            (SpeedKind::Closing, None) => {
+                self.notes.push("other mass: that of the body".into());
+                Some(body_kg)
+            }
+        };
+        Ok(Masses { body_kg, other_kg })
+    }
+
+    fn force(&mut self) -> Result<ForceKind, ImportError> {
+        match (self.facts.force, self.settings.read.force) {
+            (Some(found), Some(asked)) if found != asked => {
+                Err(ImportError::OtherForce { path: self.item.path.clone(), found, asked })
+            }
+            (Some(force), _) | (None, Some(force)) => Ok(force),
+            (None, None) => {
+                self.notes.push(
+                    "force: taken as the contact force; neither file nor --force say which it is"
+                        .into(),
+                );
+                Ok(ForceKind::Contact)
+            }
+        }
+    }
+}

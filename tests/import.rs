@@ -1,0 +1,1038 @@
+//! Curves of files into a database: every format, what is refused and in which words, and the way
+//! of predicted curves back into a group on which models are trained.
+
+use std::fs;
+use std::path::Path;
+
+use crumple::formats::read::{READERS, ReadCurve, ReadOptions, read};
+use crumple::unit::UnitSystem;
+use proptest::prelude::*;
+use serde_json::Value;
+
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries};
+
+/// The curve of all these files: a flank, a fall, a plateau; in m and N.
+const POINTS: [(f64, f64); 5] = [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2.0e6)];
+
+/// Its energy is that of 24 t at this speed, in m/s.
+fn speed() -> f64 {
+    let work: f64 = POINTS.windows(2).map(|w| 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0)).sum();
+    (2.0 * work / 24e3).sqrt()
+}
+
+fn given(units: Option<&str>) -> ReadOptions {
+    let units = units.map(|units| UnitSystem::parse(units).unwrap());
+    ReadOptions { units, ..ReadOptions::default() }
+}
+
+/// Reads a file of that name and content.
+fn read_bytes(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+) -> Result<(ReadCurve, &'static str), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    let (curve, reader) = read(&path, options).map_err(|e| e.to_string())?;
+    Ok((curve, reader.name))
+}
+
+fn is_points(curve: &ReadCurve, context: &str) {
+    let points: Vec<(f64, f64)> =
+        curve.deflection_m.iter().copied().zip(curve.force_n.iter().copied()).collect();
+    assert_eq!(points.len(), POINTS.len(), "{context}: {points:?}");
+    for ((d, f), (dp, fp)) in points.iter().zip(&POINTS) {
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
+        assert!(close(*d, *dp) && close(*f, *fp), "{context}: {points:?}");
+    }
+}
+
+/// Columns of the curve in other units, `separator` between and `decimal` in numbers.
+fn rows(length: f64, force: f64, separator: &str, decimal: &str) -> String {
+    let shown = |v: f64| format!("{v}").replace('.', decimal);
+    POINTS
+        .iter()
+        .map(|(d, f)| format!("{}{separator}{}\n", shown(d / length), shown(f / force)))
+        .collect()
+}
+
+#[test]
+fn csv_headers_of_many_kinds() {
+    fn t(header: &str, length: f64, force: f64) {
+        let separator = if header.contains(';') {
+            ";"
+        } else if header.contains('\t') {
+            "\t"
+        } else {
+            ","
+        };
+        let text = format!("{header}\n{}", rows(length, force, separator, "."));
+        let (curve, format) = read_bytes("a.csv", text.as_bytes(), &given(None))
+            .unwrap_or_else(|e| panic!("{header}: {e}"));
+        assert_eq!(format, "csv");
+        is_points(&curve, header);
+        assert!(curve.notes[0].starts_with("columns: deflection of \""), "{:?}", curve.notes);
+        // The same with a byte-order mark and lines that end as Windows has them.
+        let text = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        is_points(&read_bytes("a.csv", text.as_bytes(), &given(None)).unwrap().0, header);
+    }
+    t("d_m,force_N", 1.0, 1.0);
+    t("d_mm, F_kN", 1e-3, 1e3);
+    t("deflection_m;force_MN", 1.0, 1e6);
+    t("displacement [mm];Force [kN]", 1e-3, 1e3);
+    t("Displacement (mm),load (MN)", 1e-3, 1e6);
+    t("crush_m,load_kN", 1.0, 1e3);
+    t("s/mm;F/kN", 1e-3, 1e3);
+    t("x [m]\tforce [N]", 1.0, 1.0);
+    t("\"Crush [cm]\",\"Contact Force [kN]\"", 1e-2, 1e3);
+    t("DEFLECTION_mm,FORCE_N", 1e-3, 1.0);
+    t("x-displacement (mm);body force (N)", 1e-3, 1.0);
+    t("# by hand; run 3\n# units: none\ndisp mm,force kN", 1e-3, 1e3);
+    t("deflection;force\nmm;kN", 1e-3, 1e3);
+    t("deflection;force\n[mm];[kN]", 1e-3, 1e3);
+}
+
+#[test]
+fn csv_columns_in_any_order_with_decimal_commas_or_without_units() {
+    let comma = format!("Weg;displacement [mm];Force [kN]\n{}", {
+        rows(1e-3, 1e3, ";", ",").lines().map(|l| format!("1,5;{l}\n")).collect::<String>()
+    });
+    is_points(&read_bytes("a.csv", comma.as_bytes(), &given(None)).unwrap().0, "comma");
+    for text in ["deflection,force\n", ""] {
+        let text = format!("{text}{}", rows(1e-3, 1.0, ",", "."));
+        let (curve, _) = read_bytes("a.csv", text.as_bytes(), &given(Some("mm-t-s"))).unwrap();
+        is_points(&curve, &text);
+        assert_eq!(curve.units, UnitSystem::parse("mm-t-s").ok());
+        assert!(curve.notes[0].contains("in units mm-t-s as given"), "{:?}", curve.notes);
+    }
+    let facts = "# force_kind: body\n# speed_m_per_s: 10\n# speed_kind: wall\n# mass_kg: 24000\n# unloading_stiffness_N_per_m: 8e7\n";
+    let text = format!("{facts}time [ms],d_m,force_N\n0,0,0\n1,0.01,1e6\n2,0.02,2e6\n3,0.01,0\n");
+    let (curve, _) = read_bytes("a.csv", text.as_bytes(), &given(None)).unwrap();
+    assert_eq!(curve.time_s, Some(vec![0.0, 1e-3, 2e-3, 3e-3]));
+    assert_eq!(curve.facts.mass_kg, Some(24e3));
+    assert_eq!(curve.facts.speed_m_per_s, Some(10.0));
+    assert_eq!(curve.facts.unloading_stiffness_n_per_m, Some(8e7));
+}
+
+/// A deck with one curve; its points in mm and kN.
+fn deck(title: &str, card: &str, points: &str) -> String {
+    format!(
+        "*KEYWORD\n$ by hand\n*DEFINE_CURVE_TITLE\n{title}\n$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint\n{card}\n{points}*END\n"
+    )
+}
+
+fn fields(length: f64, force: f64) -> String {
+    POINTS.iter().map(|(d, f)| format!("{:>20}{:>20}\n", d / length, f / force)).collect()
+}
+
+#[test]
+fn lsdyna_decks() {
+    fn t(text: &str, units: Option<&str>, notes: &[&str]) {
+        let (curve, format) = read_bytes("a.k", text.as_bytes(), &given(units)).unwrap();
+        assert_eq!(format, "lsdyna");
+        is_points(&curve, text);
+        for note in notes {
+            assert!(curve.notes.iter().any(|n| n.contains(note)), "{note}: {:?}", curve.notes);
+        }
+    }
+    let card = "       101         0       1.0       1.0       0.0       0.0         0         0";
+    t(&deck("nose", card, &fields(1e-3, 1e3)), Some("mm-kg-ms"), &["units: mm-kg-ms as given"]);
+    // Empty factors and factors of zero are 1.
+    t(&deck("a, b", "       101", &fields(1e-3, 1e3)), Some("mm-kg-ms"), &["curve: 101"]);
+    let zero = "       101         0       0.0       0.0       0.0       0.0";
+    t(&deck("nöse", zero, &fields(1e-3, 1e3)), Some("mm-kg-ms"), &[]);
+    // d = SFA (a + OFFA), F = SFO (o + OFFO).
+    let scaled = "7,0,0.5,1000,-2.0,3";
+    let points: String =
+        POINTS.iter().map(|(d, f)| format!("{},{}\n", 2.0 * d + 2.0, f / 1e3 - 3.0)).collect();
+    t(
+        &deck("scaled", scaled, &points),
+        Some("SI"),
+        &["abscissas times 0.5 after -2 is added, ordinates times 1000 after 3"],
+    );
+    let own = deck("x", card, &fields(1e-3, 1.0))
+        .replace("$ by hand", "$ units of the points: mm-t-s (length 1e-3 m)");
+    t(&own, None, &["units: mm-t-s by line 2 of the file"]);
+    // Compression in the third quadrant, as springs of S06 have it.
+    let third: String = POINTS
+        .iter()
+        .rev()
+        .map(|(d, f)| format!("{:>20}{:>20}\n", -d, -f))
+        .chain([format!("{:>20}{:>20}\n", 0.5, 0)])
+        .collect();
+    t(&deck("x", card, &third), Some("SI"), &["third quadrant", "reverse order", "guard"]);
+    // Fortran's exponents, a curve without title, other keywords around it.
+    let text = format!(
+        "*keyword\n*node\n  1,2,3\n*define_curve\n{card}\n{}*PART\nsomething\n",
+        fields(1.0, 1e3).replace("3000", "3.0+3")
+    );
+    t(&text, Some("m-t-s"), &[]);
+    // The long format.
+    let card: String =
+        ["101", "0", "1.0", "1.0", "0.0", "0.0"].map(|f| format!("{f:>20}")).concat();
+    let long = deck("x", &card, &fields(1.0, 1.0)).replace("_TITLE", "_TITLE+");
+    t(&long, Some("SI"), &[]);
+}
+
+#[test]
+fn a_curve_of_several_is_chosen() {
+    let card = |id: u32| format!("{id:>10}         0");
+    let two = deck("one", &card(101), &fields(1.0, 1.0))
+        + &deck("two", &card(102), "1,2\n2,3\n3,4\n4,5\n");
+    let options = |curve: &str| ReadOptions { curve: Some(curve.into()), ..given(Some("SI")) };
+    is_points(&read_bytes("a.k", two.as_bytes(), &options("101")).unwrap().0, "101");
+    let error = read_bytes("a.k", two.as_bytes(), &given(Some("SI"))).unwrap_err();
+    assert!(
+        error.ends_with("a.k: the file holds several curves: choose one with --curve: 101 (\"one\"), 102 (\"two\")"),
+        "{error}"
+    );
+    let error = read_bytes("a.k", two.as_bytes(), &options("7")).unwrap_err();
+    assert!(
+        error.ends_with("the file has no curve \"7\": it has 101 (\"one\"), 102 (\"two\")"),
+        "{error}"
+    );
+
+    let values = rows(1.0, 1.0, " ", ".");
+    let two = format!("#1\ndouble a(5,2) # d [m], F [N]\n{values}double b(5,2)\n{values}");
+    is_points(&read_bytes("a.txt", two.as_bytes(), &options("a")).unwrap().0, "a");
+    let error = read_bytes("a.txt", two.as_bytes(), &given(None)).unwrap_err();
+    assert!(error.ends_with("choose one with --curve: a, b"), "{error}");
+
+    let one = format!("title\nx (m)\ny (N)\nlabel\n{values}CONTINUE\n");
+    let two = format!("{one}{}", one.replace("label", "other"));
+    is_points(&read_bytes("a.cur", two.as_bytes(), &options("other")).unwrap().0, "other");
+    is_points(&read_bytes("a.cur", two.as_bytes(), &options("1")).unwrap().0, "1");
+    let error = read_bytes("a.cur", two.as_bytes(), &given(None)).unwrap_err();
+    assert!(error.ends_with("--curve: 1 (\"label\"), 2 (\"other\")"), "{error}");
+}
+
+#[test]
+fn modelica_tables() {
+    fn t(text: &str, units: Option<&str>, note: &str) {
+        let (curve, format) = read_bytes("a.txt", text.as_bytes(), &given(units)).unwrap();
+        assert_eq!(format, "modelica");
+        is_points(&curve, text);
+        assert!(curve.notes.iter().any(|n| n.contains(note)), "{:?}", curve.notes);
+    }
+    let si = rows(1.0, 1.0, " ", ".");
+    t(&format!("#1\ndouble fd_load(5,2)  # d [m], F [N]\n{si}"), None, "those of line 2");
+    t(&format!("#1\ndouble fd_load(5,2)\n{si}"), None, "SI, as crumple export writes fd_load");
+    let mm = rows(1e-3, 1.0, "\t", ".");
+    t(&format!("#1\n# mine\ndouble nose(5, 2)\n{mm}"), Some("mm-t-s"), "mm-t-s as given");
+    t(&format!("#1\n# units: mm-t-s\nfloat nose(5,2)\n{mm}"), None, "units: mm-t-s by line 2");
+    let one_line = si.replace('\n', ", ");
+    t(&format!("#1\ndouble fd_load(5,2)\n{one_line}\n"), None, "SI");
+    let guarded = format!("#1\ndouble fd_load(7,2)\n-0.1 0\n{si}1.1 2e6\n");
+    t(&guarded, None, "1 below zero deflection");
+}
+
+/// A matrix of a MAT file of version 4.
+fn matrix(name: &str, rows: i32, columns: i32, values: &[f64], is_big: bool) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let head = [if is_big { 1000 } else { 0 }, rows, columns, 0, name.len() as i32 + 1];
+    for integer in head {
+        bytes.extend(if is_big { integer.to_be_bytes() } else { integer.to_le_bytes() });
+    }
+    bytes.extend(name.bytes().chain([0]));
+    for value in values {
+        bytes.extend(if is_big { value.to_be_bytes() } else { value.to_le_bytes() });
+    }
+    bytes
+}
+
+/// The curve column by column.
+fn columns() -> Vec<f64> {
+    POINTS.iter().map(|p| p.0).chain(POINTS.iter().map(|p| p.1)).collect()
+}
+
+#[test]
+fn mat_files_of_both_byte_orders() {
+    for is_big in [false, true] {
+        let ours = [
+            matrix("fd_load", 5, 2, &columns(), is_big),
+            matrix("fd_unload", 2, 2, &[1.0, 0.9, 2e6, 0.0], is_big),
+            matrix("k_u", 1, 1, &[8e7], is_big),
+        ];
+        let (curve, format) = read_bytes("a.mat", &ours.concat(), &given(None)).unwrap();
+        assert_eq!(format, "mat");
+        is_points(&curve, "ours");
+        assert_eq!(curve.facts.unloading_stiffness_n_per_m, Some(8e7));
+        assert!(curve.notes[1].contains("SI, as crumple export writes fd_load"));
+        let other = [matrix("n", 1, 1, &[5.0], is_big), matrix("fd", 5, 2, &columns(), is_big)];
+        let other = other.concat();
+        is_points(&read_bytes("b.mat", &other, &given(Some("SI"))).unwrap().0, "other");
+        let error = read_bytes("b.mat", &other, &given(None)).unwrap_err();
+        assert!(
+            error.contains("b.mat: the file does not say its units: give them with --units"),
+            "{error}"
+        );
+    }
+}
+
+/// A channel file.
+fn channel(code: &str, unit: &str, values: &[f64]) -> String {
+    let values: String = values.iter().map(|v| format!("{v}\n")).collect();
+    format!(
+        "Test object number        :1\nName of the channel       :{code}\nChannel code              :{code}\nUnit                      :{unit}\nReference channel         :implicit\nTime of first sample      :-0.002\nSampling interval         :0.001\nNumber of samples         :{}\n{values}",
+        values.lines().count()
+    )
+}
+
+#[test]
+fn iso_mme_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let channels = folder.path().join("T1/Channel");
+    fs::create_dir_all(&channels).unwrap();
+    fs::write(folder.path().join("T1/T1.mme"), "Data format edition number :1.6\n").unwrap();
+    let (d, f) = ([0.0, 5.0, 10.0, 15.0, 12.0], [0.0, 1.0, 2.0, 3.0, 0.0]);
+    fs::write(channels.join("T1.chn"), "Number of channels :3\n").unwrap();
+    fs::write(channels.join("T1.001"), channel("11VEHCCG0000ACXD", "m/s^2", &d)).unwrap();
+    fs::write(channels.join("T1.002"), channel("11FRONT00000DSXP", "mm", &d)).unwrap();
+    fs::write(channels.join("T1.003"), channel("11FRONT00000FOXP", "kN", &f)).unwrap();
+    let expected_d = d.map(|d| d * 1e-3);
+    for path in ["T1", "T1/T1.mme", "T1/Channel/T1.003", "T1/Channel/T1.001"] {
+        let (curve, reader) = read(&folder.path().join(path), &given(None)).unwrap();
+        assert_eq!(reader.name, "iso-mme");
+        assert_eq!(curve.deflection_m, expected_d, "{path}");
+        assert_eq!(curve.force_n, f.map(|f| f * 1e3));
+        assert_eq!(curve.time_s.as_ref().unwrap()[..2], [-0.002, -0.002 + 0.001]);
+        let mut files: Vec<_> = curve.files.iter().map(|f| f.path.clone()).collect();
+        files.dedup();
+        assert_eq!(files.len(), curve.files.len(), "{path}: no file twice");
+    }
+    // A second force: the codes choose.
+    fs::write(channels.join("T1.004"), channel("12FRONT00000FOXP", "kN", &f)).unwrap();
+    let path = folder.path().join("T1");
+    let error = read(&path, &given(None)).unwrap_err().to_string();
+    assert!(error.contains("choose one with --curve: displacement 11FRONT00000DSXP; force 11FRONT00000FOXP, 12FRONT00000FOXP"), "{error}");
+    let chosen =
+        ReadOptions { curve: Some("11FRONT00000DSXP,12FRONT00000FOXP".into()), ..given(None) };
+    assert!(read(&path, &chosen).is_ok());
+    // Damage is named with its file and line.
+    let t = |text: String, expected: &str| {
+        fs::write(channels.join("T1.004"), text).unwrap();
+        let error = read(&path, &given(None)).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    };
+    let good = channel("12FRONT00000FOXP", "kN", &f);
+    t(
+        good.replace("kN", "lbf"),
+        "T1.004: line 4: the unit \"lbf\" of the force is not known: use one of N, kN, MN",
+    );
+    t(
+        good.replace("implicit", "explicit"),
+        "T1.004: line 5: expected \"Reference channel :implicit\"",
+    );
+    t(
+        good.replace("samples         :5", "samples         :9"),
+        "T1.004: line 8: number of samples declares 9, but the file has 5 values",
+    );
+    t(
+        good.replace("\n2\n", "\nNOVALUE\n"),
+        "T1.004: line 11: expected a number, found \"NOVALUE\"",
+    );
+    t(good.replace(":0.001", ":0"), "expected an interval above 0 in s, found \"0\"");
+}
+
+#[test]
+fn two_columns_below_titles_and_labels() {
+    fn t(text: &str, units: Option<&str>) {
+        let (curve, format) = read_bytes("a.cur", text.as_bytes(), &given(units))
+            .unwrap_or_else(|e| panic!("{text}: {e}"));
+        assert_eq!(format, "two-columns", "{text}");
+        is_points(&curve, text);
+    }
+    let mm = rows(1e-3, 1e3, "  ", ".");
+    let label = |x: &str, y: &str| {
+        format!("$ T/HIS\nImpact of a nose, 2nd test\n{x}\n{y}\nnose\n{mm}CONTINUE\n")
+    };
+    t(&label("Displacement (mm)", "Force (kN)"), None);
+    t(&label("X disp of node 12 [mm]", "Sum of rigid walls [kN]"), None);
+    t(&label("a", "b"), Some("mm-kg-ms"));
+    t(&format!("displacement [mm]   force [kN]\n{mm}"), None);
+    t(&format!("# d_mm F_kN\n{mm}"), None);
+    t(&format!("# units: mm-kg-ms\n{mm}"), None);
+    t(&mm, Some("mm-kg-ms"));
+    t(&format!("a title\n{}", rows(1.0, 1.0, ", ", ".")), Some("SI"));
+}
+
+/// Names, contents and options of files that are refused, with what the message must say.
+#[test]
+fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
+    fn t(name: &str, bytes: impl AsRef<[u8]>, units: Option<&str>, expected: &[&str]) {
+        let error = read_bytes(name, bytes.as_ref(), &given(units)).unwrap_err();
+        for part in [&[name][..], expected].concat() {
+            assert!(error.contains(part), "expected {part}\nfound {error}");
+        }
+    }
+    let csv = |rows: &str| format!("d_m,force_N\n{rows}");
+    t(
+        "a.csv",
+        csv("0,0\n1,NaN\n2,3\n3,4\n"),
+        None,
+        &["line 3, field 2: expected a number, found \"NaN\""],
+    );
+    t(
+        "a.csv",
+        csv("0,0\n1,ten\n2,3\n3,4\n"),
+        None,
+        &["line 3, field 2: expected a number, found \"ten\""],
+    );
+    t(
+        "a.csv",
+        csv("0,0\n1\n2,3\n3,4\n"),
+        None,
+        &["line 3, field 2: expected a number, found \"\""],
+    );
+    t("a.csv", csv("0,0\n1,1e999\n2,3\n3,4\n"), None, &["line 3, field 2: expected a number"]);
+    t("a.csv", csv("0,0\n1,2\n2,3\n"), None, &["the curve has 3 points: expected at least 4"]);
+    t("a.csv", csv(""), None, &["the curve has 0 points"]);
+    t(
+        "a.csv",
+        csv("0,0\n2,2\n1,3\n3,4\n"),
+        None,
+        &["line 4: the deflection must increase", "or a column of times"],
+    );
+    t(
+        "a.csv",
+        csv("0,0\n1,2\n2,-1\n3,4\n"),
+        None,
+        &["line 4: the force is -1 N", "write pull as 0"],
+    );
+    t(
+        "a.csv",
+        csv("-1,-2\n0,0\n1,2\n2,3\n"),
+        None,
+        &["line 2: the force is -2 N on the other side"],
+    );
+    t(
+        "a.csv",
+        "d,force\n0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &[
+            "line 1: the deflection has no unit (\"d\")",
+            "write it as d_m or d_mm",
+            "--units, such as mm-t-s or SI",
+        ],
+    );
+    t(
+        "a.csv",
+        "0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &["line 1: the header (the names of the columns)", "--units"],
+    );
+    t(
+        "a.csv",
+        "d [inch],force_N\n0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &["line 1: the unit \"inch\" of the deflection is not known: use one of mm, cm, m"],
+    );
+    t(
+        "a.csv",
+        "d_m,force [kn]\n0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &["the unit \"kn\" of the force is not known: use one of N, kN, MN"],
+    );
+    t(
+        "a.csv",
+        "date,note\n0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &[
+            "line 1: expected a column deflection with its unit, such as d_m or d_mm, found \"date\"",
+        ],
+    );
+    t(
+        "a.csv",
+        "d_m,note\n0,0\n1,2\n2,3\n3,4\n",
+        None,
+        &["expected a column force with its unit, such as force_N or force_kN, found \"note\""],
+    );
+    t(
+        "a.csv",
+        "# force_kind: big\nd_m,force_N\n0,0\n",
+        None,
+        &["line 1: \"# force_kind: big\": expected \"body\" or \"contact\""],
+    );
+    t("a.csv", b"d_m,force_N\n0,\xff\n1,2\n", None, &["line 2"]);
+    t(
+        "a.json",
+        "{}",
+        None,
+        &["this is no predicted curve", "give a JSON file made by crumple predict"],
+    );
+    t("a.json", "{\"deflection_m\": [0, 1", None, &["line 1 column 22"]);
+    t(
+        "a.bin",
+        [0u8, 159, 146, 150],
+        None,
+        &["neither content nor extension tell the format", "--from"],
+    );
+    for empty in ["a.csv", "a.json", "a.k", "a.txt", "a.mat", "a.cur", "a.mme"] {
+        t(empty, "", None, &["expected a curve, found an empty file"]);
+    }
+    let card = "       101         0";
+    t(
+        "a.k",
+        deck("x", card, &fields(1.0, 1.0)),
+        None,
+        &["the file does not say its units", "\"$ units: mm-t-s\""],
+    );
+    t(
+        "a.k",
+        deck("$x", card, &fields(1.0, 1.0)),
+        Some("SI"),
+        &["line 7, columns 1-10: expected the number of a curve (LCID)", "line 5 begins with $"],
+    );
+    t(
+        "a.k",
+        deck("x", card, "  0.0 0.0\n"),
+        Some("SI"),
+        &[
+            "line 7, columns 1-20: expected one number in each field of 20 columns, or fields with commas between, found \"0.0 0.0\"",
+        ],
+    );
+    t(
+        "a.k",
+        deck("x", card, &fields(1.0, 1.0).replace("1000000", "&param")),
+        Some("SI"),
+        &["columns 21-40: expected a number, found \"&param\""],
+    );
+    t("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 points"]);
+    t(
+        "a.k",
+        deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"),
+        Some("SI"),
+        &["line 8, field 2: expected a number, found \"nan\""],
+    );
+    t(
+        "a.k",
+        "*KEYWORD\n*NODE\n1,2\n",
+        Some("SI"),
+        &["expected a *DEFINE_CURVE, found none in this deck"],
+    );
+    let table = |head: &str| format!("#1\n{head}\n{}", rows(1.0, 1.0, " ", "."));
+    t("a.txt", table("double nose(5,2)"), None, &["does not say its units", "# d [m], F [N]"]);
+    t(
+        "a.txt",
+        table("double fd_load(9,2)"),
+        None,
+        &["line 2: table fd_load declares 9 rows of 2, but the file has 10 values for it"],
+    );
+    t(
+        "a.txt",
+        table("double fd_load(3,2)"),
+        None,
+        &["line 6, field 1: expected no more than the 3 rows of 2 that table fd_load declares"],
+    );
+    t(
+        "a.txt",
+        table("double fd_load(900000,900000)"),
+        None,
+        &[
+            "line 2: table fd_load declares 900000 rows of 900000, but the file has",
+            "correct the size",
+        ],
+    );
+    t("a.txt", table("double fd_load(99999999999,2)"), None, &["more than 1000000 points"]);
+    t(
+        "a.txt",
+        table("double fd_load"),
+        None,
+        &["line 2: expected a table such as \"double fd_load(4,2)\""],
+    );
+    t("a.txt", table("double k(10,1)"), Some("SI"), &["expected a table of two columns"]);
+    t(
+        "a.txt",
+        table("double fd_load(5,2)").replace("1000000", "x"),
+        None,
+        &["expected a number, found \"x\""],
+    );
+    let mat = matrix("fd_load", 5, 2, &columns(), false);
+    t(
+        "a.mat",
+        &mat[..60],
+        None,
+        &[
+            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes behind its name",
+            "it may be cut",
+        ],
+    );
+    t("a.mat", &mat[..10], None, &["byte 0: expected a matrix of a MAT file of version 4"]);
+    t(
+        "a.mat",
+        matrix("fd_load", i32::MAX, i32::MAX, &[], false),
+        None,
+        &["declares 2147483647 rows of 2147483647"],
+    );
+    t(
+        "a.mat",
+        matrix("fd_load", 5, 2, &[0.0, 1.0, 2.0, 3.0, 4.0, 0.0, f64::NAN, 1.0, 1.0, 1.0], false),
+        None,
+        &["row 2: the force is NaN: expected a finite number"],
+    );
+    t(
+        "a.mat",
+        matrix("x", 2, 5, &columns(), false),
+        None,
+        &["expected a full matrix of doubles with two columns", "found x (2 x 5)"],
+    );
+    t("a.mat", "MATLAB 5.0 MAT-file", None, &["of a later version: save it with -v4"]);
+    t(
+        "a.cur",
+        "t\nTime (ms)\nForce (kN)\nl\n0 0\n1 2\n2 3\n3 4\n",
+        None,
+        &["line 2: expected a deflection in the first column, found \"Time (ms)\""],
+    );
+    t(
+        "a.cur",
+        "t\nx\ny\nl\n0 0\n1 2\n2 3\n3 4\n",
+        None,
+        &["the deflection has no unit", "--units"],
+    );
+    t(
+        "a.cur",
+        "x (m)\ny (N)\n0 0\n1 abc\n2 3\n3 4\n",
+        None,
+        &["line 4, field 2: expected a number, found \"abc\""],
+    );
+    t(
+        "a.cur",
+        "x (m)\ny (N)\n0 0\n1 2 3\n",
+        None,
+        &["line 4: expected two numbers, or CONTINUE behind a curve"],
+    );
+}
+
+/// Titles of 200 characters, beyond ASCII, with commas: kept, and cut behind 200.
+#[test]
+fn titles_are_kept() {
+    let long = "ä".repeat(250);
+    for title in ["Nase, 36 km/h; \"neu\"", "碰撞曲线", &long] {
+        let kept: String = title.chars().take(200).collect();
+        let card = "       101         0";
+        let k = deck(title, card, &fields(1.0, 1.0));
+        let (curve, _) = read_bytes("a.k", k.as_bytes(), &given(Some("SI"))).unwrap();
+        assert_eq!(curve.title.as_deref(), Some(kept.trim()), "{title}");
+        let cur = format!("t\nx (m)\ny (N)\n{title}\n{}", rows(1.0, 1.0, " ", "."));
+        let (curve, _) = read_bytes("a.cur", cur.as_bytes(), &given(None)).unwrap();
+        assert_eq!(curve.title.as_deref(), Some(kept.trim()), "{title}");
+        let is_cut = curve.notes.iter().any(|n| n == "title: cut to its first 200 characters");
+        assert_eq!(is_cut, title.len() > 300);
+    }
+}
+
+/// The curve as a CSV file in a new folder.
+fn here() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("d_mm,force_kN\n{}", rows(1e-3, 1e3, ",", "."));
+    fs::write(folder.path().join("nose.csv"), text).unwrap();
+    folder
+}
+
+/// The arguments of an import of `nose.csv` with these beside.
+fn adding<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&["db", "add", "c.h5", "nose.csv", "--group", "tests"][..], more].concat()
+}
+
+const WALL: [&str; 4] = ["--kind", "wall", "--mass", "24t"];
+
+fn cases(folder: &Path, group: &str) -> Vec<Value> {
+    let shown = crumple_ok(folder, &["db", "show", "c.h5", "--group", group, "--json"]);
+    let shown: Value = serde_json::from_str(&shown).unwrap();
+    shown["groups"][group].as_array().unwrap().clone()
+}
+
+#[test]
+fn a_file_becomes_a_case_that_every_command_knows() {
+    let folder = here();
+    let here = folder.path();
+    let v = format!("{}m/s", speed());
+    let added =
+        crumple_ok(here, &adding(&[&WALL[..], &["--speed", &v, "--unloading", "80MN/m"]].concat()));
+    for part in [
+        "nose",
+        "1.0000",
+        "80.0 MN/m",
+        "columns: deflection of \"d_mm\" in mm",
+        "motion: reconstructed",
+        "force: taken as the contact force",
+        "wrote c.h5 (group tests)",
+    ] {
+        assert!(added.contains(part), "{part} is missing in\n{added}");
+    }
+    let case = &cases(here, "tests")[0];
+    assert_eq!(case["study"], "imported");
+    assert_eq!(case["name"], "nose");
+    assert_eq!(case["truncated"], false);
+    let bytes = fs::read(here.join("nose.csv")).unwrap();
+    assert_eq!(case["sources"][0]["path"], "nose.csv");
+    assert_eq!(case["sources"][0]["size_bytes"], bytes.len());
+    assert_eq!(case["sources"][0]["blake3"], blake3::hash(&bytes).to_hex().to_string());
+    assert_eq!(case["recipe"]["imported"]["format"], "csv");
+    // No point of the table is lost.
+    let d: Vec<f64> = serde_json::from_value(case["original"]["deflection_m"].clone()).unwrap();
+    let f: Vec<f64> = serde_json::from_value(case["original"]["force_N"].clone()).unwrap();
+    for (dp, fp) in POINTS {
+        let found = d.iter().zip(&f).any(|(d, f)| (d - dp).abs() < 1e-12 && (f - fp).abs() < 1e-5);
+        assert!(found, "({dp}, {fp})");
+    }
+    let t: Vec<f64> = serde_json::from_value(case["time_s"].clone()).unwrap();
+    assert!((t[1] - 0.75e-3).abs() < 1e-12);
+    let check = crumple_ok(here, &["db", "check", "c.h5", "--strict"]);
+    assert_eq!(check, "1 cases checked, 0 findings\n");
+}
+
+#[test]
+fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits() {
+    let folder = here();
+    let here = folder.path();
+    let v = format!("{}m/s", speed());
+    let t = |code: i32, more: &[&str], expected: &str| {
+        let before = entries(here);
+        let error = crumple_fails(here, code, &adding(more));
+        assert!(error.contains(expected), "expected {expected}, found:\n{error}");
+        assert_eq!(entries(here), before);
+    };
+    t(
+        2,
+        &["--speed", &v, "--mass", "24t"],
+        "nose.csv: the file does not say what its speed is measured against: give --kind wall",
+    );
+    t(
+        2,
+        &["--speed", &v, "--kind", "wall"],
+        "nose.csv: the file does not say the mass of the body: give --mass",
+    );
+    t(2, &WALL, "nose.csv: the file does not say its speed: give --speed, such as --speed 36km/h");
+    t(2, &["--speed", "36"], "speed \"36\" has no unit");
+    let with = |more: &[&'static str]| -> Vec<String> {
+        WALL.iter()
+            .chain(&["--speed"])
+            .map(|s| s.to_string())
+            .chain([v.clone()])
+            .chain(more.iter().map(|s| s.to_string()))
+            .collect()
+    };
+    let t_with = |code: i32, more: &[&'static str], expected: &str| {
+        let with = with(more);
+        t(code, &with.iter().map(String::as_str).collect::<Vec<_>>(), expected);
+    };
+    t_with(
+        2,
+        &["other.csv"],
+        "--speed is given 1 times for 2 files: give it once for each file, in their order",
+    );
+    t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 files");
+    t_with(2, &["--other-mass", "3t"], "a wall has no mass: remove --other-mass");
+    t_with(1, &["--case", "a/b"], "\"a/b\" cannot be the name of a case: it may not contain");
+    t_with(
+        1,
+        &["--from", "xyz"],
+        "there is no format \"xyz\" of curves that can be read: use one of mat, json, lsdyna",
+    );
+    t(
+        1,
+        &["--kind", "wall", "--mass", "240t", "--speed", &v],
+        "nose.csv: the curve takes up 0.1000 times the kinetic energy of 240.0 t",
+    );
+    t(
+        1,
+        &["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"],
+        "is softer than the line from the largest deflection",
+    );
+    // The second file is missing: the first is not written either.
+    t(
+        1,
+        &["missing.csv", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v],
+        "missing.csv: No such file",
+    );
+    t(
+        1,
+        &[".", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v],
+        ".: this is a folder: give a file",
+    );
+    crumple_ok(
+        here,
+        &with(&[]).iter().map(String::as_str).fold(adding(&[]), |mut a, s| {
+            a.push(s);
+            a
+        }),
+    );
+    t_with(
+        1,
+        &[],
+        "group \"tests\" has a case \"nose\" already: replace it with --replace, or give another name with --case",
+    );
+    t_with(
+        1,
+        &["--force", "body", "--case", "b"],
+        "this curve has a body force, the cases of group \"tests\" have a contact one",
+    );
+    t(
+        1,
+        &["--kind", "closing", "--mass", "24t", "--speed", &v, "--case", "b", "--accept-energy"],
+        "this curve has a closing speed",
+    );
+    crumple_ok(
+        here,
+        &with(&["--replace"]).iter().map(String::as_str).fold(adding(&[]), |mut a, s| {
+            a.push(s);
+            a
+        }),
+    );
+    // The kind is the group's where nothing else says it.
+    let added = crumple_ok(here, &adding(&["--speed", &v, "--mass", "24t", "--case", "b"]));
+    assert!(added.contains("speed: wall as in the group"), "{added}");
+    // A database that is none stays as it is.
+    fs::write(here.join("c.h5"), "hello\n").unwrap();
+    t_with(1, &[], "c.h5: ");
+    assert_eq!(fs::read(here.join("c.h5")).unwrap(), b"hello\n");
+}
+
+/// A record with times keeps its motion: a mass on a spring, and what was before contact.
+#[test]
+fn a_record_over_time_is_extracted_as_one_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 40e6);
+    let omega = (k / m).sqrt();
+    let mut text = "time [ms];displacement [mm];force [kN]\n".to_string();
+    for i in -100..=1_500 {
+        let t = f64::from(i) * 1e-4;
+        let half = std::f64::consts::PI / omega;
+        let d = match t {
+            t if t < 0.0 => v * t,
+            t if t < half => v / omega * (omega * t).sin(),
+            t => -v * (t - half),
+        };
+        // Displacement counts from where the record begins, compression is negative.
+        let f = if (0.0..half).contains(&t) { -k * d } else { 0.0 };
+        text += &format!("{};{};{}\n", t * 1e3, (d + 0.1) * 1e3, f * 1e-3).replace('.', ",");
+    }
+    fs::write(here.join("nose.csv"), text).unwrap();
+    let added = crumple_ok(here, &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24t"]));
+    assert!(added.contains("motion: that of the file's times"), "{added}");
+    assert!(added.contains("force: sign flipped, positive in compression"), "{added}");
+    let case = &cases(here, "tests")[0];
+    let crush = case["max_deflection_m"].as_f64().unwrap();
+    assert!((crush / (v / omega) - 1.0).abs() < 2e-4, "{crush}");
+    assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 1e-3);
+    assert!(case["contact_time_s"].as_f64().unwrap().abs() < 1e-5);
+    // Through another unit system, the likely cause is found as in a build.
+    let error = crumple_fails(
+        here,
+        1,
+        &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24kg", "--case", "b"]),
+    );
+    assert!(error.contains("such an impact cannot be"), "{error}");
+    assert!(error.contains("--accept-energy"), "{error}");
+}
+
+/// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
+/// models train; a build into the same database keeps it.
+#[test]
+fn predicted_curves_come_back_as_a_group_that_trains() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::rename(build_fixture(here, "lead-car-wall"), here.join("c.h5")).unwrap();
+    let train = |group: &str, model: &str| {
+        crumple_ok(here, &["train", "c.h5", "--group", group, "--model", "linear", "-o", model]);
+    };
+    train("lead-car-wall", "a.model");
+    let speeds = ["25", "36", "45", "54", "63"];
+    for speed in speeds {
+        let kmh = format!("{speed}km/h");
+        let (json, csv) = (format!("{speed}.json"), format!("{speed}.csv"));
+        crumple_ok(here, &["predict", "a.model", "--speed", &kmh, "-o", &json, "-o", &csv]);
+    }
+    for (format, group) in [("json", "again"), ("csv", "body")] {
+        let files = speeds.map(|speed| format!("{speed}.{format}"));
+        let mut arguments = vec!["db", "add", "c.h5", "--group", group, "--json"];
+        arguments.extend(files.iter().map(String::as_str));
+        let output = crumple_in(here, &arguments);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{error}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        for case in report["cases"].as_array().unwrap() {
+            // The model's own balance is not exact.
+            let balance = case["work_over_energy"].as_f64().unwrap();
+            assert!((0.9..1.1).contains(&balance), "{case}");
+            assert_eq!(case["mass_kg"], 24e3);
+            assert_eq!(case["force_kind"], if group == "body" { "body" } else { "contact" });
+        }
+    }
+    // The whole way back: the curve of a middle speed, left out of nothing, is the first model's.
+    train("again", "b.model");
+    for model in ["a", "b"] {
+        let (model, out) = (format!("{model}.model"), format!("{model}50.json"));
+        crumple_ok(here, &["predict", &model, "--speed", "45km/h", "-o", &out]);
+    }
+    let of = |name: &str| -> Value {
+        serde_json::from_slice(&fs::read(here.join(name)).unwrap()).unwrap()
+    };
+    let (first, second) = (of("a50.json"), of("b50.json"));
+    for key in ["max_deflection_m", "energy_J"] {
+        let (a, b) = (first[key].as_f64().unwrap(), second[key].as_f64().unwrap());
+        assert!((a / b - 1.0).abs() < 0.02, "{key}: {a} and {b}");
+    }
+    let rebound = |curve: &Value| curve["rebound"]["speed_m_per_s"].as_f64().unwrap();
+    assert!(
+        (rebound(&first) / rebound(&second) - 1.0).abs() < 0.1,
+        "{} {}",
+        rebound(&first),
+        rebound(&second)
+    );
+    let report = crumple_ok(here, &["validate", "c.h5", "--group", "again", "--json"]);
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert!(report["groups"][0]["rows"].as_array().unwrap().len() > 3);
+    // A build leaves them, in other groups and in its own.
+    let nose = format!("d_m,force_N\n{}", rows(1.0, 1.0, ",", "."));
+    fs::write(here.join("nose.csv"), nose).unwrap();
+    let v = format!("{}m/s", speed());
+    crumple_ok(
+        here,
+        &[
+            "db",
+            "add",
+            "c.h5",
+            "nose.csv",
+            "--group",
+            "lead-car-wall",
+            "--speed",
+            &v,
+            "--mass",
+            "24t",
+        ],
+    );
+    let study = crate::common::fixture("fe/lead-car-wall/study.toml");
+    crumple_ok(here, &["build", study.to_str().unwrap(), "-o", "c.h5"]);
+    assert_eq!(cases(here, "lead-car-wall").len(), 8);
+    assert_eq!(cases(here, "again").len(), 5);
+    train("lead-car-wall", "mixed.model");
+    let error = crumple_fails(
+        here,
+        1,
+        &[
+            "db",
+            "add",
+            "c.h5",
+            "nose.csv",
+            "--group",
+            "lead-car-wall",
+            "--speed",
+            &v,
+            "--mass",
+            "24t",
+            "--case",
+            "36kmh",
+            "--replace",
+        ],
+    );
+    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car against a rigid wall\", which builds it"), "{error}");
+}
+
+#[test]
+fn no_study_takes_the_name_of_what_was_added() {
+    let study = fs::read_to_string(crate::common::fixture("fe/lead-car-wall/study.toml")).unwrap();
+    let name = study.lines().find(|l| l.starts_with("name")).unwrap();
+    let study = study.replace(name, "name = \"imported\"");
+    let error = crumple::study::parse(Path::new("study.toml"), &study).unwrap_err().to_string();
+    assert!(error.contains("is the name of the curves that crumple db add takes"), "{error}");
+}
+
+/// Reads bytes as every format, by name and by content.
+fn read_as_all(folder: &Path, bytes: &[u8]) {
+    for name in ["a.csv", "a.mme", "a.001"] {
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+    for units in [None, Some("mm-t-s")] {
+        let _ = read(&folder.join("a.csv"), &given(units));
+        for reader in READERS {
+            let options = ReadOptions { format: Some(reader.name.into()), ..given(units) };
+            let _ = read(&folder.join("a.001"), &options);
+        }
+    }
+    let _ = read(&folder.join("a.mme"), &given(None));
+}
+
+/// Good files of every format, to be damaged.
+fn good() -> Vec<Vec<u8>> {
+    let card = "       101         0       1.0       1.0       0.0       0.0         0         0";
+    vec![
+        format!(
+            "# mass_kg: 24000\ntime [ms];d_mm;force_kN\n0;{}",
+            rows(1e-3, 1e3, ";", ",").replace('\n', "\n1;")
+        )
+        .into_bytes(),
+        deck("x", card, &fields(1.0, 1.0)).into_bytes(),
+        format!("#1\ndouble fd_load(5,2)  # d [m], F [N]\n{}", rows(1.0, 1.0, " ", "."))
+            .into_bytes(),
+        [matrix("fd_load", 5, 2, &columns(), false), matrix("k_u", 1, 1, &[8e7], false)].concat(),
+        channel("11FRONT00000FOXP", "kN", &[0.0, 1.0, 2.0, 3.0, 0.0]).into_bytes(),
+        format!("t\nx (m)\ny (N)\nl\n{}CONTINUE\n", rows(1.0, 1.0, " ", ".")).into_bytes(),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn any_bytes_give_a_curve_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+        let folder = tempfile::tempdir().unwrap();
+        read_as_all(folder.path(), &bytes);
+    }
+
+    #[test]
+    fn damaged_files_give_a_curve_or_an_error(
+        which in any::<prop::sample::Index>(),
+        flips in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
+        cut in any::<prop::sample::Index>(),
+        is_cut in any::<bool>(),
+    ) {
+        let good = good();
+        let mut bytes = good[which.index(good.len())].clone();
+        for (at, byte) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        if is_cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        let folder = tempfile::tempdir().unwrap();
+        read_as_all(folder.path(), &bytes);
+    }
+
+    /// Any table of positive forces gives a case or an error, in bounded time.
+    #[test]
+    fn any_table_gives_a_case_or_an_error(
+        points in proptest::collection::vec((1e-6f64..1.0, 0.0f64..1e7), 3..40),
+        v in 0.01f64..300.0,
+        unloading in proptest::option::of(1e3f64..1e12),
+    ) {
+        use crumple::curve::from_table::{Impact, Table, from_table};
+        let mut d = 0.0;
+        let (mut deflection_m, mut force_n) = (vec![0.0], vec![0.0]);
+        for (step, force) in points {
+            d += step;
+            deflection_m.push(d);
+            force_n.push(force);
+        }
+        let table = Table { deflection_m: &deflection_m, force_n: &force_n, time_s: None, body_force_n: None };
+        let impact = Impact {
+            speed: crumple::unit::Speed { m_per_s: v, kind: crumple::unit::SpeedKind::Wall },
+            masses: crumple::curve::Masses { body_kg: 24e3, other_kg: None },
+            unloading_stiffness_n_per_m: unloading,
+            body_unloading_stiffness_n_per_m: None,
+            units: UnitSystem::SI,
+            accept_energy: true,
+        };
+        if let Ok(case) = from_table(&table, &impact) {
+            let states = case.original.time_s().len();
+            prop_assert!(states < 500_000, "{states} states");
+            for d in &deflection_m {
+                prop_assert!(case.original.deflection_m().contains(d));
+            }
+        }
+    }
+}
