@@ -65,7 +65,6 @@ pub mod multibody;
 
 pub mod nsdm;
 
-#[allow(missing_docs)]
 pub mod formats;
 
 pub mod import;

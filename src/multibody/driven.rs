@@ -17,7 +17,7 @@ pub enum UnloadingChoice {
 
 impl ForceLaw {
     /// The law that follows a curve.
-    pub(crate) fn of_curve(
+    pub fn of_curve(
         curve: &DrivingCurve,
         unloading: UnloadingChoice,
         end: EnvelopeEnd,
