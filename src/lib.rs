@@ -53,6 +53,8 @@ pub mod build;
 
 pub mod dataset;
 
+mod piecewise;
+
 mod table;
 
 mod stream;

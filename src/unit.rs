@@ -70,7 +70,7 @@ pub enum UnitError {
         /// The same number with a unit.
         example: String,
     },
-    /// The unit is none of this kind of quantity.
+    /// The unit does not belong to this kind of quantity.
     #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
     UnknownUnit {
         /// What kind of quantity was expected.
