@@ -291,7 +291,7 @@ pub(crate) const GRID_M: f64 = 2e-3;
 const SAME_SPEED: f64 = 1e-3;
 
 /// Whether two speeds count as one.
-pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
+pub fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 

@@ -152,7 +152,8 @@ pub const TIME: Dimension = Dimension {
     example_unit: "ms",
     units: &[("us", 1e-6), ("ms", 1e-3), ("s", 1.0)],
 };
-pub(crate) const STIFFNESS: Dimension = Dimension {
+/// Stiffnesses, in N/m inside.
+pub const STIFFNESS: Dimension = Dimension {
     what: "stiffness",
     example_unit: "MN/m",
     units: &[

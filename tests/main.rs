@@ -12,6 +12,7 @@ mod documents;
 mod engine;
 mod examples;
 mod files;
+mod fmu;
 mod forest;
 mod growing;
 mod house_rules;

@@ -109,25 +109,8 @@ pub fn compare(
     settings: &ComparisonSettings,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
-    let near = |v: f64| is_same_speed(v, speed_m_per_s);
-    let index = set
-        .cases
-        .iter()
-        .position(|c| near(c.speed_m_per_s))
-        .ok_or_else(|| no_case(group, speed_m_per_s, &set))?;
-    if set.cases.len() < 3 {
-        return Err(CompareError::TooFew { cases: set.cases.len() });
-    }
-    let left_out = LeftOutCase::new(&set, cases, index).map_err(|error| match error {
-        NotLeftOut::Truncated { case } => CompareError::Truncated { case },
-        NotLeftOut::Motion(error) => error.into(),
-        NotLeftOut::TooFew { .. } => CompareError::TooFew { cases: set.cases.len() },
-        error => error.into(),
-    })?;
+    let left_out = left_out_at(speed_m_per_s, &set, cases)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
-    if rest.cases.len() < 2 {
-        return Err(CompareError::TooFew { cases: set.cases.len() });
-    }
     let speed = case.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
     let find = |name: &str| {
@@ -151,7 +134,8 @@ pub fn compare(
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
     compared.push(rows.row(methods::ddtcm(&left_out, settings.seed)?)?);
-    let others: Vec<Case> = cases.iter().filter(|c| !near(c.speed.m_per_s)).cloned().collect();
+    let is_other = |c: &&Case| !is_same_speed(c.speed.m_per_s, speed_m_per_s);
+    let others: Vec<Case> = cases.iter().filter(is_other).cloned().collect();
     compared.push(rows.row(methods::best(&left_out, group, &others, settings.seed)?)?);
 
     Ok(Comparison {
@@ -169,6 +153,31 @@ pub fn compare(
         rows: compared,
         nsdm: report,
     })
+}
+
+/// The case at `speed_m_per_s`, left out of the group; at least two others must remain.
+fn left_out_at<'a>(
+    speed_m_per_s: f64,
+    set: &'a TrainingSet,
+    cases: &'a [Case],
+) -> Result<LeftOutCase<'a>, CompareError> {
+    let index = set
+        .cases
+        .iter()
+        .position(|c| is_same_speed(c.speed_m_per_s, speed_m_per_s))
+        .ok_or_else(|| no_case(&set.group, speed_m_per_s, set))?;
+    let too_few = CompareError::TooFew { cases: set.cases.len() };
+    if set.cases.len() < 3 {
+        return Err(too_few);
+    }
+    match LeftOutCase::new(set, cases, index) {
+        Ok(left_out) if left_out.rest.cases.len() < 2 => Err(too_few),
+        Ok(left_out) => Ok(left_out),
+        Err(NotLeftOut::Truncated { case }) => Err(CompareError::Truncated { case }),
+        Err(NotLeftOut::Motion(error)) => Err(error.into()),
+        Err(NotLeftOut::TooFew { .. }) => Err(too_few),
+        Err(error) => Err(error.into()),
+    }
 }
 
 fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> CompareError {

@@ -25,6 +25,7 @@ use crate::scenario::{
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
 use crate::solver::{self, Selection, WantedId};
+use crate::surrogate::Model;
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
@@ -250,23 +251,19 @@ fn methods<'a>(
     }
 
     let start = Instant::now();
-    let mut forests = sources.clone();
-    for (name, (case, cases)) in &groups {
+    let forests = with_models(sources, &groups, |group, cases| {
         // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
-        let model = ddtcm_model(&TrainingSet::new(&case.group, cases)?, settings.seed)?;
-        forests.replace(name, CurveSource::Model(Box::new(model)));
-    }
+        Ok(ddtcm_model(&TrainingSet::new(group, cases)?, settings.seed)?)
+    })?;
     let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
     add("ddtcm", "recipe's force", paper, forests, start.elapsed().as_secs_f64());
 
     let start = Instant::now();
-    let mut best = sources.clone();
-    for (name, (case, cases)) in &groups {
+    let best = with_models(sources, &groups, |group, cases| {
         let choice = Choice::Auto { seed: settings.seed, trees: None };
-        let model = validate::train(&case.group, cases, choice)?;
-        best.replace(name, CurveSource::Model(Box::new(model)));
-    }
+        Ok(validate::train(group, cases, choice)?)
+    })?;
     let fit_s = start.elapsed().as_secs_f64();
     for (name, speed) in
         [("best_train", InterfaceSpeed::Train), ("best_local", InterfaceSpeed::Local)]
@@ -276,6 +273,19 @@ fn methods<'a>(
         add(name, "body force", changed, best.clone(), fit_s);
     }
     Ok(methods)
+}
+
+/// The sources with a model in place of every case, which `fit` makes of the case's group.
+fn with_models(
+    sources: &Sources,
+    groups: &BTreeMap<String, (Case, Vec<Case>)>,
+    fit: impl Fn(&str, &[Case]) -> Result<Model, CompareError>,
+) -> Result<Sources, CompareError> {
+    let mut models = sources.clone();
+    for (name, (case, cases)) in groups {
+        models.replace(name, CurveSource::Model(Box::new(fit(&case.group, cases)?)));
+    }
+    Ok(models)
 }
 
 /// The scenario and its curves with a spring and damper fitted to each case.

@@ -10,6 +10,7 @@ use crumple::assess::{ComparisonSettings, Row};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::nsdm::Start;
+use crumple::rating::Rating;
 use crumple::scenario;
 use crumple::unit::km_per_h;
 use serde::Serialize;
@@ -160,36 +161,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         comparison.reference_peak_force_n / 1e6,
         comparison.reference_max_crush_m
     )?;
-    let score = |iso: &Option<crumple::rating::iso18571::Iso18571>| {
-        iso.as_ref().map_or("-".into(), |iso| format!("{:.3}", iso.rating))
-    };
-    let factor = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.3e}"));
-    let rows: Vec<Vec<String>> = comparison
-        .rows
-        .iter()
-        .map(|row| {
-            vec![
-                row.method.clone(),
-                row.driven_by.map_or("spring and damper", ForceKind::name).into(),
-                row.curve.clone(),
-                percent(row.velocity_l1),
-                format!(
-                    "{} ({:.2})",
-                    percent(row.acceleration_l1),
-                    row.acceleration_unfiltered_l1 * 100.0
-                ),
-                format!("{}/{}", score(&row.velocity.iso18571), score(&row.acceleration.iso18571)),
-                row.force_l1.map_or("-".into(), percent),
-                format!("{:.3} MN", row.peak_force_n / 1e6),
-                format!("{:.4} m", row.max_crush_m),
-                format!("{:.1} ms", row.fit_time_s * 1e3),
-                format!("{:.2} ms", row.predict_time_s * 1e3),
-                format!("{:.2} ms", row.simulation_time_s * 1e3),
-                factor(row.speed_up),
-                factor(row.speed_up_with_training),
-            ]
-        })
-        .collect();
+    let rows: Vec<Vec<String>> = comparison.rows.iter().map(cells).collect();
     let heading = [
         "method",
         "driven by",
@@ -211,6 +183,31 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         Some(nsdm) => print_nsdm(out, nsdm),
         None => Ok(()),
     }
+}
+
+/// The cells of one method, in the order of the table's heading.
+fn cells(row: &Row) -> Vec<String> {
+    let score = |rating: &Rating| {
+        rating.iso18571.map_or("-".to_string(), |iso| format!("{:.3}", iso.rating))
+    };
+    let factor = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.3e}"));
+    let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
+    vec![
+        row.method.clone(),
+        row.driven_by.map_or("spring and damper", ForceKind::name).into(),
+        row.curve.clone(),
+        percent(row.velocity_l1),
+        format!("{} ({unfiltered:.2})", percent(row.acceleration_l1)),
+        format!("{}/{}", score(&row.velocity), score(&row.acceleration)),
+        row.force_l1.map_or("-".into(), percent),
+        format!("{:.3} MN", row.peak_force_n / 1e6),
+        format!("{:.4} m", row.max_crush_m),
+        format!("{:.1} ms", row.fit_time_s * 1e3),
+        format!("{:.2} ms", row.predict_time_s * 1e3),
+        format!("{:.2} ms", row.simulation_time_s * 1e3),
+        factor(row.speed_up),
+        factor(row.speed_up_with_training),
+    ]
 }
 
 /// What the fits of the spring and damper are worth.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::file;
 use crumple::rating::deceleration::Deceleration;
+use crumple::rating::iso18571::Iso18571;
 use crumple::rating::magnitude_phase::MagnitudePhase;
 use crumple::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
 use crumple::solver::{self, ReadError, Selection, WantedId};
@@ -474,16 +475,7 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
     };
     errors("Sprague-Geers", rating.sprague_geers);
     errors("Russell", rating.russell);
-    let parts = rating.iso18571.map(|i| {
-        format!(
-            "{}; corridor {:.3}, phase {:.3}, magnitude {:.3}, slope {:.3}",
-            i.grade.name(),
-            i.corridor,
-            i.phase,
-            i.magnitude,
-            i.slope
-        )
-    });
+    let parts = rating.iso18571.map(iso18571_parts);
     let score = |rating: f64| format!("{rating:.3}");
     row("ISO/TS 18571", rating.iso18571.map(|i| score(i.rating)), parts.unwrap_or_default());
     let parts = rating.cora.map(|c| {
@@ -504,4 +496,15 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
         row("largest 120 ms mean", value, more);
     }
     rows
+}
+
+fn iso18571_parts(rating: Iso18571) -> String {
+    format!(
+        "{}; corridor {:.3}, phase {:.3}, magnitude {:.3}, slope {:.3}",
+        rating.grade.name(),
+        rating.corridor,
+        rating.phase,
+        rating.magnitude,
+        rating.slope
+    )
 }

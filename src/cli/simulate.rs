@@ -298,19 +298,7 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
     let speed = format!("speed at {} ms", (summary.end_s * 1e6).round() / 1e3);
     output::table(out, &["body", &speed, "mean deceleration", "over 120 ms"], &rows)?;
     if let Some(limits) = &summary.limits {
-        let over = match limits.over.is_empty() {
-            true => "no vehicle".into(),
-            false => limits.over.join(", "),
-        };
-        let of = match &limits.trains {
-            Some(trains) => format!(", of train {}", trains.join(", ")),
-            None => String::new(),
-        };
-        writeln!(
-            out,
-            "over {} g ({}:{}{of}): {over}\n{}",
-            limits.mean_deceleration_limit_g, limits.standard, limits.edition, limits.statement
-        )?;
+        print_limits(out, limits)?;
     }
     writeln!(
         out,
@@ -320,5 +308,21 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
         ledger.stored_j / 1e6,
         ledger.dissipated_j / 1e6,
         ledger.max_energy_error
+    )
+}
+
+fn print_limits(out: &mut dyn Write, limits: &Limits) -> io::Result<()> {
+    let over = match limits.over.is_empty() {
+        true => "no vehicle".into(),
+        false => limits.over.join(", "),
+    };
+    let of = match &limits.trains {
+        Some(trains) => format!(", of train {}", trains.join(", ")),
+        None => String::new(),
+    };
+    writeln!(
+        out,
+        "over {} g ({}:{}{of}): {over}\n{}",
+        limits.mean_deceleration_limit_g, limits.standard, limits.edition, limits.statement
     )
 }

@@ -1,7 +1,7 @@
 //! `crumple train`: from a group of the database to a model file.
 
 use std::iter;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use crumple::assess::validate::{self, Choice};
@@ -10,7 +10,7 @@ use crumple::forest::{StopRule, Thresholds};
 use crumple::surrogate::forest::ForestOptions;
 use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{MODELS, ModelKind};
+use crumple::surrogate::{MODELS, Model, ModelKind};
 use crumple::unit::km_per_h;
 use serde::Serialize;
 
@@ -169,11 +169,17 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         ));
     }
     let warned = !truncated.is_empty() || model.cases.len() < 3;
+    print(&args.output, group, &model, options)?;
+    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+}
+
+/// Says what was trained and how good it is.
+fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Result<(), Failure> {
     let out_of_bag = model.forest().and_then(|forest| forest.forest().out_of_bag());
     let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
     if options.json {
         output::print_json(&Document {
-            output: args.output.display().to_string(),
+            output: path.display().to_string(),
             group,
             model: model.name(),
             options: &model.kind,
@@ -194,8 +200,8 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             if let Some(validation) = &model.leave_one_out {
                 super::validate::print_means(out, validation)?;
             }
-            writeln!(out, "wrote {}", args.output.display())
+            writeln!(out, "wrote {}", path.display())
         })?;
     }
-    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+    Ok(())
 }

@@ -87,17 +87,9 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
     let v = &case.closing_speed_m_per_s;
     let mass = case.masses.effective_kg();
     let end = loading_end(&case.sampled);
-    // States whose deflection advances, and the mean forces between them.
-    let mut states = vec![0];
-    let mut reached_m = 0.0;
-    for i in 1..end {
-        if d[i] > reached_m && d[i] <= (1.0 - LAST_SHARE) * d[end] {
-            states.push(i);
-            reached_m = d[i];
-        }
-    }
-    states.push(end);
+    let states = advancing_states(d, end);
     let mean = |i: usize, j: usize| -0.5 * mass * (v[j] * v[j] - v[i] * v[i]) / (d[j] - d[i]);
+    // The mean forces between them.
     let mut means = Vec::with_capacity(states.len());
     // A body that swings forward at first would be pulled: what an interface that only pushes
     // cannot give it is taken from the next pushes.
@@ -145,6 +137,22 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
         unloading_stiffness_n_per_m: separation
             .and_then(|speed| rebound_stiffness_n_per_m(top, mass, speed)),
     })
+}
+
+/// States on the way to the `end` of the loading branch whose deflection advances, with the first
+/// and the last one.
+fn advancing_states(deflection_m: &[f64], end: usize) -> Vec<usize> {
+    let mut states = vec![0];
+    let mut reached_m = 0.0;
+    for i in 1..end {
+        let d = deflection_m[i];
+        if d > reached_m && d <= (1.0 - LAST_SHARE) * deflection_m[end] {
+            states.push(i);
+            reached_m = d;
+        }
+    }
+    states.push(end);
+    states
 }
 
 /// CFC 60 of values at `time_s`, as they are if their interval is too coarse for it.

@@ -464,18 +464,7 @@ fn decode_case(
         other => return Err(place.damaged(format!("force_kind \"{other}\" is not known"))),
     };
     let sampled = decode_curve(group, place)?;
-    let closing_speed_m_per_s = numbers(group, "closing_speed_m_per_s", place)?;
-    let (speeds, times) = (closing_speed_m_per_s.len(), sampled.time_s().len());
-    if speeds != times {
-        return Err(place.damaged(format!(
-            "closing_speed_m_per_s and time_s differ in length: {speeds} and {times}"
-        )));
-    }
-    if let Some(i) = closing_speed_m_per_s.iter().position(|v| !v.is_finite()) {
-        return Err(
-            place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1))
-        );
-    }
+    let closing_speed_m_per_s = closing_speeds(group, sampled.time_s().len(), place)?;
     let original_place =
         Location { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
     let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
@@ -512,6 +501,27 @@ fn decode_case(
     };
     let hashes = attrs.json(HASHES)?;
     Ok(FoundCase { case, attributes: attrs.map, hashes })
+}
+
+/// The closing speeds of a case, in m/s: a finite one for each of `times` times.
+fn closing_speeds(
+    group: &Group,
+    times: usize,
+    place: &Location<'_>,
+) -> Result<Vec<f64>, DatabaseError> {
+    let speeds = numbers(group, "closing_speed_m_per_s", place)?;
+    if speeds.len() != times {
+        return Err(place.damaged(format!(
+            "closing_speed_m_per_s and time_s differ in length: {} and {times}",
+            speeds.len()
+        )));
+    }
+    match speeds.iter().position(|v| !v.is_finite()) {
+        Some(i) => {
+            Err(place.damaged(format!("closing_speed_m_per_s of state {} is not finite", i + 1)))
+        }
+        None => Ok(speeds),
+    }
 }
 
 fn decode_curve(group: &Group, place: &Location<'_>) -> Result<Curve, DatabaseError> {

@@ -239,12 +239,7 @@ impl Database {
     ///
     /// # Errors
     /// [`DatabaseError::NoGroup`] or [`DatabaseError::NoCase`], with the names there are.
-    pub(crate) fn case(
-        &self,
-        path: &Path,
-        group: &str,
-        name: &str,
-    ) -> Result<&Case, DatabaseError> {
+    pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, DatabaseError> {
         let cases = self.group(path, group)?;
         cases.iter().find(|c| c.name == name).ok_or_else(|| DatabaseError::NoCase {
             path: path.into(),

@@ -54,7 +54,7 @@ fn is_pipe(_: fs::FileType) -> bool {
 ///
 /// # Errors
 /// As of [`kind`], and for a pipe.
-pub(crate) fn open(path: &Path) -> io::Result<File> {
+pub fn open(path: &Path) -> io::Result<File> {
     match kind(path)? {
         Kind::File => File::open(path),
         Kind::Pipe => Err(io::Error::new(

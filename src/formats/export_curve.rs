@@ -6,6 +6,7 @@ use super::thin::softened;
 use super::{ExportError, Options};
 use crate::curve::{DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
+use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::{Beyond, PredictError};
 use crate::surrogate::{PredictedCurve, Warning};
 use crate::unit::{SpeedKind, km_per_h};
@@ -155,9 +156,24 @@ impl ExportCurve {
         (2.0 * stored_j / mass).sqrt() / self.predicted.speed_m_per_s
     }
 
+    /// The law of crumple's own runs: it unloads with its stiffness. Beyond the last point the force
+    /// goes on rising if it bottoms, else it is held.
+    pub fn law(&self) -> ForceLaw {
+        let end = match self.tail {
+            Tail::Bottom => EnvelopeEnd::Slope,
+            Tail::None | Tail::Hold => EnvelopeEnd::Hold,
+        };
+        ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
+    }
+
+    /// Speed of separation over impact speed in crumple's own runs.
+    pub fn own_restitution(&self) -> f64 {
+        self.restitution(TargetUnloading::Line(self.stiffness_n_per_m()))
+    }
+
     /// What the target's unloading gives beside ours, in one line.
     pub fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
-        let ours = self.restitution(TargetUnloading::Line(self.stiffness_n_per_m()));
+        let ours = self.own_restitution();
         let theirs = self.restitution(unloading);
         let how = match unloading {
             TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),

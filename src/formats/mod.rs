@@ -8,10 +8,13 @@ mod adams;
 mod calculix;
 pub mod csv;
 mod export_curve;
+pub mod fmu;
+mod fmu_export;
 pub mod iso_mme;
 pub mod json;
 pub mod lsdyna;
 mod mat;
+mod modelica;
 pub mod onnx;
 mod radioss;
 pub mod read;
@@ -102,6 +105,27 @@ pub const FORMATS: &[Format] = &[
         description: "Adams spline: View command, Solver statement or spring property file",
         tail: Tail::Bottom,
         writer: Writer::Together(adams::write),
+    },
+    Format {
+        name: "fmi2",
+        extensions: &["fmu"],
+        description: "FMU of FMI 2.0, model exchange and co-simulation, whole law with memory, SI",
+        tail: Tail::Bottom,
+        writer: Writer::Each(fmu_export::write_fmi2),
+    },
+    Format {
+        name: "fmi3",
+        extensions: &["fmu"],
+        description: "the same of FMI 3.0",
+        tail: Tail::Bottom,
+        writer: Writer::Each(fmu_export::write_fmi3),
+    },
+    Format {
+        name: "modelica",
+        extensions: &["mo", "txt"],
+        description: "Modelica package with the spring and its memory, or a CombiTable text, SI",
+        tail: Tail::Bottom,
+        writer: Writer::Together(modelica::write),
     },
     Format {
         name: "mat",
@@ -240,6 +264,9 @@ pub enum ExportError {
     /// What was made of the curve is none.
     #[error("the curve cannot be prepared: {0}")]
     Curve(#[from] EnvelopeError),
+    /// The FMU cannot be made.
+    #[error(transparent)]
+    Fmu(#[from] fmu::FmuError),
     /// The forest has no ONNX form.
     #[error(transparent)]
     Onnx(#[from] OnnxError),

@@ -5,7 +5,7 @@ use crate::curve::{CurveUnloading, DrivingCurve};
 
 /// How a curve unloads in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum UnloadingChoice {
+pub enum UnloadingChoice {
     /// As the curve knows it; with the steepest rise of its loading branch if it does not, and
     /// along the loading branch if that never rises.
     Own,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::layout::{Layout, Role, Slot, layout};
-use super::spring::{SpringError, spring};
+use super::spring::{NoSpring, SpringError, spring};
 use super::{CheckedScenario, CurveSource, LimitsTable, Prepared, ScenarioError, Sources, Used};
 use crate::multibody::{
     Chain, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
@@ -21,12 +21,12 @@ pub enum AssemblyError {
         curve: String,
     },
     /// It gives no force law.
-    #[error("curve \"{curve}\": {message}")]
+    #[error("curve \"{curve}\": {source}")]
     NoSpring {
         /// The curve.
         curve: String,
         /// Why not.
-        message: String,
+        source: SpringError,
     },
     /// Its damper is none.
     #[error("curve \"{curve}\": {source}")]
@@ -180,8 +180,8 @@ impl Builder<'_> {
         ScenarioError::Assembly { path: self.path.into(), source: source.into() }
     }
 
-    fn no_spring(&self, curve: &str, message: String) -> ScenarioError {
-        self.failed(AssemblyError::NoSpring { curve: curve.into(), message })
+    fn no_spring(&self, curve: &str, source: SpringError) -> ScenarioError {
+        self.failed(AssemblyError::NoSpring { curve: curve.into(), source })
     }
 
     /// The law of a curve at a slot: made once for all slots that need the same.
@@ -203,8 +203,8 @@ impl Builder<'_> {
             return Ok(made.clone());
         }
         let spring = spring(source, table, slot, speed).map_err(|e| match e {
-            SpringError::Message(message) => self.no_spring(curve, message),
-            SpringError::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
+            NoSpring::Spring(source) => self.no_spring(curve, source),
+            NoSpring::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
         })?;
         let expected = match slot.role {
             Role::Wall => Some(SpeedKind::Wall),
@@ -217,7 +217,7 @@ impl Builder<'_> {
             let (curve, interface) = (curve.into(), slot.name.clone());
             return Err(self.failed(AssemblyError::Speeds { curve, kind, interface, expected }));
         }
-        let (law, of_law) = spring.law(table).map_err(|message| self.no_spring(curve, message))?;
+        let (law, of_law) = spring.law(table).map_err(|source| self.no_spring(curve, source))?;
         let used = Used {
             curve: curve.into(),
             force: spring.curve.force.map(|f| f.name()),

@@ -15,6 +15,8 @@ pub(crate) use assemble::adjust;
 pub use check::{CheckError, CheckedScenario};
 pub(crate) use local::assemble;
 pub(crate) use sources::{CurveSource, Sources};
+pub use sources::{SourceError, StageError};
+pub use spring::SpringError;
 pub use tables::*;
 
 use crate::database::DatabaseError;
@@ -69,12 +71,12 @@ pub enum ScenarioError {
         source: Box<CheckError>,
     },
     /// A curve's source is wrong.
-    #[error("{path}: {message}")]
-    Invalid {
+    #[error("{path}: {source}")]
+    Source {
         /// The scenario.
         path: PathBuf,
-        /// What is wrong, with the curve.
-        message: String,
+        /// Which curve, and what is wrong.
+        source: SourceError,
     },
     /// A curve cannot stand where the scenario puts it.
     #[error("{path}: {source}")]

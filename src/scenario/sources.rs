@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::{CurveTable, Scenario, ScenarioError, StageTable};
-use crate::curve::{Case, DrivingCurve, Envelope};
+use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError};
 use crate::database::Database;
 use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
@@ -64,17 +64,10 @@ impl Sources {
     /// # Errors
     /// [`ScenarioError`] names the curve or file.
     pub(crate) fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
-        let folder = path.parent().unwrap_or(Path::new(""));
         let mut databases = BTreeMap::new();
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
-            let source =
-                CurveSource::read(table, name, folder, &mut databases).map_err(|e| match e {
-                    ReadError::Message(message) => {
-                        ScenarioError::Invalid { path: path.into(), message }
-                    }
-                    ReadError::Scenario(error) => *error,
-                })?;
+            let source = CurveSource::read(path, name, table, &mut databases)?;
             curves.insert(name.clone(), source);
         }
         Ok(Self { curves })
@@ -86,51 +79,90 @@ impl Sources {
     }
 }
 
-enum ReadError {
-    Message(String),
-    Scenario(Box<ScenarioError>),
+/// Why a curve's table does not say where the curve comes from.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SourceError {
+    /// It names no source, or several.
+    #[error("curve \"{curve}\" needs exactly one of model, file, database and stages")]
+    NotOne {
+        /// Name of the curve.
+        curve: String,
+    },
+    /// It names a database and no case in it.
+    #[error("curve \"{curve}\": write case = \"group/case\" beside database")]
+    NoCase {
+        /// Name of the curve.
+        curve: String,
+    },
+    /// It says which force the curve is, and the file says another.
+    #[error(
+        "curve \"{curve}\": force names another force than {} says it holds: remove force",
+        .file.display()
+    )]
+    OtherForce {
+        /// Name of the curve.
+        curve: String,
+        /// The curve's file.
+        file: PathBuf,
+    },
+    /// Its stages make no curve.
+    #[error("curve \"{curve}\": {source}")]
+    Stages {
+        /// Name of the curve.
+        curve: String,
+        /// Why not.
+        source: StageError,
+    },
 }
 
-impl<E: Into<ScenarioError>> From<E> for ReadError {
-    fn from(error: E) -> Self {
-        Self::Scenario(Box::new(error.into()))
-    }
+/// Why stages in series make no curve.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StageError {
+    /// A stage is shorter than what joins it to the next.
+    #[error("stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm")]
+    Short {
+        /// Name of the stage, or its number, counted from 1.
+        stage: String,
+        /// Its stroke, in m.
+        stroke_m: f64,
+    },
+    /// The points that they give are no envelope.
+    #[error("its stages make no curve: {0}")]
+    NoCurve(#[from] EnvelopeError),
 }
 
 impl CurveSource {
+    /// Reads what the table of curve `name` in the scenario at `path` asks for.
     fn read(
-        table: &CurveTable,
+        path: &Path,
         name: &str,
-        folder: &Path,
+        table: &CurveTable,
         databases: &mut BTreeMap<PathBuf, Database>,
-    ) -> Result<Self, ReadError> {
+    ) -> Result<Self, ScenarioError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let curve = || name.to_string();
+        let wrong = |source| ScenarioError::Source { path: path.into(), source };
         match (&table.model, &table.file, &table.database, &table.stages) {
             (Some(model), None, None, None) => {
                 Ok(Self::Model(Box::new(Model::read(&folder.join(model))?)))
             }
             (None, Some(file), None, None) => {
-                let path = folder.join(file);
-                if path.extension().is_some_and(|e| e == "json") {
-                    return Ok(Self::Predicted(Box::new(json::predicted(&path)?)));
+                let file = folder.join(file);
+                if file.extension().is_some_and(|e| e == "json") {
+                    return Ok(Self::Predicted(Box::new(json::predicted(&file)?)));
                 }
-                let mut held = csv::driving(&path)?;
+                let mut held = csv::driving(&file)?;
                 let stated = table.force.or(held.force);
                 if held.force.is_some() && stated != held.force {
-                    return Err(ReadError::Message(format!(
-                        "curve \"{name}\": force names another force than {} says it holds: remove force",
-                        path.display()
-                    )));
+                    return Err(wrong(SourceError::OtherForce { curve: curve(), file }));
                 }
                 held.force = stated;
                 Ok(Self::Curve(Box::new(held)))
             }
             (None, None, Some(database), None) => {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));
-                let (group, case) = case.ok_or_else(|| {
-                    ReadError::Message(format!(
-                        "curve \"{name}\": write case = \"group/case\" beside database"
-                    ))
-                })?;
+                let (group, case) =
+                    case.ok_or_else(|| wrong(SourceError::NoCase { curve: curve() }))?;
                 let path = folder.join(database);
                 if !databases.contains_key(&path) {
                     databases.insert(path.clone(), Database::read(&path)?);
@@ -139,25 +171,23 @@ impl CurveSource {
             }
             (None, None, None, Some(stages)) => staged(stages)
                 .map(Self::Stages)
-                .map_err(|message| ReadError::Message(format!("curve \"{name}\": {message}"))),
-            _ => Err(ReadError::Message(format!(
-                "curve \"{name}\" needs exactly one of model, file, database and stages"
-            ))),
+                .map_err(|source| wrong(SourceError::Stages { curve: curve(), source })),
+            _ => Err(wrong(SourceError::NotOne { curve: curve() })),
         }
     }
 }
 
 /// Stages in series on one stroke.
-fn staged(stages: &[StageTable]) -> Result<Envelope, String> {
+fn staged(stages: &[StageTable]) -> Result<Envelope, StageError> {
     let (mut d, mut f) = (Vec::new(), Vec::new());
     let mut begin = 0.0;
     for (i, stage) in stages.iter().enumerate() {
         let from = stage.from.map_or(0.0, |f| f.0);
         let to = stage.to.map_or(from, |f| f.0);
-        let stroke = stage.stroke.0;
-        if stroke <= 2.0 * STEP_M {
-            let name = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
-            return Err(format!("stage {name} has a stroke of {stroke} m: expected over 0.2 mm"));
+        let stroke_m = stage.stroke.0;
+        if stroke_m <= 2.0 * STEP_M {
+            let stage = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
+            return Err(StageError::Short { stage, stroke_m });
         }
         match f.last() {
             None => {
@@ -170,9 +200,9 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, String> {
             }
             Some(_) => {}
         }
-        begin += stroke;
+        begin += stroke_m;
         d.push(begin);
         f.push(to);
     }
-    Envelope::new(d, f).map_err(|e| format!("its stages make no curve: {e}"))
+    Ok(Envelope::new(d, f)?)
 }

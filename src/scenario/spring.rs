@@ -3,7 +3,7 @@
 use super::layout::{Role, Slot};
 use super::{CurveSource, CurveTable as Table, EndName, LawName};
 use crate::curve::driving::NoDrivingCurve;
-use crate::curve::{DrivingCurve, ForceKind};
+use crate::curve::{DrivingCurve, EnvelopeError, ForceKind};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::{PredictError, predict_driving};
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
@@ -14,21 +14,68 @@ pub(super) struct Spring {
     pub warnings: Vec<String>,
 }
 
-/// Why a source gives no spring.
-pub(super) enum SpringError {
-    Message(String),
+/// Why a source gives no force law at an interface.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpringError {
+    /// A band is asked of a source that has none.
+    #[error("band needs a model or a predicted curve (.json), which has one")]
+    NoBand,
+    /// The case's loading branch is no envelope, or `scale` makes it none.
+    #[error("{0}")]
+    Envelope(#[from] EnvelopeError),
+    /// The case's body force cannot be told from its speeds.
+    #[error("its sampled states make no loading branch")]
+    NoMotion,
+    /// The factor on the force is not above 0.
+    #[error("scale = {factor}: expected more than 0")]
+    Scale {
+        /// The factor.
+        factor: f64,
+    },
+    /// A body force would count the mass of the crush zone twice.
+    #[error(
+        "interface {interface} has a vehicle with a crush zone of its own mass, which a body force already contains: use a contact force, or no front and rear"
+    )]
+    CrushZoneTwice {
+        /// Name of the interface.
+        interface: String,
+    },
+    /// It has stages, and its unloading stiffness is not stated.
+    #[error(
+        "it has stages, which do not say how they unload, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
+    )]
+    StagesUnload,
+    /// Its force never rises, and its unloading stiffness is not stated.
+    #[error(
+        "it never rises, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
+    )]
+    NeverRises,
+}
+
+/// Why there is no spring: of the curve's table or source, or of the model that is asked.
+pub(super) enum NoSpring {
+    Spring(SpringError),
     Predict(PredictError),
 }
 
-impl<E: Into<PredictError>> From<E> for SpringError {
-    fn from(error: E) -> Self {
-        Self::Predict(error.into())
+impl From<SpringError> for NoSpring {
+    fn from(error: SpringError) -> Self {
+        Self::Spring(error)
     }
 }
 
-impl From<NoDrivingCurve> for SpringError {
+impl From<PredictError> for NoSpring {
+    fn from(error: PredictError) -> Self {
+        Self::Predict(error)
+    }
+}
+
+impl From<NoDrivingCurve> for NoSpring {
     fn from(error: NoDrivingCurve) -> Self {
-        Self::Message(error.to_string())
+        Self::Spring(match error {
+            NoDrivingCurve::Envelope(error) => SpringError::Envelope(error),
+            NoDrivingCurve::NoMotion => SpringError::NoMotion,
+        })
     }
 }
 
@@ -38,7 +85,7 @@ pub(super) fn spring(
     table: &Table,
     slot: &Slot<'_>,
     speed_m_per_s: f64,
-) -> Result<Spring, SpringError> {
+) -> Result<Spring, NoSpring> {
     let (declared, has_body) = match source {
         CurveSource::Model(model) => (Some(model.force_kind), model.has_body_force()),
         CurveSource::Predicted(curve) => {
@@ -51,9 +98,7 @@ pub(super) fn spring(
     let force = which_force(table.force, slot, declared, has_body)?;
     if table.band.is_some() && !matches!(source, CurveSource::Model(_) | CurveSource::Predicted(_))
     {
-        return Err(SpringError::Message(
-            "band needs a model or a predicted curve (.json), which has one".into(),
-        ));
+        return Err(SpringError::NoBand.into());
     }
     let Spring { mut curve, mut warnings } = match source {
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
@@ -79,10 +124,9 @@ pub(super) fn spring(
     }
     if let Some(factor) = table.scale {
         if !(factor > 0.0 && factor.is_finite()) {
-            let message = format!("scale = {factor}: expected more than 0");
-            return Err(SpringError::Message(message));
+            return Err(SpringError::Scale { factor }.into());
         }
-        curve = curve.scaled(factor).map_err(|e| SpringError::Message(e.to_string()))?;
+        curve = curve.scaled(factor).map_err(SpringError::Envelope)?;
     }
     Ok(Spring { curve, warnings })
 }
@@ -94,7 +138,7 @@ fn of_model(
     slot: &Slot<'_>,
     speed_m_per_s: f64,
     force: Option<ForceKind>,
-) -> Result<Spring, SpringError> {
+) -> Result<Spring, NoSpring> {
     let query = Query {
         mass_kg: Some(slot.mass_kg),
         rule: table.max_crush,
@@ -106,7 +150,8 @@ fn of_model(
     };
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) = predict_driving(model, &query, force, table.band)?;
-    Ok(Spring { curve: curve.continued()?, warnings: texts(&warnings) })
+    let curve = curve.continued().map_err(PredictError::Envelope)?;
+    Ok(Spring { curve, warnings: texts(&warnings) })
 }
 
 /// The curve of a predicted one that was read from a file.
@@ -114,7 +159,7 @@ fn of_predicted(
     curve: &PredictedCurve,
     table: &Table,
     force: Option<ForceKind>,
-) -> Result<Spring, SpringError> {
+) -> Result<Spring, NoSpring> {
     let force = force.unwrap_or(curve.provenance.force_kind);
     let driving = curve.driving_member(force, table.band)?;
     Ok(Spring { curve: driving, warnings: texts(&curve.warnings) })
@@ -138,22 +183,19 @@ fn which_force(
     slot: &Slot<'_>,
     declared: Option<ForceKind>,
     has_body: bool,
-) -> Result<Option<ForceKind>, SpringError> {
+) -> Result<Option<ForceKind>, NoSpring> {
     if asked == Some(ForceKind::Contact) && declared == Some(ForceKind::Body) {
-        return Err(SpringError::Predict(PredictError::NoContactForce));
+        return Err(PredictError::NoContactForce.into());
     }
     if slot.split && slot.role != Role::Within && asked.or(declared) == Some(ForceKind::Body) {
-        return Err(SpringError::Message(format!(
-            "interface {} has a vehicle with a crush zone of its own mass, which a body force already contains: use a contact force, or no front and rear",
-            slot.name
-        )));
+        return Err(SpringError::CrushZoneTwice { interface: slot.name.clone() }.into());
     }
     Ok(asked.or((has_body && !slot.split).then_some(ForceKind::Body)))
 }
 
 impl Spring {
     /// The force law that the curve's table asks for, with what must be said of it.
-    pub(crate) fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), String> {
+    pub(crate) fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), SpringError> {
         let end = match table.end {
             EndName::Hold => EnvelopeEnd::Hold,
             EndName::Slope => EnvelopeEnd::Slope,
@@ -166,7 +208,7 @@ impl Spring {
         Ok((ForceLaw::of_curve(&self.curve, unloading, end), warnings))
     }
 
-    fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), String> {
+    fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), SpringError> {
         let asked = table.unloading.map(|u| u.0);
         let known = self.curve.unloading.stiffness_n_per_m();
         let steepest = self.curve.loading.max_slope();
@@ -189,13 +231,10 @@ impl Spring {
         }
         let stiffness = asked.or(known).unwrap_or(steepest);
         if stiffness.max(steepest) <= 0.0 || asked.is_none() && table.stages.is_some() {
-            let why = match table.stages {
-                Some(_) => "has stages, which do not say how they unload",
-                None => "never rises",
-            };
-            return Err(format!(
-                "it {why}, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
-            ));
+            return Err(match table.stages {
+                Some(_) => SpringError::StagesUnload,
+                None => SpringError::NeverRises,
+            });
         }
         Ok((asked.map_or(UnloadingChoice::Own, UnloadingChoice::Stiffness), warnings))
     }

@@ -64,10 +64,13 @@ pub enum RunError {
     },
     /// Neither manifest nor deck say the units.
     #[error(
-        "the manifest gives no units and {why}: add units = \"mm-t-s\" (or what they are) to [study]"
+        "the manifest gives no units and {}: add units = \"mm-t-s\" (or what they are) to [study]",
+        deck.as_ref().map_or("the run has no deck that could".into(), |deck| {
+            format!("the deck {} states none", deck.display())
+        })
     )]
     NoUnits {
-        /// Why the deck does not.
-        why: String,
+        /// The run's deck, if it has one.
+        deck: Option<PathBuf>,
     },
 }

@@ -55,11 +55,8 @@ impl LocatedRun<'_> {
                 system
             }
             (None, None) => {
-                let why = match &self.deck {
-                    Some(deck) => format!("the deck {} states none", deck.file.path.display()),
-                    None => "the run has no deck that could".into(),
-                };
-                return Err(RunError::NoUnits { why });
+                let deck = self.deck.as_ref().map(|deck| deck.file.path.clone());
+                return Err(RunError::NoUnits { deck });
             }
         };
         Ok((units, remarks))

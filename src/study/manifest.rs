@@ -102,13 +102,21 @@ pub struct RunEntry {
 #[schemars(with = "i64", extend("enum" = [1, -1]))]
 pub struct Sign(pub(super) i64);
 
-impl TryFrom<i64> for Sign {
-    type Error = String;
+/// A sign that is neither 1 nor −1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("sign = {found}: expected 1 or -1")]
+pub struct NoSign {
+    /// As written.
+    pub found: i64,
+}
 
-    fn try_from(sign: i64) -> Result<Self, String> {
+impl TryFrom<i64> for Sign {
+    type Error = NoSign;
+
+    fn try_from(sign: i64) -> Result<Self, NoSign> {
         match sign {
             1 | -1 => Ok(Self(sign)),
-            _ => Err(format!("sign = {sign}: expected 1 or -1")),
+            found => Err(NoSign { found }),
         }
     }
 }

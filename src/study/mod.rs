@@ -20,7 +20,7 @@ use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub use check::InvalidStudy;
 pub use error::{RunError, StudyError};
-pub use manifest::{Head, Manifest, RunEntry, Sign, StudyKind};
+pub use manifest::{Head, Manifest, NoSign, RunEntry, Sign, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

@@ -129,7 +129,7 @@ pub enum SweepError {
         /// The file.
         path: PathBuf,
         /// What is not the same.
-        differs: String,
+        differs: Difference,
     },
     /// What is there is of nobody we know.
     #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
@@ -138,16 +138,86 @@ pub enum SweepError {
         path: PathBuf,
     },
     /// Rows are missing or not whole.
-    #[error("{path}: {message}")]
+    #[error("{path}: {source}")]
     Damaged {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        message: String,
+        source: Damage,
     },
     /// The files are not the shards of one sweep.
     #[error(transparent)]
     Merge(#[from] MergeError),
+}
+
+/// What a file that is there does not share with the sweep that would write it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Difference {
+    /// Another version of this program wrote it.
+    #[error("it is of crumple {found}, this is {this}")]
+    Version {
+        /// The version that wrote it.
+        found: String,
+        /// This version.
+        this: String,
+    },
+    /// Its rows are results of other inputs.
+    #[error("plan, scenario or a file it names have changed since")]
+    Inputs,
+    /// It is another part of the sweep.
+    #[error(
+        "it is shard {}/{}, this is {}/{}",
+        .found.index, .found.count, .this.index, .this.count
+    )]
+    Shard {
+        /// The part in the file.
+        found: Shard,
+        /// The part that was asked for.
+        this: Shard,
+    },
+}
+
+/// What is wrong with the file of a sweep.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Damage {
+    /// The rows end too early.
+    #[error(
+        "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
+    )]
+    Short {
+        /// The first item whose row is not there.
+        item: u64,
+        /// The last item there should be.
+        last: u64,
+    },
+    /// More stands in the file than its rows.
+    #[error("there is something behind the last row: run its sweep again with --restart")]
+    Behind,
+    /// A row is not there, or not as it should be.
+    #[error("the row of item {item} is missing or damaged: run its sweep again with --restart")]
+    Row {
+        /// Its item.
+        item: u64,
+    },
+    /// The attributes of an HDF5 file are not those of a sweep.
+    #[error("its attributes are not those of a sweep of this layout")]
+    Attributes,
+    /// A column of an HDF5 file has too few or too many rows.
+    #[error("{column} has {rows} rows, expected {expected}")]
+    Rows {
+        /// Name of the column.
+        column: String,
+        /// Rows that it has.
+        rows: u64,
+        /// Rows that the sweep has.
+        expected: u64,
+    },
+    /// A column of an HDF5 file has numbers for text, or the other way round.
+    #[error("{column} does not hold the kind of values it should")]
+    Kind {
+        /// Name of the column.
+        column: String,
+    },
 }
 
 /// What has been done.

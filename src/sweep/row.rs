@@ -1,6 +1,6 @@
 //! A row of results as numbers and as a line of CSV, and what stands above the rows.
 
-use super::{Shard, Sweep, SweepError};
+use super::{Damage, Difference, Shard, Sweep, SweepError};
 
 /// First line of every file.
 pub(crate) const FORMAT: &str = "crumple sweep";
@@ -220,29 +220,23 @@ impl Head {
     }
 
     /// Why rows under this head do not belong under `wanted`; `None` if they do.
-    pub(crate) fn differs_from(&self, wanted: &Self) -> Option<String> {
-        let shard = |s: Shard| format!("{}/{}", s.index, s.count);
+    pub(crate) fn differs_from(&self, wanted: &Self) -> Option<Difference> {
         if self.version != wanted.version {
-            let (found, this) = (&self.version, &wanted.version);
-            return Some(format!("it is of crumple {found}, this is {this}"));
+            let (found, this) = (self.version.clone(), wanted.version.clone());
+            return Some(Difference::Version { found, this });
         }
         if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
         {
-            return Some("plan, scenario or a file it names have changed since".into());
+            return Some(Difference::Inputs);
         }
         (self.shard != wanted.shard)
-            .then(|| format!("it is shard {}, this is {}", shard(self.shard), shard(wanted.shard)))
+            .then_some(Difference::Shard { found: self.shard, this: wanted.shard })
     }
 }
 
 /// The error of a row that cannot be read.
 pub(crate) fn bad_row(path: &std::path::Path, item: u64) -> SweepError {
-    SweepError::Damaged {
-        path: path.into(),
-        message: format!(
-            "the row of item {item} is missing or damaged: run its sweep again with --restart"
-        ),
-    }
+    SweepError::Damaged { path: path.into(), source: Damage::Row { item } }
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::row::{Row, Status};
 use super::{Sweep, SweepError};
-use crate::multibody::{Record, Run, RunSettings, simulate};
+use crate::multibody::{Record, Run, RunSettings, SimulationError, simulate};
 use crate::plan::ResultName;
-use crate::scenario::{self, Prepared, Scenario};
+use crate::scenario::{self, CheckError, Prepared, Scenario, ScenarioError};
 
 /// How many items are run before their rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +34,30 @@ const BLOCK: usize = 8;
 const BLOCKS_PER_THREAD: usize = 4;
 /// Chains that a worker keeps.
 const KEPT_CHAINS: usize = 16;
+
+/// Why an item has no result.
+#[derive(Debug, thiserror::Error)]
+enum RowError {
+    /// The values make no scenario.
+    #[error(transparent)]
+    Check(#[from] CheckError),
+    /// The scenario with these values cannot be put together. The scenario's path is the same for
+    /// all items and known to whoever reads the message.
+    #[error("{}", without_path(.0))]
+    Scenario(#[from] ScenarioError),
+    /// The run failed.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+fn without_path(error: &ScenarioError) -> String {
+    match error {
+        ScenarioError::Source { source, .. } => source.to_string(),
+        ScenarioError::Assembly { source, .. } => source.to_string(),
+        ScenarioError::Chain { source, .. } => source.to_string(),
+        other => other.to_string(),
+    }
+}
 
 /// A row with its line.
 pub(crate) struct Written {
@@ -138,7 +162,7 @@ impl<'a> Worker<'a> {
                 let chain = &sweep.base.chain;
                 let columns = super::result_columns(&sweep.results, chain, &sweep.base.order);
                 row.values.resize(self.values.len() + columns.len(), f64::NAN);
-                vec![error]
+                vec![error.to_string()]
             }
         };
         row.message = messages.join("; ").replace(|c: char| c.is_control(), " ");
@@ -146,12 +170,12 @@ impl<'a> Worker<'a> {
     }
 
     /// Appends the results of the scenario as it stands; gives back warnings, or why it failed.
-    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, String> {
+    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, RowError> {
         let sweep = self.sweep;
         let prepared = self.prepared()?;
         // A row needs the summary only.
         let settings = RunSettings { record: Record::Summary, ..prepared.settings };
-        let run = simulate(&prepared.chain, &settings).map_err(|e| e.to_string())?;
+        let run = simulate(&prepared.chain, &settings)?;
         push_results(&sweep.results, prepared, &run, values);
         // What holds for the scenario as written has been said once; here it has other numbers.
         let said = |w: &String| {
@@ -168,27 +192,19 @@ impl<'a> Worker<'a> {
     }
 
     /// The chain of the scenario as it stands; laws that do not change are not made again.
-    fn prepared(&mut self) -> Result<&Prepared, String> {
-        // The path is the same for all items and known to whoever reads the message.
-        let said = |e: scenario::ScenarioError| match e {
-            scenario::ScenarioError::Invalid { message, .. } => message,
-            scenario::ScenarioError::Assembly { source, .. } => source.to_string(),
-            scenario::ScenarioError::Chain { source, .. } => source.to_string(),
-            other => other.to_string(),
-        };
+    fn prepared(&mut self) -> Result<&Prepared, RowError> {
         let Self { sweep, scenario, values, shaping, chains } = self;
-        let scenario = &sweep.scenario.vary(scenario).map_err(|e| e.to_string())?;
+        let scenario = &sweep.scenario.vary(scenario)?;
         let shaping = values.iter().zip(&*shaping).filter(|(_, shapes)| **shapes);
         let key: Vec<u64> = shaping.map(|(value, _)| value.to_bits()).collect();
         match chains.iter().position(|(k, _)| *k == key) {
             Some(at) => {
                 let (_, prepared) = &mut chains[at];
-                scenario::adjust(&sweep.path, scenario, prepared).map_err(said)?;
+                scenario::adjust(&sweep.path, scenario, prepared)?;
                 Ok(&chains[at].1)
             }
             None => {
-                let made = scenario::assemble(&sweep.path, scenario, &sweep.sources);
-                let made = made.map_err(said)?;
+                let made = scenario::assemble(&sweep.path, scenario, &sweep.sources)?;
                 if chains.len() == KEPT_CHAINS {
                     chains.remove(0);
                 }

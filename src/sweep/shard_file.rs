@@ -3,8 +3,8 @@
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::SweepError;
 use super::row::{Head, MAX_HEAD_BYTES, bad_row};
+use super::{Damage, SweepError};
 use crate::file;
 
 /// The finished CSV file of a shard.
@@ -57,21 +57,13 @@ fn each_line(
     for item in head.rows() {
         if read_line(reader, &mut line).map_err(io)? == 0 {
             let last = head.rows().end - 1;
-            return Err(SweepError::Damaged {
-                path: path.into(),
-                message: format!(
-                    "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
-                ),
-            });
+            let source = Damage::Short { item, last };
+            return Err(SweepError::Damaged { path: path.into(), source });
         }
         see(&line).ok_or_else(|| bad_row(path, item))?;
     }
     match read_line(reader, &mut line).map_err(io)? {
         0 => Ok(()),
-        _ => Err(SweepError::Damaged {
-            path: path.into(),
-            message: "there is something behind the last row: run its sweep again with --restart"
-                .into(),
-        }),
+        _ => Err(SweepError::Damaged { path: path.into(), source: Damage::Behind }),
     }
 }

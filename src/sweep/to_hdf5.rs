@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
 use super::shard_file::ShardFile;
 use super::tally::Tally;
-use super::{Shard, SweepError};
+use super::{Damage, Shard, SweepError};
 use crate::hdf5::table::{Attribute, Column, Put, Table, TableError, Values, write_table};
 
 /// Whether a path is to become HDF5.
@@ -206,15 +206,14 @@ impl FinishedTable {
     /// [`SweepError::Table`] if it is no HDF5 file, or no sweep's.
     fn open(path: &Path) -> Result<Self, SweepError> {
         let table = Table::open(path, FORMAT)?;
-        let head = head(&table)?.ok_or_else(|| SweepError::Damaged {
-            path: path.into(),
-            message: "its attributes are not those of a sweep of this layout".into(),
-        })?;
+        let head = head(&table)?
+            .ok_or_else(|| SweepError::Damaged { path: path.into(), source: Damage::Attributes })?;
         let rows = head.rows().end - head.rows().start;
         let messages = table.columns.len() - 1;
         if let Some(short) = table.columns[..messages].iter().find(|c| c.rows != rows) {
-            let message = format!("{} has {} rows, expected {rows}", short.name, short.rows);
-            return Err(SweepError::Damaged { path: path.into(), message });
+            let (column, found) = (short.name.clone(), short.rows);
+            let source = Damage::Rows { column, rows: found, expected: rows };
+            return Err(SweepError::Damaged { path: path.into(), source });
         }
         // Widths of texts are the file's own, everything else is what this program writes.
         let is_text = |c: &Column| matches!(c.values, Values::Text { .. });
@@ -223,8 +222,8 @@ impl FinishedTable {
             is_text(found) != is_text(wanted) || !is_text(found) && found.values != wanted.values
         };
         if let Some((other, _)) = table.columns.iter().zip(&expected).find(is_other) {
-            let message = format!("{} does not hold the kind of values it should", other.name);
-            return Err(SweepError::Damaged { path: path.into(), message });
+            let source = Damage::Kind { column: other.name.clone() };
+            return Err(SweepError::Damaged { path: path.into(), source });
         }
         Ok(Self { path: path.into(), table, head })
     }

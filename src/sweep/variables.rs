@@ -215,34 +215,7 @@ impl Binder<'_> {
                 self.one("speed_m_per_s", "speed_factor", name, Target::Speed(at))
             }
             What::Mass => self.masses(),
-            What::Gap => match (&vary.curve, vary.interface.as_deref()) {
-                (Some(curve), None) => {
-                    self.check_curve(curve)?;
-                    let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
-                    if vehicles.any(|v| v.front.iter().chain(&v.rear).any(|z| z.curve == *curve)) {
-                        return Err(VariableError::ZoneGap { curve: curve.clone() });
-                    }
-                    if vary.factor && self.scenario.curves[curve].gap.is_none() {
-                        return Err(VariableError::NoGap { curve: curve.clone() });
-                    }
-                    if self.scenario.contact.gap.is_some()
-                        && !self.scenario.clone().curve_names_mut()[1..]
-                            .iter()
-                            .any(|name| *name == curve)
-                    {
-                        return Err(VariableError::GapUnused { curve: curve.clone() });
-                    }
-                    self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
-                }
-                (None, Some("contact")) => {
-                    if vary.factor && self.scenario.contact.gap.is_none() {
-                        return Err(VariableError::NoContactGap);
-                    }
-                    self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
-                }
-                (None, Some(other)) => Err(VariableError::Interface { found: other.into() }),
-                _ => Err(VariableError::NoGapNamed),
-            },
+            What::Gap => self.gaps(),
             What::Band => {
                 let curve = self.curve()?;
                 let table = &self.scenario.curves[curve];
@@ -264,6 +237,39 @@ impl Binder<'_> {
                 }
                 self.one("curve", "curve", curve, Target::Curve(curve.into()))
             }
+        }
+    }
+
+    /// The gap of a curve or of the contact.
+    fn gaps(&self) -> Result<Vec<Variable>, VariableError> {
+        let vary = self.vary;
+        match (&vary.curve, vary.interface.as_deref()) {
+            (Some(curve), None) => {
+                self.check_curve(curve)?;
+                let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
+                if vehicles.any(|v| v.front.iter().chain(&v.rear).any(|z| z.curve == *curve)) {
+                    return Err(VariableError::ZoneGap { curve: curve.clone() });
+                }
+                if vary.factor && self.scenario.curves[curve].gap.is_none() {
+                    return Err(VariableError::NoGap { curve: curve.clone() });
+                }
+                if self.scenario.contact.gap.is_some()
+                    && !self.scenario.clone().curve_names_mut()[1..]
+                        .iter()
+                        .any(|name| *name == curve)
+                {
+                    return Err(VariableError::GapUnused { curve: curve.clone() });
+                }
+                self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
+            }
+            (None, Some("contact")) => {
+                if vary.factor && self.scenario.contact.gap.is_none() {
+                    return Err(VariableError::NoContactGap);
+                }
+                self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
+            }
+            (None, Some(other)) => Err(VariableError::Interface { found: other.into() }),
+            _ => Err(VariableError::NoGapNamed),
         }
     }
 

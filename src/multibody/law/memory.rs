@@ -15,15 +15,15 @@ pub(super) enum StoredBy {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Memory {
     /// Unloading stiffness `k`.
-    stiffness_n_per_m: f64,
+    pub(super) stiffness_n_per_m: f64,
     /// `k_s`: steepest rise of the envelope, or the unloading stiffness if that is more.
-    steepest_n_per_m: f64,
+    pub(super) steepest_n_per_m: f64,
     /// `c`: a branch stores at most this share of force times deflection, since it would reach
     /// zero deflection with a force left otherwise.
-    largest_share: f64,
-    stored_by: StoredBy,
+    pub(super) largest_share: f64,
+    pub(super) stored_by: StoredBy,
     /// Energy that is lost once the deflection has been at each point of the envelope.
-    dissipated_j: Vec<f64>,
+    pub(super) dissipated_j: Vec<f64>,
 }
 
 impl Memory {

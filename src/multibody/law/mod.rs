@@ -9,11 +9,13 @@
 mod memory;
 mod pieces;
 mod shape;
+mod tables;
 
 use crate::curve::Envelope;
 use memory::{Memory, StoredBy};
 pub(super) use pieces::{Branch, OnEnvelope, Piece};
 pub use shape::UnloadingShape;
+pub use tables::{LawTables, MemoryTables};
 
 /// What happens when the deflection falls.
 #[derive(Clone, Copy, Debug, PartialEq)]

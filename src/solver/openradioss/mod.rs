@@ -16,7 +16,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::lsdyna::nodout::TRANSLATIONS;
-use super::problem::{ProblemCode, Problems};
+use super::problem::{Problem, ProblemCode};
 use super::source::{Source, Stream};
 use super::{Selection, SolverFile};
 use crate::history::{EntityId, History, Side};
@@ -75,24 +75,18 @@ pub(crate) fn read(
 ) -> io::Result<Vec<SolverFile>> {
     let Some(source) = parts.first() else { return Ok(Vec::new()) };
     let input = Stream::new(&**source);
-    let mut problems = Problems::default();
     let mut records = Records::new(input);
     let Some(header) = Header::read(&mut records)? else {
-        problems.add(
-            ProblemCode::CutRecord,
-            None,
-            None,
-            format!("the header is damaged or cut at byte {}", records.position()),
-        );
+        let message = format!("the header is damaged or cut at byte {}", records.position());
         let file = SolverFile {
-            problems: problems.into_list(),
+            problems: vec![Problem::new(ProblemCode::CutRecord, message)],
             ..empty(selection.section.as_deref().unwrap_or("glstat"))
         };
         return Ok(vec![file]);
     };
     let mut states = States::new(&header, selection);
-    states.read(&header, &mut records, &mut problems)?;
-    Ok(states.finish(&header, selection, problems))
+    states.read(&header, &mut records)?;
+    Ok(states.finish(&header, selection))
 }
 
 /// Names of an object in its section: both sides of an interface.

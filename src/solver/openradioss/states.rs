@@ -37,6 +37,8 @@ pub(crate) struct States {
     starts: Vec<u64>,
     /// Kept values that are no finite numbers.
     not_finite: usize,
+    /// What was found to be wrong on the way.
+    problems: Problems,
 }
 
 /// The channels of a group's selected objects and variables.
@@ -97,6 +99,7 @@ impl States {
             first_group,
             starts: Vec::new(),
             not_finite: 0,
+            problems: Problems::default(),
         }
     }
 
@@ -107,12 +110,7 @@ impl States {
 
     /// Reads states until the end. One that is damaged is left out and said; as all have the
     /// same length, the next one is found behind it.
-    pub(crate) fn read(
-        &mut self,
-        header: &Header,
-        records: &mut Records<'_>,
-        problems: &mut Problems,
-    ) -> io::Result<()> {
+    pub(crate) fn read(&mut self, header: &Header, records: &mut Records<'_>) -> io::Result<()> {
         let mut start = records.position();
         let mut number = 0;
         let mut above: [Option<Vec<Vec<u8>>>; 2] = [None, None];
@@ -130,9 +128,9 @@ impl States {
                 }
             }
             if state.len() == self.lengths.len() {
-                damaged = self.say(damaged, number, problems);
-                self.look_for_zeros(header, &above, Some(&state), problems);
-                self.store(&state, start, problems);
+                self.leave_out(damaged.take(), number);
+                self.look_for_zeros(header, &above, Some(&state));
+                self.store(&state, start);
                 let [_, last] = above;
                 above = [last, Some(state)];
             } else if damaged.is_none() {
@@ -140,42 +138,36 @@ impl States {
             }
             start += self.stride();
         }
-        self.say(damaged, number + 1, problems);
-        self.look_for_zeros(header, &above, None, problems);
+        self.leave_out(damaged, number + 1);
+        self.look_for_zeros(header, &above, None);
         if self.not_finite > 0 {
             let message = format!(
                 "{} values are no finite numbers; they are returned as such",
                 self.not_finite
             );
-            problems.add(ProblemCode::NotFinite, None, None, message);
+            self.problems.add(ProblemCode::NotFinite, None, None, message);
         }
         Ok(())
     }
 
-    /// Says which states are left out: from the damaged one up to the one before `next`.
-    fn say(
-        &self,
-        damaged: Option<(u64, usize)>,
-        next: usize,
-        problems: &mut Problems,
-    ) -> Option<(u64, usize)> {
-        let (byte, first) = damaged?;
+    /// Notes which states are left out: from the damaged one, given by its byte and number, up to
+    /// the one before `next`.
+    fn leave_out(&mut self, damaged: Option<(u64, usize)>, next: usize) {
+        let Some((byte, first)) = damaged else { return };
         let message = match next - first {
             1 => format!("state {first} is cut or damaged; it is left out"),
             _ => format!("states {first} to {} are cut or damaged; they are left out", next - 1),
         };
-        problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
-        None
+        self.problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
     }
 
     /// Names the last state above if more values beside each other are zero, though not in the
     /// states around it, than a node that stands on a wall has: T01 has no check sums.
     fn look_for_zeros(
-        &self,
+        &mut self,
         header: &Header,
         above: &[Option<Vec<Vec<u8>>>; 2],
         below: Option<&Vec<Vec<u8>>>,
-        problems: &mut Problems,
     ) {
         let [Some(before), Some(state)] = above else { return };
         let is_zero = |word: &[u8]| word[0] & 0x7f == 0 && word[1..] == [0, 0, 0];
@@ -202,7 +194,7 @@ impl States {
                     self.name(header, k, i - 1),
                 );
                 let place = self.starts.last().copied().map(Place::at_byte);
-                problems.add(ProblemCode::SuspectZeros, place, None, message);
+                self.problems.add(ProblemCode::SuspectZeros, place, None, message);
             }
         }
     }
@@ -224,7 +216,7 @@ impl States {
         }
     }
 
-    fn store(&mut self, state: &[Vec<u8>], start: u64, problems: &mut Problems) {
+    fn store(&mut self, state: &[Vec<u8>], start: u64) {
         let real = |record: &[u8], offset: usize| {
             let at = 4 * offset;
             let word = record.get(at..at + 4).and_then(|w| <[u8; 4]>::try_from(w).ok());
@@ -233,7 +225,7 @@ impl States {
         let time = real(&state[0], 0);
         if !time.is_finite() {
             let message = format!("the state is left out: its time is {time:?}");
-            problems.add_at_byte(ProblemCode::IncompleteState, start, message);
+            self.problems.add_at_byte(ProblemCode::IncompleteState, start, message);
             return;
         }
         self.starts.push(start);
@@ -254,10 +246,10 @@ impl States {
     }
 
     /// Leaves out what a restart wrote again; forces cannot be told across it.
-    fn resolve_restarts(&mut self, problems: &mut Problems) {
+    fn resolve_restarts(&mut self) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
         let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");
-        problems.append(found);
+        self.problems.append(found);
         // Nor can a state whose time is out of order be differentiated.
         let mut last = f64::NEG_INFINITY;
         kept.retain(|&i| {
@@ -279,20 +271,15 @@ impl States {
         });
     }
 
-    pub(crate) fn finish(
-        mut self,
-        header: &Header,
-        selection: &Selection,
-        mut problems: Problems,
-    ) -> Vec<SolverFile> {
-        self.resolve_restarts(&mut problems);
+    pub(crate) fn finish(mut self, header: &Header, selection: &Selection) -> Vec<SolverFile> {
+        self.resolve_restarts();
         let has_impulses = header.groups.iter().any(|g| g.section().is_some_and(|s| s != "nodout"));
         if self.time.len() == 1 && has_impulses {
             let message = "one state has no rate of impulses: there are no forces";
-            problems.add(ProblemCode::AbsentComponent, None, None, message.into());
+            self.problems.add(ProblemCode::AbsentComponent, None, None, message.into());
         }
         let time: Arc<[f64]> = self.time.into();
-        let problems = problems.into_list();
+        let problems = self.problems.into_list();
         let mut files = group_files(header, self.groups, selection, &time);
         if header.globals > 0 {
             let mut file = empty("glstat");

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use super::Selection;
 use super::lsdyna::line::{Field, Line, real, shown};
-use super::problem::{Place, ProblemCode, Problems};
+use super::problem::{Place, Problem, ProblemCode, Problems};
 use crate::history::EntityId;
 pub(crate) use finish::Collected;
 use table::Table;
@@ -240,7 +240,8 @@ impl<'a> States<'a> {
         }
         if self.selection.audit {
             for (from, to) in (0..table.components.len()).filter_map(&field) {
-                read_field(line.columns(from, to), line, [from, to], &mut self.problems);
+                let (_, problem) = read_field(line.columns(from, to), line, [from, to]);
+                self.problems.extend(problem.map(|p| *p));
             }
         }
         let Some(first) = table.channel_of[row] else { return };
@@ -249,7 +250,9 @@ impl<'a> States<'a> {
             let place = field(column);
             channel.pending_seen = place.is_some();
             channel.pending = place.map_or(f64::NAN, |(from, to)| {
-                read_field(line.columns(from, to), line, [from, to], &mut self.problems)
+                let (value, problem) = read_field(line.columns(from, to), line, [from, to]);
+                self.problems.extend(problem.map(|p| *p));
+                value
             });
         }
     }
@@ -299,7 +302,8 @@ impl<'a> States<'a> {
             );
             return;
         }
-        let value = read_field(bytes, line, columns, &mut self.problems);
+        let (value, problem) = read_field(bytes, line, columns);
+        self.problems.extend(problem.map(|p| *p));
         self.scalars[index].pending = Some(value);
     }
 
@@ -335,10 +339,11 @@ impl<'a> States<'a> {
     }
 }
 
-/// The field's value; a problem and NaN where it holds no number.
-fn read_field(bytes: &[u8], line: &Line<'_>, columns: [usize; 2], problems: &mut Problems) -> f64 {
+/// The field's value; NaN and a problem where it holds no number. The problem is boxed, so that the
+/// usual result fits into registers.
+fn read_field(bytes: &[u8], line: &Line<'_>, columns: [usize; 2]) -> (f64, Option<Box<Problem>>) {
     let (code, message, value) = match real(bytes) {
-        Field::Real(value) => return value,
+        Field::Real(value) => return (value, None),
         Field::NotFinite(value) => (
             ProblemCode::NotFinite,
             format!("expected a finite number, found \"{}\"", shown(bytes).trim()),
@@ -355,6 +360,7 @@ fn read_field(bytes: &[u8], line: &Line<'_>, columns: [usize; 2], problems: &mut
             f64::NAN,
         ),
     };
-    problems.add(code, Some(line.into()), Some(columns), message);
-    value
+    let problem =
+        Problem { columns: Some(columns), ..Problem::at(code, Some(line.into()), message) };
+    (value, Some(Box::new(problem)))
 }

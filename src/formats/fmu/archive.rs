@@ -1,0 +1,83 @@
+//! The archive of an FMU: which file lies where.
+
+use std::io::{Cursor, Write};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::description::{build_description, model_description};
+use super::table::Table;
+use super::text::{escaped, identifier};
+use super::{BINARIES, FmiVersion, FmuError, SOURCES, Spring, TABLE_HEADER};
+
+/// Name of the generated C file.
+const TABLE_SOURCE: &str = "table.c";
+
+pub(super) fn pack(
+    spring: &Spring<'_>,
+    version: FmiVersion,
+    table: &Table,
+    token: &str,
+) -> Result<Vec<u8>, FmuError> {
+    let name = identifier(spring.name);
+    let mut sources = SOURCES.to_vec();
+    let table_source = table.source();
+    sources.push((TABLE_SOURCE, &table_source));
+    sources.push(("table.h", TABLE_HEADER));
+    sources.sort_unstable();
+    let compiled: Vec<&str> =
+        sources.iter().map(|(file, _)| *file).filter(|file| file.ends_with(".c")).collect();
+
+    // One date for all, or the same input would give other bytes tomorrow.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut add = |path: &str, bytes: &[u8]| -> Result<(), FmuError> {
+        archive.start_file(path, options)?;
+        archive.write_all(bytes)?;
+        Ok(())
+    };
+    let model = model_description(spring, version, &name, token, &compiled);
+    add("modelDescription.xml", model.as_bytes())?;
+    for binary in BINARIES {
+        let folder = binary.folders[version as usize];
+        let bytes = table.written_into(binary.bytes, folder)?;
+        add(&format!("binaries/{folder}/{name}.{}", binary.extension), &bytes)?;
+    }
+    if version == FmiVersion::Fmi3 {
+        add("sources/buildDescription.xml", build_description(&name, &compiled).as_bytes())?;
+    }
+    for (file, text) in &sources {
+        add(&format!("sources/{file}"), text.as_bytes())?;
+    }
+    add("documentation/index.html", documentation(spring).as_bytes())?;
+    add("extra/crumple/facts.json", facts(spring)?.as_bytes())?;
+    Ok(archive.finish()?.into_inner())
+}
+
+/// What a user of the FMU must know.
+fn documentation(spring: &Spring<'_>) -> String {
+    let mut rows = String::new();
+    for (key, value) in spring.facts {
+        rows += &format!("<tr><th>{}</th><td>{}</td></tr>\n", escaped(key), escaped(value));
+    }
+    format!(
+        include_str!("documentation.html"),
+        name = escaped(spring.name),
+        description = escaped(spring.description),
+        rows = rows,
+    )
+}
+
+/// The facts for programs, in their order.
+fn facts(spring: &Spring<'_>) -> Result<String, FmuError> {
+    let mut facts = serde_json::Map::new();
+    facts.insert("name".into(), spring.name.into());
+    facts.insert("description".into(), spring.description.into());
+    for (key, value) in spring.facts {
+        facts.insert((*key).into(), value.as_str().into());
+    }
+    Ok(serde_json::to_string_pretty(&facts)? + "\n")
+}

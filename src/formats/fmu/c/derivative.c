@@ -1,0 +1,71 @@
+/* Partial derivatives of the spring's outputs by its input and its parameter. */
+#include "spring.h"
+
+#define MODES (MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_STEP | MODE_TERMINATED)
+
+/* Derivative of an output by a known variable; 0 if the call names no such pair. */
+static int partial(const state_t *now, uint32_t unknown, uint32_t known, double *value) {
+    double d = now->input[0];
+    int is_largest = d >= now->memory[0];
+    double largest = is_largest ? d : now->memory[0];
+    law_slopes_t slopes = law_slopes(&crumple_table, d, largest);
+    double stored, dissipated;
+    law_energies(&crumple_table, d, largest, &stored, &dissipated);
+    if (known != VR_DEFLECTION && known != VR_FORCE_SCALE) {
+        return 0;
+    }
+    switch (unknown) {
+    case VR_FORCE:
+        *value = known == VR_DEFLECTION ? now->force_scale * slopes.force
+                                        : law_force(&crumple_table, d, largest);
+        return 1;
+    case VR_STORED_ENERGY:
+        *value = known == VR_DEFLECTION ? now->force_scale * slopes.stored : stored;
+        return 1;
+    case VR_DISSIPATED_ENERGY:
+        *value = known == VR_DEFLECTION ? now->force_scale * slopes.dissipated : dissipated;
+        return 1;
+    case VR_LARGEST_DEFLECTION: *value = known == VR_DEFLECTION && is_largest ? 1.0 : 0.0; return 1;
+    default: return 0;
+    }
+}
+
+/* `result` has one number per unknown, or per known if `is_backward`. */
+static int multiply(spring_t *spring, const char *function, const uint32_t *unknown,
+                    size_t unknowns, const uint32_t *known, size_t knowns, const double *seed,
+                    double *result, int is_backward) {
+    size_t i, k;
+    int said = spring_in(spring, function, MODES);
+    if (said != SAID_OK) {
+        return said;
+    }
+    for (i = 0; i < (is_backward ? knowns : unknowns); i++) {
+        result[i] = 0.0;
+    }
+    for (i = 0; i < unknowns; i++) {
+        for (k = 0; k < knowns; k++) {
+            double value;
+            if (!partial(&spring->now, unknown[i], known[k], &value)) {
+                return spring_say(spring, SAID_ERROR, function,
+                                  "takes outputs as unknowns, the input or parameter as knowns");
+            }
+            if (is_backward) {
+                result[k] += value * seed[i];
+            } else {
+                result[i] += value * seed[k];
+            }
+        }
+    }
+    return SAID_OK;
+}
+
+int spring_forward(spring_t *spring, const char *function, const uint32_t *unknown, size_t unknowns,
+                   const uint32_t *known, size_t knowns, const double *seed, double *result) {
+    return multiply(spring, function, unknown, unknowns, known, knowns, seed, result, 0);
+}
+
+int spring_backward(spring_t *spring, const char *function, const uint32_t *unknown,
+                    size_t unknowns, const uint32_t *known, size_t knowns, const double *seed,
+                    double *result) {
+    return multiply(spring, function, unknown, unknowns, known, knowns, seed, result, 1);
+}

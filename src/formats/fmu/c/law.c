@@ -1,0 +1,240 @@
+/* Force law of an interface, operation by operation as crumple's own (multibody/law), so that the
+ * results are the same bits. Compile without contraction of a*b+c (-ffp-contract=off). */
+#include "law.h"
+
+/* A point of the envelope. */
+typedef struct {
+    uint32_t piece;
+    double deflection;
+    double force;
+    double work;
+} top_t;
+
+/* The unloading branch from the largest deflection. */
+typedef struct {
+    double largest;
+    double top;
+    double stored;
+    double dissipated;
+    double length; /* deflection given back until the force is zero */
+} branch_t;
+
+static double larger(double a, double b) {
+    return a > b ? a : b;
+}
+static double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+
+/* How many of the rising numbers are at most x. */
+static uint32_t count_up_to(const double *rising, uint32_t n, double x) {
+    uint32_t from = 0, to = n;
+    while (from < to) {
+        uint32_t middle = from + (to - from) / 2;
+        if (rising[middle] <= x) {
+            from = middle + 1;
+        } else {
+            to = middle;
+        }
+    }
+    return from;
+}
+
+/* The point of the envelope at a deflection of 0 or more. */
+static top_t on_envelope(const crumple_table_t *t, double deflection) {
+    uint32_t above = count_up_to(t->deflection, t->points, deflection);
+    uint32_t i = above > 1 ? above - 1 : 0;
+    double along = larger(deflection - t->deflection[i], 0.0);
+    double force = t->force[i] + t->slope[i] * along;
+    top_t top;
+    top.piece = i;
+    top.deflection = deflection;
+    top.force = force;
+    top.work = t->work[i] + 0.5 * (t->force[i] + force) * along;
+    return top;
+}
+
+/* Energy that a branch of this stiffness, or the stiffer one to (0, 0), can store. */
+static double storable(const crumple_table_t *t, const top_t *top, double stiffness) {
+    double bound = t->largest_share * top->deflection;
+    return top->force * smaller(0.5 * top->force / stiffness, bound);
+}
+
+/* Energy of the branch of the unloading stiffness, were there no other. */
+static double by_stiffness(const crumple_table_t *t, const top_t *top) {
+    double mean;
+    if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
+        return storable(t, top, t->stiffness);
+    }
+    mean = top->deflection > 0.0 ? top->work / top->deflection : 0.0;
+    return smaller(0.5 * mean * mean / t->stiffness, top->work);
+}
+
+/* Energy that comes back from a largest deflection. */
+static double stored_from(const crumple_table_t *t, const top_t *top) {
+    double dissipated = larger(t->dissipated[top->piece], top->work - by_stiffness(t, top));
+    double stored = larger(top->work - dissipated, storable(t, top, t->steepest));
+    if (t->flags & CRUMPLE_BY_MEAN_FORCE) {
+        stored = smaller(stored, top->force * t->largest_share * top->deflection);
+    }
+    return stored;
+}
+
+static branch_t branch_from(const crumple_table_t *t, double largest) {
+    top_t top = on_envelope(t, largest);
+    branch_t branch;
+    branch.largest = largest;
+    branch.top = top.force;
+    branch.stored = stored_from(t, &top);
+    branch.dissipated = top.work - branch.stored;
+    branch.length = 0.0; /* the envelope itself has no force here */
+    if (top.force > 0.0 && branch.stored > 0.0) {
+        branch.length = branch.stored / (top.force * t->shape_rest[0]);
+    }
+    return branch;
+}
+
+/* The piece of the shape that holds a share of the length. */
+static uint32_t shape_piece(const crumple_table_t *t, double length) {
+    uint32_t above = count_up_to(t->shape_length, t->shape_points, length);
+    if (above < 1) {
+        above = 1;
+    } else if (above > t->shape_points - 1) {
+        above = t->shape_points - 1;
+    }
+    return above - 1;
+}
+
+static double shape_slope(const crumple_table_t *t, uint32_t j) {
+    return (t->shape_force[j + 1] - t->shape_force[j]) /
+           (t->shape_length[j + 1] - t->shape_length[j]);
+}
+
+/* Force on a branch below its top, and its slope. */
+static double force_on(const crumple_table_t *t, const branch_t *b, double deflection,
+                       double *slope) {
+    uint32_t j;
+    double at, at_zero, force;
+    *slope = 0.0;
+    if (deflection <= b->largest - b->length || b->length <= 0.0) {
+        return 0.0;
+    }
+    j = shape_piece(t, (b->largest - deflection) / b->length);
+    at = b->largest - t->shape_length[j] * b->length;
+    *slope = -shape_slope(t, j) * b->top / b->length;
+    at_zero = b->top * t->shape_force[j] - *slope * at;
+    force = at_zero + *slope * deflection;
+    if (!(force > 0.0)) {
+        *slope = 0.0;
+        return 0.0;
+    }
+    return force;
+}
+
+double law_force(const crumple_table_t *t, double deflection, double largest) {
+    branch_t branch;
+    double slope;
+    if (deflection <= 0.0) {
+        return 0.0;
+    }
+    if (!(t->flags & CRUMPLE_HAS_MEMORY) || deflection >= largest) {
+        return on_envelope(t, deflection).force;
+    }
+    branch = branch_from(t, largest);
+    return force_on(t, &branch, deflection, &slope);
+}
+
+void law_energies(const crumple_table_t *t, double deflection, double largest, double *stored,
+                  double *dissipated) {
+    branch_t branch;
+    double length, along, force, rest;
+    uint32_t j;
+    *stored = 0.0;
+    *dissipated = 0.0;
+    if (largest <= 0.0) {
+        return; /* never in contact */
+    }
+    if (!(t->flags & CRUMPLE_HAS_MEMORY)) {
+        *stored = on_envelope(t, larger(deflection, 0.0)).work;
+        return;
+    }
+    branch = branch_from(t, largest);
+    *dissipated = branch.dissipated;
+    if (branch.length <= 0.0) {
+        return;
+    }
+    length = (branch.largest - larger(deflection, 0.0)) / branch.length;
+    if (length >= 1.0) {
+        return;
+    }
+    j = shape_piece(t, length);
+    along = t->shape_length[j + 1] - length;
+    force = t->shape_force[j + 1] - shape_slope(t, j) * along;
+    rest = t->shape_rest[j + 1] + 0.5 * (t->shape_force[j + 1] + force) * along;
+    *stored = branch.stored * rest / t->shape_rest[0];
+}
+
+/* Slope of `storable` along the envelope. */
+static double storable_slope(const crumple_table_t *t, const top_t *top, double stiffness) {
+    double slope = t->slope[top->piece];
+    if (0.5 * top->force / stiffness < t->largest_share * top->deflection) {
+        return top->force * slope / stiffness;
+    }
+    return t->largest_share * (top->force + top->deflection * slope);
+}
+
+/* Slope of `by_stiffness` along the envelope. */
+static double by_stiffness_slope(const crumple_table_t *t, const top_t *top) {
+    double mean;
+    if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
+        return storable_slope(t, top, t->stiffness);
+    }
+    mean = top->work / top->deflection;
+    if (0.5 * mean * mean / t->stiffness < top->work) {
+        return mean * ((top->force - mean) / top->deflection) / t->stiffness;
+    }
+    return top->force;
+}
+
+law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double largest) {
+    law_slopes_t slopes = {0.0, 0.0, 0.0};
+    branch_t branch;
+    top_t top;
+    double dissipated, free, stored;
+    if (deflection <= 0.0) {
+        return slopes;
+    }
+    top = on_envelope(t, deflection);
+    if (!(t->flags & CRUMPLE_HAS_MEMORY)) {
+        slopes.force = t->slope[top.piece];
+        slopes.stored = top.force;
+        return slopes;
+    }
+    if (deflection < largest) {
+        branch = branch_from(t, largest);
+        slopes.stored = force_on(t, &branch, deflection, &slopes.force);
+        return slopes;
+    }
+    slopes.force = t->slope[top.piece];
+    dissipated = t->dissipated[top.piece];
+    free = top.work - by_stiffness(t, &top);
+    slopes.stored = top.force;
+    if (free > dissipated) {
+        dissipated = free;
+        slopes.stored = by_stiffness_slope(t, &top);
+    } else if (free == dissipated) {
+        /* What is dissipated never falls. */
+        slopes.stored = smaller(top.force, by_stiffness_slope(t, &top));
+    }
+    stored = top.work - dissipated;
+    if (storable(t, &top, t->steepest) > stored) {
+        stored = storable(t, &top, t->steepest);
+        slopes.stored = storable_slope(t, &top, t->steepest);
+    }
+    if ((t->flags & CRUMPLE_BY_MEAN_FORCE) &&
+        top.force * t->largest_share * top.deflection < stored) {
+        slopes.stored = t->largest_share * (top.force + top.deflection * slopes.force);
+    }
+    slopes.dissipated = top.force - slopes.stored;
+    return slopes;
+}

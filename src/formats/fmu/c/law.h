@@ -1,0 +1,28 @@
+/* Force law of an interface: force and energies over the deflection and the largest one so far. */
+#ifndef CRUMPLE_LAW_H
+#define CRUMPLE_LAW_H
+
+#include "table.h"
+
+/* Derivatives by the deflection, where the largest deflection follows it if it is at least that. */
+typedef struct {
+    double force;
+    double stored;
+    double dissipated;
+} law_slopes_t;
+
+CRUMPLE_INSIDE
+
+/* Force in N at a deflection after it has once been `largest` (largest >= deflection, >= 0). */
+double law_force(const crumple_table_t *t, double deflection, double largest);
+
+/* Stored and dissipated energy in J; their sum is the work done so far. */
+void law_energies(const crumple_table_t *t, double deflection, double largest, double *stored,
+                  double *dissipated);
+
+/* On the envelope and at its points, the slopes towards larger deflections. */
+law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double largest);
+
+CRUMPLE_INSIDE_END
+
+#endif

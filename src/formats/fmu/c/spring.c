@@ -1,0 +1,173 @@
+/* The spring's variables, its memory and its steps. */
+#include "spring.h"
+
+/* Modes in which all variables have values. */
+#define MODES_TO_GET \
+    (MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_STEP | MODE_TERMINATED)
+/* Times of a step may differ by this share of it: importers add steps up. */
+#define STEP_SHARE 1e-3
+
+static int is_finite(double x) {
+    return x - x == 0.0;
+}
+
+/* How far times may lie apart; rounding of large times does not count. */
+static double slack(double time, double step) {
+    double size = time < 0.0 ? -time : time;
+    return STEP_SHARE * step + 1e-9 * size;
+}
+
+int spring_set_time(spring_t *spring, const char *function, double time) {
+    int said = spring_in(spring, function, MODE_EVENT | MODE_CONTINUOUS);
+    if (said != SAID_OK) {
+        return said;
+    }
+    if (spring->now.kind != MODEL_EXCHANGE || !is_finite(time)) {
+        return spring_say(spring, SAID_ERROR, function, "needs model exchange and a finite time");
+    }
+    spring->now.time = time;
+    return SAID_OK;
+}
+
+/* The largest deflection with the present point, which may be a trial. */
+static double largest_with(const state_t *now) {
+    return now->input[0] > now->memory[0] ? now->input[0] : now->memory[0];
+}
+
+void spring_remember(spring_t *spring) {
+    spring->now.memory[0] = largest_with(&spring->now);
+}
+
+int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
+               double *values) {
+    const state_t *now;
+    double stored, dissipated;
+    size_t i;
+    int said = spring_in(spring, function, MODE_INSTANTIATED | MODES_TO_GET);
+    if (said != SAID_OK || n == 0) {
+        return said;
+    }
+    now = &spring->now;
+    law_energies(&crumple_table, now->input[0], largest_with(now), &stored, &dissipated);
+    for (i = 0; i < n; i++) {
+        if (now->mode == MODE_INSTANTIATED && vr[i] >= VR_FORCE && vr[i] <= VR_LARGEST_DEFLECTION) {
+            return spring_say_of(spring, function, vr[i], "has no value before initialization");
+        }
+        switch (vr[i]) {
+        case VR_TIME: values[i] = now->time; break;
+        case VR_DEFLECTION: values[i] = now->input[0]; break;
+        case VR_FORCE:
+            values[i] =
+                now->force_scale * law_force(&crumple_table, now->input[0], largest_with(now));
+            break;
+        case VR_STORED_ENERGY: values[i] = now->force_scale * stored; break;
+        case VR_DISSIPATED_ENERGY: values[i] = now->force_scale * dissipated; break;
+        case VR_LARGEST_DEFLECTION: values[i] = largest_with(now); break;
+        case VR_FORCE_SCALE: values[i] = now->force_scale; break;
+        default: return spring_say_of(spring, function, vr[i], "is no variable of this type");
+        }
+    }
+    return SAID_OK;
+}
+
+/* NULL if the variable may be given this value now. */
+static const char *reason_against_value(const spring_t *spring, uint32_t vr, double value) {
+    switch (vr) {
+    case VR_DEFLECTION: return is_finite(value) ? NULL : "must be a finite number";
+    case VR_FORCE_SCALE:
+        if (spring->now.mode == MODE_CONTINUOUS) {
+            return "is a parameter: it can be set in event mode";
+        }
+        return is_finite(value) && value > 0.0 ? NULL : "must be a finite number above 0";
+    default: return "is neither an input nor a parameter";
+    }
+}
+
+int spring_set(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
+               const double *values) {
+    size_t i;
+    int said = spring_in(spring, function,
+                         MODE_INSTANTIATED | (MODES_TO_GET & ~(uint32_t)MODE_TERMINATED));
+    if (said != SAID_OK) {
+        return said;
+    }
+    /* All or none, so that a refused call changes nothing. */
+    for (i = 0; i < n; i++) {
+        const char *reason = reason_against_value(spring, vr[i], values[i]);
+        if (reason != NULL) {
+            return spring_say_of(spring, function, vr[i], reason);
+        }
+    }
+    for (i = 0; i < n; i++) {
+        if (vr[i] == VR_DEFLECTION) {
+            spring->now.input[0] = values[i];
+        } else {
+            spring->now.force_scale = values[i];
+        }
+    }
+    return SAID_OK;
+}
+
+int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
+                     const int32_t *order, const double *values) {
+    size_t i;
+    int said = spring_in(spring, function, MODE_INITIALIZATION | MODE_STEP);
+    if (said != SAID_OK) {
+        return said;
+    }
+    for (i = 0; i < n; i++) {
+        if (vr[i] != VR_DEFLECTION) {
+            return spring_say_of(spring, function, vr[i], "is no input");
+        }
+        if (order[i] < 1 || order[i] > 2 || !is_finite(values[i])) {
+            return spring_say_of(spring, function, vr[i],
+                                 "takes finite derivatives of order 1 or 2");
+        }
+    }
+    for (i = 0; i < n; i++) {
+        spring->now.rates[0][order[i] - 1] = values[i];
+    }
+    return SAID_OK;
+}
+
+int spring_step(spring_t *spring, const char *function, double point, double step) {
+    state_t *now;
+    double turn, end, first, second;
+    int said = spring_in(spring, function, MODE_STEP);
+    if (said != SAID_OK) {
+        return said;
+    }
+    now = &spring->now;
+    if (!is_finite(point) || !is_finite(step) || !(step > 0.0)) {
+        return spring_say(spring, SAID_ERROR, function, "the step must be a finite number above 0");
+    }
+    if (point - now->time > slack(point, step) || now->time - point > slack(point, step)) {
+        return spring_say(
+            spring, SAID_ERROR, function,
+            "the step does not begin where the last one ended; restore a state to go back");
+    }
+    if (point + step - now->stop_time > slack(point, step)) {
+        return spring_say(spring, SAID_ERROR, function, "the step goes beyond the stop time");
+    }
+    /* Values, derivatives and the end are of the input; the memory follows it all along the step.
+     */
+    first = now->rates[0][0];
+    second = now->rates[0][1];
+    end = now->input[0] + (first + 0.5 * second * step) * step;
+    if (!is_finite(end)) {
+        return spring_say(spring, SAID_ERROR, function, "the deflection has no finite end value");
+    }
+    spring_remember(spring);
+    turn = second < 0.0 ? -first / second : 0.0;
+    if (turn > 0.0 && turn < step) {
+        now->input[0] += 0.5 * first * turn;
+        spring_remember(spring);
+    }
+    now->input[0] = end;
+    spring_remember(spring);
+    /* Else a later step whose derivatives nobody sets would go on along them. */
+    now->rates[0][0] = 0.0;
+    now->rates[0][1] = 0.0;
+    now->time = point + step;
+    return SAID_OK;
+}

@@ -1,0 +1,164 @@
+//! FMUs: a force law as a component for any tool that imports FMI 2.0 or 3.0, by model exchange or by
+//! co-simulation. Of all exports they alone carry the whole law with its memory.
+//!
+//! The component is written in C (`c/`) and compiled when crumple is built. One binary serves both
+//! versions; an export writes the curve into a marked block of it, so that nobody needs a compiler.
+//! The same sources go into the archive, with the curve as a C file.
+
+mod archive;
+mod description;
+mod table;
+mod text;
+
+use crate::multibody::ForceLaw;
+use table::Table;
+
+/// Version of the interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FmiVersion {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0.
+    Fmi3,
+}
+
+/// What goes into one FMU.
+pub struct Spring<'a> {
+    /// Any text; letters, digits and `_` of it name the model.
+    pub name: &'a str,
+    /// One line for the importer's user.
+    pub description: &'a str,
+    pub law: &'a ForceLaw,
+    /// What is known of the curve, for documentation/ and extra/.
+    pub facts: &'a [(&'static str, String)],
+}
+
+/// Why there is no FMU.
+#[derive(Debug, thiserror::Error)]
+pub enum FmuError {
+    #[error("an FMU holds at most {room} points of a curve, found {points}")]
+    TooManyPoints { points: usize, room: usize },
+    #[error("an FMU holds at most {room} points of an unloading branch, found {points}")]
+    TooManyShapePoints { points: usize, room: usize },
+    #[error("the curve's {what} is no finite number")]
+    NotFinite { what: &'static str },
+    #[error("the FMU binary of {platform} has no place for a curve")]
+    NoPlace { platform: &'static str },
+    #[error("the archive cannot be packed: {0}")]
+    Packing(#[from] zip::result::ZipError),
+    #[error("the archive cannot be packed: {0}")]
+    Writing(#[from] std::io::Error),
+    #[error("the facts of the curve cannot be written: {0}")]
+    Facts(#[from] serde_json::Error),
+}
+
+/// A compiled component without a curve.
+struct Binary {
+    /// Names of the platform's folder in FMI 2 and FMI 3.
+    folders: [&'static str; 2],
+    extension: &'static str,
+    bytes: &'static [u8],
+}
+
+/// What build.rs could compile.
+const BINARIES: &[Binary] = &include!(concat!(env!("OUT_DIR"), "/fmu_binaries.rs"));
+
+/// Sources of the component beside the table, as they go into the archive.
+const SOURCES: [(&str, &str); 12] = [
+    ("derivative.c", include_str!("c/derivative.c")),
+    ("fmi2.c", include_str!("c/fmi2.c")),
+    ("fmi3.c", include_str!("c/fmi3.c")),
+    ("fmi3_none.c", include_str!("c/fmi3_none.c")),
+    ("instance.c", include_str!("c/instance.c")),
+    ("law.c", include_str!("c/law.c")),
+    ("law.h", include_str!("c/law.h")),
+    ("names.h", include_str!("c/names.h")),
+    ("spring.c", include_str!("c/spring.c")),
+    ("spring.h", include_str!("c/spring.h")),
+    ("state.c", include_str!("c/state.c")),
+    ("sum.c", include_str!("c/sum.c")),
+];
+
+/// The header of the table, which the exporter must agree with.
+const TABLE_HEADER: &str = include_str!("c/table.h");
+
+/// Platforms whose binary is in every FMU of this program, by their names in FMI 2 (`linux64`,
+/// `win64`). On others the FMU must be compiled from its sources.
+pub fn binaries() -> impl Iterator<Item = &'static str> {
+    BINARIES.iter().map(|binary| binary.folders[0])
+}
+
+/// The FMU as the bytes of its archive. The same input gives the same bytes.
+///
+/// Deflection is in m, compression positive; the outputs are the law's force and energies, and the
+/// largest deflection so far. Beyond the curve's end [`crate::multibody::EnvelopeEnd::Error`] holds
+/// the force.
+///
+/// # Errors
+/// [`FmuError`] if the curve has more points than the FMU has room for.
+pub fn archive(spring: &Spring<'_>, version: FmiVersion) -> Result<Vec<u8>, FmuError> {
+    let token = token(spring, version, &Table::new(spring.law, "")?);
+    let table = Table::new(spring.law, &token)?;
+    archive::pack(spring, version, &table, &token)
+}
+
+/// GUID of FMI 2 and instantiation token of FMI 3: a hash of all that the FMU is made of.
+fn token(spring: &Spring<'_>, version: FmiVersion, table: &Table) -> String {
+    let mut hash = blake3::Hasher::new();
+    let mut add = |text: &[u8]| {
+        hash.update(&(text.len() as u64).to_le_bytes());
+        hash.update(text);
+    };
+    add(format!("{version:?} {}", env!("CARGO_PKG_VERSION")).as_bytes());
+    add(spring.name.as_bytes());
+    add(spring.description.as_bytes());
+    for (key, value) in spring.facts {
+        add(key.as_bytes());
+        add(value.as_bytes());
+    }
+    for (_, source) in SOURCES {
+        add(source.as_bytes());
+    }
+    add(TABLE_HEADER.as_bytes());
+    add(&table.bytes());
+    let hex = hash.finalize().to_hex();
+    let part = |from: usize, to: usize| hex.get(from..to).unwrap_or_default();
+    format!("{{{}-{}-{}-{}-{}}}", part(0, 8), part(8, 12), part(12, 16), part(16, 20), part(20, 32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Envelope;
+    use crate::multibody::{EnvelopeEnd, Unloading};
+
+    fn law(points: usize) -> ForceLaw {
+        let d = (0..points).map(|i| i as f64 * 1e-3).collect();
+        let f = (0..points).map(|i| i as f64 * 1e3).collect();
+        let unloading = Unloading::Memory { stiffness_n_per_m: 40e6 };
+        ForceLaw::new(Envelope::new(d, f).unwrap(), unloading, EnvelopeEnd::Hold)
+    }
+
+    #[test]
+    fn the_token_names_all_that_the_fmu_holds() {
+        let token_of = |name: &str, points: usize, version: FmiVersion| {
+            let law = law(points);
+            let spring = Spring { name, description: "", law: &law, facts: &[] };
+            token(&spring, version, &Table::new(&law, "").unwrap())
+        };
+        let one = token_of("a", 5, FmiVersion::Fmi2);
+        assert_eq!(one.len(), 38, "{one}");
+        assert_eq!(one, token_of("a", 5, FmiVersion::Fmi2));
+        assert_ne!(one, token_of("b", 5, FmiVersion::Fmi2));
+        assert_ne!(one, token_of("a", 6, FmiVersion::Fmi2));
+        assert_ne!(one, token_of("a", 5, FmiVersion::Fmi3));
+    }
+
+    #[test]
+    fn refuses_more_points_than_there_is_room_for() {
+        let law = law(4097);
+        let spring = Spring { name: "a", description: "", law: &law, facts: &[] };
+        let error = archive(&spring, FmiVersion::Fmi3).unwrap_err();
+        assert_eq!(error.to_string(), "an FMU holds at most 4096 points of a curve, found 4097");
+    }
+}

@@ -1,0 +1,127 @@
+//! Modelica: a self-contained package with the spring and its memory (`.mo`), or a CombiTable text (`.txt`); SI.
+//!
+//! The package needs no library: the law is the one of [`ForceLaw`](crate::multibody::ForceLaw) with a straight unloading
+//! line, its tables are constants of the package. Memory: the largest deflection is a discrete variable that moves while
+//! the deflection falls (`when v < 0`); on the way up the force is that of the loading branch.
+
+use std::fmt::Write;
+
+use super::text::{Lines, nine_digits, title};
+use super::thin::thinned;
+use super::{ExportCurve, ExportError, Exported, Options, Tail, TargetUnloading};
+
+/// Columns of a comment.
+const COMMENT_WIDTH: usize = 200;
+/// Most points of the package's table: a translator unrolls the search through them.
+const MOST_POINTS: usize = 200;
+/// Numbers per line of an array.
+const PER_LINE: usize = 6;
+
+pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+    if options.units.is_some() {
+        return Err(ExportError::SiOnly { format: "modelica" });
+    }
+    let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
+    if options.extension.as_deref() == Some("txt") {
+        return Ok(combi_table(curves, &stem));
+    }
+    let mut exported = Exported::default();
+    for curve in curves {
+        let points = curve.deflection_m().len();
+        let loading = thinned(&curve.loading, MOST_POINTS, curve.end)?;
+        let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
+        if loading.deflection_m().len() < points {
+            exported.notes.push(format!(
+                "{}: {} of {points} points are kept in the package, with the same energy to the maximal crush",
+                curve.headline(),
+                loading.deflection_m().len()
+            ));
+        }
+        exported.notes.push(format!(
+            "{}: restitution {:.3} as in crumple's own runs",
+            curve.headline(),
+            curve.own_restitution()
+        ));
+        let curve = curve.clone().through(loading, end);
+        exported.files.push((format!("{}.mo", curve.identifier()), package(&curve)));
+    }
+    Ok(exported)
+}
+
+/// One table of loading and one of unloading per curve.
+fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
+    let mut lines = Lines::default();
+    let mut notes = Vec::new();
+    lines.add(format_args!("#1"));
+    for (k, curve) in curves.iter().enumerate() {
+        let suffix = if k == 0 { String::new() } else { format!("_{}", k + 1) };
+        for (key, value) in curve.facts() {
+            lines.add(format_args!("# {key}: {}", title(&value, COMMENT_WIDTH)));
+        }
+        // Tables extrapolate by their last two points: guard points hold the force at 0 before
+        // the contact.
+        let reach = curve.loading.end_m();
+        let guards = [(-0.02 * reach, 0.0), (-0.01 * reach, 0.0)];
+        let points = curve.deflection_m().iter().copied().zip(curve.force_n().iter().copied());
+        let held =
+            (curve.tail != Tail::Bottom).then(|| (1.1 * reach, curve.loading.force_at(reach)));
+        let loading: Vec<(f64, f64)> = guards.into_iter().chain(points).chain(held).collect();
+        let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
+        let open_m = end_m - end_n / curve.stiffness_n_per_m();
+        let unloading = [(open_m - 0.01 * reach, 0.0), (open_m, 0.0), (end_m, end_n)];
+        for (name, points) in [("fd_load", &loading[..]), ("fd_unload", &unloading)] {
+            lines.add(format_args!("double {name}{suffix}({},2)  # d [m], F [N]", points.len()));
+            for (d, f) in points {
+                lines.add(format_args!("{} {}", nine_digits(*d), nine_digits(*f)));
+            }
+        }
+        notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
+    }
+    Exported { files: vec![(format!("{stem}.txt"), lines.into_bytes())], notes }
+}
+
+/// A constant array.
+fn array(name: &str, values: impl Iterator<Item = f64>, meaning: &str) -> String {
+    let numbers: Vec<String> = values.map(nine_digits).collect();
+    let rows: Vec<String> = numbers.chunks(PER_LINE).map(|row| row.join(", ")).collect();
+    let values = rows.join(",\n    ");
+    format!("  constant Real {name}[{}] = {{\n    {values}}} \"{meaning}\";\n", numbers.len())
+}
+
+fn package(curve: &ExportCurve) -> Vec<u8> {
+    let law = curve.law();
+    let tables = law.tables();
+    let name = curve.identifier();
+    let mut text = String::new();
+    for (key, value) in curve.facts() {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "// {key}: {}", title(&value, COMMENT_WIDTH));
+    }
+    let headline = title(&curve.headline(), COMMENT_WIDTH).replace(['"', '\\'], " ");
+    let _ = writeln!(text, "package {name} \"{headline}\"");
+    let points = tables.deflection_m.len();
+    let _ = writeln!(text, "  constant Integer points = {points};");
+    text += &array("d", tables.deflection_m.iter().copied(), "Deflection, m");
+    text += &array("f", tables.force_n.iter().copied(), "Force of the loading branch, N");
+    text += &array("slope", tables.slope_n_per_m.iter().copied(), "Slope behind each point, N/m");
+    text += &array("work", tables.work_j.iter().copied(), "Work done to each point, J");
+    let memory = tables.memory.as_ref();
+    let lost = memory.map_or(tables.work_j, |m| m.dissipated_j);
+    text += &array("lost", lost.iter().copied(), "Energy lost to each point, J");
+    let stiffness = memory.map_or(1.0, |m| m.stiffness_n_per_m);
+    let steepest = memory.map_or(1.0, |m| m.steepest_n_per_m);
+    for (key, value, meaning) in [
+        ("stiffness", stiffness, "Unloading stiffness, N/m"),
+        ("steepest", steepest, "Steepest rise or unloading stiffness, N/m"),
+        ("impact_speed", curve.predicted.speed_m_per_s, "Speed the curve belongs to, m/s"),
+        ("impact_mass", curve.effective_mass_kg(), "Mass that moves along the deflection, kg"),
+    ] {
+        let _ = writeln!(text, "  constant Real {key} = {} \"{meaning}\";", nine_digits(value));
+    }
+    text += FUNCTIONS;
+    let _ = writeln!(text, "end {name};");
+    text.into_bytes()
+}
+
+/// The law and two models that use it.
+const FUNCTIONS: &str = include_str!("modelica/spring.mo");

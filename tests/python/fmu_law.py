@@ -1,0 +1,74 @@
+"""The law inside an FMU against numbers of ours.
+
+    python fmu_law.py FMU PAIRS.json
+
+PAIRS.json holds deflections, largest deflections and our force and energies, as bits. Prints a JSON
+object: pairs, how many of the numbers differ, the largest relative difference, and the largest
+difference of the directional derivatives from central differences, in the scale of the largest.
+"""
+
+import json
+import sys
+
+from fmu_spring import Spring, Unpacked, from_bits, to_bits
+
+QUANTITIES = ["force", "stored_energy", "dissipated_energy"]
+# Derivatives are looked at for every so many pairs.
+EVERY = 25
+
+
+def central(spring, name, deflection, width):
+    values = []
+    for d in [deflection - width, deflection, deflection + width]:
+        spring.set(d)
+        values.append(spring.get(name))
+    left, right = (values[1] - values[0]) / width, (values[2] - values[1]) / width
+    return left, right
+
+
+def main(path, pairs):
+    asked = json.load(open(pairs))
+    numbers = {key: [from_bits(text) for text in asked[key]] for key in ["deflection", "largest"]}
+    different, worst = 0, 0.0
+    slopes = {name: [] for name in QUANTITIES}
+    with Unpacked(path) as fmu, Spring(fmu, "cs") as spring:
+        fresh = spring.i.getFMUState()
+        for k, (d, largest) in enumerate(zip(numbers["deflection"], numbers["largest"])):
+            spring.i.setFMUState(fresh)
+            spring.set(largest)
+            spring.i.doStep(0.0, 1.0)
+            spring.set(d)
+            for name, value in zip(QUANTITIES, spring.get(*QUANTITIES)):
+                if to_bits(value) != asked[name][k]:
+                    ours = from_bits(asked[name][k])
+                    different += 1
+                    worst = max(worst, abs(value - ours) / max(abs(ours), 1e-300))
+            if k % EVERY != 1 or d <= 1e-3:
+                continue
+            for on_envelope in [False, True]:
+                if on_envelope:
+                    # Nothing is remembered: the same deflection is the largest.
+                    spring.i.setFMUState(fresh)
+                for name in QUANTITIES:
+                    spring.set(d)
+                    partial = spring.partial(name)
+                    left, right = central(spring, name, d, 1e-7)
+                    # Not where a kink lies within the difference.
+                    if abs(left - right) <= 1e-3 * max(abs(left), abs(right)):
+                        slopes[name].append((partial, 0.5 * (left + right)))
+        spring.i.freeFMUState(fresh)
+    off = 0.0
+    for name, pairs in slopes.items():
+        largest = max(abs(slope) for _, slope in pairs) or 1.0
+        off = max(off, max(abs(a - b) for a, b in pairs) / largest)
+    print(json.dumps({
+        "pairs": len(numbers["largest"]),
+        "different": different,
+        "worst": worst,
+        "derivative": off,
+        "slopes": sum(map(len, slopes.values())),
+    }))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
