@@ -932,6 +932,73 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
     assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car against a rigid wall\", which builds it"), "{error}");
 }
 
+/// What crumple export writes comes back: the loading branch without the points that other tools
+/// need, with what the header says of it.
+#[test]
+fn exported_curves_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let group = ["--group", "lead-car-wall"];
+    crumple_ok(
+        here,
+        &[&["train", "curves.h5", "--model", "linear", "-o", "a.model"], &group[..]].concat(),
+    );
+    let files = ["a.json", "a.csv", "a.k", "a.txt", "a.mat"];
+    let outputs = files.iter().flat_map(|file| ["-o", file]);
+    let predict = ["predict", "a.model", "--speed", "50km/h"].into_iter().chain(outputs);
+    crumple_ok(here, &predict.collect::<Vec<_>>());
+    let body = ReadOptions { force: Some(crumple::curve::ForceKind::Body), ..given(None) };
+    let (expected, _) = read(&here.join("a.json"), &body).unwrap();
+    for file in &files[1..] {
+        let (curve, reader) = read(&here.join(file), &given(None)).unwrap();
+        assert_eq!(
+            curve.deflection_m.len(),
+            expected.deflection_m.len(),
+            "{file}: {:?}",
+            curve.notes
+        );
+        let close =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-8 * b.abs());
+        assert!(close(&curve.deflection_m, &expected.deflection_m), "{file}");
+        assert!(close(&curve.force_n, &expected.force_n), "{file}");
+        let (facts, expected) = (curve.facts, expected.facts);
+        assert_eq!(facts.force, expected.force, "{file}: {}", reader.name);
+        assert_eq!(facts.speed_kind, expected.speed_kind);
+        assert_eq!(facts.mass_kg, expected.mass_kg);
+        assert_eq!(facts.speed_m_per_s, expected.speed_m_per_s);
+        let stiffness = facts.unloading_stiffness_n_per_m.unwrap();
+        assert!((stiffness / expected.unloading_stiffness_n_per_m.unwrap() - 1.0).abs() < 1e-8);
+        assert!(
+            curve.notes.iter().any(|n| n.contains("beyond the maximal crush of")),
+            "{file}: {:?}",
+            curve.notes
+        );
+    }
+    // The same case by each way.
+    let files = ["a.csv", "a.k", "a.txt", "a.mat"];
+    let names = ["--case", "csv", "--case", "k", "--case", "txt", "--case", "mat"];
+    crumple_ok(here, &[&["db", "add", "c.h5", "--group", "all"], &files[..], &names].concat());
+    let crushes: Vec<f64> =
+        cases(here, "all").iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).collect();
+    assert!(crushes.iter().all(|c| (c / crushes[0] - 1.0).abs() < 1e-8), "{crushes:?}");
+    // Histories of a recorded case.
+    let export = ["export", "curves.h5", "--case", "36kmh", "--to", "iso-mme", "-o", "test"];
+    crumple_ok(here, &[&export[..], &group].concat());
+    crumple_ok(here, &["db", "add", "c.h5", "test", "--group", "mme", "--kind", "wall"]);
+    let recorded = &cases(here, "mme")[0];
+    let shown = crumple_ok(
+        here,
+        &[&["db", "show", "curves.h5", "--case", "36kmh", "--json"], &group[..]].concat(),
+    );
+    let shown: Value = serde_json::from_str(&shown).unwrap();
+    let first = &shown["groups"]["lead-car-wall"][0];
+    for key in ["max_deflection_m", "work_J", "speed_m_per_s", "mass_kg"] {
+        let (a, b) = (recorded[key].as_f64().unwrap(), first[key].as_f64().unwrap());
+        assert!((a / b - 1.0).abs() < 2e-3, "{key}: {a} and {b}");
+    }
+}
+
 #[test]
 fn no_study_takes_the_name_of_what_was_added() {
     let study = fs::read_to_string(crate::common::fixture("fe/lead-car-wall/study.toml")).unwrap();
@@ -1024,7 +1091,7 @@ proptest! {
             masses: crumple::curve::Masses { body_kg: 24e3, other_kg: None },
             unloading_stiffness_n_per_m: unloading,
             body_unloading_stiffness_n_per_m: None,
-            units: UnitSystem::SI,
+            units: UnitSystem::parse("SI").unwrap(),
             accept_energy: true,
         };
         if let Ok(case) = from_table(&table, &impact) {
