@@ -114,7 +114,7 @@ pub fn build(
         .par_iter()
         .map(|entry| {
             let name = entry.case_name();
-            // A case that somebody has changed since is made anew.
+            // A case that somebody has changed since is made again.
             let is_altered = database.is_altered(study.group(), &name);
             let before = before.get(name.as_str()).filter(|_| !is_altered);
             let result = case(&study, entry, before.map(|case| case.fingerprint.as_str()));

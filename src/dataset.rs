@@ -37,7 +37,7 @@ pub struct TrainingCase {
     pub fingerprint: String,
 }
 
-/// A column of the table beside speed and deflection: a number, or whether the case is of
+/// A column of the table besides speed and deflection: a number, or whether the case is of
 /// a category.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Feature {

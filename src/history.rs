@@ -113,7 +113,7 @@ impl fmt::Display for TimeGap {
     }
 }
 
-/// An interval is a hole beyond so many times the interval around it: 3, and a little for
+/// An interval is a hole if it is this many times the interval around it: 3, and a little for
 /// the rounding of printed times.
 const GAP_RATIO: f64 = 3.01;
 /// Intervals that are looked at on each side of one.

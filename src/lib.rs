@@ -53,6 +53,8 @@ pub mod build;
 
 pub mod dataset;
 
+mod piecewise;
+
 mod table;
 
 mod stream;
@@ -65,7 +67,6 @@ pub mod multibody;
 
 pub mod nsdm;
 
-#[allow(missing_docs)]
 pub mod formats;
 
 pub mod import;

@@ -70,7 +70,7 @@ pub enum UnitError {
         /// The same number with a unit.
         example: String,
     },
-    /// The unit is none of this kind of quantity.
+    /// The unit does not belong to this kind of quantity.
     #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
     UnknownUnit {
         /// What kind of quantity was expected.
@@ -296,7 +296,8 @@ const MASSES: &[(&str, f64)] = &[("kg", 1.0), ("t", 1e3), ("Mg", 1e3), ("g", 1e-
 const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl UnitSystem {
-    pub(crate) const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
+    /// Metres, kilograms, seconds.
+    pub const SI: Self = Self { length_m: 1.0, mass_kg: 1.0, time_s: 1.0 };
     /// Systems that crash models are written in.
     pub(crate) const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
 

@@ -252,7 +252,7 @@ impl ModelTable {
 }
 
 /// Adds the rows and means of `auto` itself: with every inner speed left out, model and rule
-/// are chosen anew by leaving out speeds of what remains.
+/// are chosen again by leaving out speeds of what remains.
 ///
 /// The errors of the chosen model are those that it was chosen by, and so a little too good;
 /// these are not. Speeds that leave fewer than three others, or fail otherwise, have no row but a

@@ -28,8 +28,9 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome};
   crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
   crumple compare --train train-set.toml
 Rows: fe is FE's own curve in the one-mass model, the floor for predictions of that force; fe_body is
-made from FE's own speeds and checks that curve, force law and run are consistent; fdrm is the FE curve of one speed, nsdm the spring and damper fitted to that
-run; ddtcm the reference method's forest and spline; best the model that leaving speeds out chooses
+made from FE's own speeds and checks that curve, force law and run are consistent; fdrm is the FE
+curve of one speed, nsdm the spring and damper fitted to that run; ddtcm the reference
+method's forest and spline; best the model that leaving speeds out chooses
 among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
 largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
 those under velocity and acceleration are taken at 10 kHz, as crumple rate takes them.

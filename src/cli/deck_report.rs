@@ -183,7 +183,7 @@ fn list(out: &mut dyn Write, what: &str, entries: &[Entry<'_>]) -> io::Result<()
     rest(out, entries.len())
 }
 
-/// Says how many of so many entries were not printed.
+/// Says how many of all entries were not printed.
 fn rest(out: &mut dyn Write, entries: usize) -> io::Result<()> {
     match entries.checked_sub(SHOWN) {
         Some(more @ 1..) => writeln!(out, "    … and {more} more (--json lists all)"),

@@ -162,7 +162,7 @@ fn columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f64])> {
     columns
 }
 
-/// What the document has beside the columns of the table.
+/// What the document has besides the columns of the table.
 fn further_columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f64])> {
     let mut columns: Vec<(String, &[f64])> = Vec::new();
     for (interface, history) in prepared.chain.interfaces().iter().zip(&run.interfaces) {

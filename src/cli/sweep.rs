@@ -48,7 +48,7 @@ pub struct Args {
     /// Run block I of N blocks of the items
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
-    /// Begin anew, whatever an earlier run has left
+    /// Start from the beginning, whatever an earlier run has left
     #[arg(long)]
     restart: bool,
     /// Say what would be run, and run nothing

@@ -30,9 +30,10 @@ the means by each rule for the crush, the model's own marked); peaks are the fir
 (force and place); velocity and acceleration (CFC 60; in brackets not filtered) are those of a
 multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to 30 ms after FE's
 largest crush. The means are over inner speeds; the ends of the range are extrapolation and stand
-apart. FE contact (floor) is FE's own contact force in that run: a lower bound, which a prediction
-beats only by chance; FE body (check) is made from FE's own speeds and checks curve, force law and run. forest is the reference method (DDTCM),
-nearest is FDRM. --nested adds auto: model and rule chosen without the speed that is left out.")]
+apart. FE contact (floor) is FE's own contact force in that run: no prediction of that force
+can be expected to do better. FE body (check) is made from FE's own speeds, and only checks curve,
+force law and run. forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
+model and rule chosen without the speed that is left out.")]
 pub struct Args {
     /// Curve database
     database: PathBuf,

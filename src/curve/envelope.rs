@@ -1,5 +1,7 @@
 //! Envelope: the loading branch as a function, force over increasing deflection.
 
+use crate::piecewise;
+
 /// A piecewise linear force over deflection.
 ///
 /// Invariant: at least two points, all finite, deflection strictly increasing from 0.
@@ -204,8 +206,7 @@ impl Envelope {
                 return i;
             }
         }
-        let above = self.deflection_m.partition_point(|&d| d <= deflection_m);
-        above.clamp(1, self.deflection_m.len() - 1) - 1
+        piecewise::segment(&self.deflection_m, deflection_m)
     }
 }
 

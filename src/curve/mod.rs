@@ -201,7 +201,7 @@ pub struct SourceFile {
     pub problems: usize,
 }
 
-/// A further case parameter beside speed: a number whose name carries its unit
+/// A further case parameter besides speed: a number whose name carries its unit
 /// (`angle_deg`), or a category (`obstacle`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]

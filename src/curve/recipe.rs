@@ -13,8 +13,8 @@ pub struct Recipe {
     pub deflection: DeflectionSource,
     /// Where the force comes from.
     pub force: ForceSource,
-    /// Contact force that tells when contact begins, beside a body force: a body slows down
-    /// some milliseconds after the first touch.
+    /// Contact force that tells when contact begins, where the force is a body force: a body
+    /// slows down some milliseconds after the first touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ForceSource>,
     /// Filter of the force.
@@ -159,7 +159,7 @@ impl TryFrom<ForceTable> for ForceSource {
                 Ok(Self::Contact { file, id, side, component })
             }
             (None, Some(_), _) if side.is_some() => {
-                Err("a node has no side: take side away, or give the id of an interface".into())
+                Err("a node has no side: remove side, or give the id of an interface".into())
             }
             (None, Some(node), Some("mass")) => {
                 let motion = match component.as_str() {

@@ -63,7 +63,7 @@ impl Foreign {
         )
     }
 
-    /// What a group holds beside the attributes, groups and datasets that are the layout's.
+    /// What a group holds besides the attributes, groups and datasets that are the layout's.
     fn members(
         &mut self,
         place: &str,

@@ -224,8 +224,8 @@ pub(crate) struct Opened<'a> {
     left: Cell<u64>,
 }
 
-/// What datasets may declare beside so many times the file's size. Compression is the reason
-/// for more than once: force histories shrink by less than this.
+/// Bytes that datasets may declare in addition to a multiple of the file's size. A multiple,
+/// because they are compressed: force histories shrink by less than this.
 const DECLARED_BYTES: u64 = 64 << 20;
 const DECLARED_PER_BYTE: u64 = 32;
 
@@ -285,7 +285,7 @@ impl<'a> Opened<'a> {
         result.map_err(|e| self.damaged(place, e.to_string()))
     }
 
-    /// Groups that hold cases, with these. What others put beside them is none.
+    /// Groups that hold cases, with these. What other programs put beside them is no group of ours.
     pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, DatabaseError> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
@@ -606,7 +606,7 @@ mod tests {
         }
     }
 
-    /// Bytes that are read of a database of so many cases: for all of them, and for one.
+    /// Bytes that are read of a database with this many cases: for all of them, and for one.
     fn bytes_read(cases: usize) -> (u64, u64) {
         let mut database = Database::default();
         database.put_all((0..cases).map(|k| case(format!("case {k:05}")))).unwrap();

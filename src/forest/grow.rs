@@ -4,7 +4,7 @@
 //! partitions each order, stably, at every split. So a node is a range of all orders, and nothing is sorted again. An entry of
 //! an order carries value, target and number of draws: a scan reads memory in one direction, where access by sample would miss
 //! the cache at every step. What needs the sample is one flag, left or right; samples are numbered along the first feature, and
-//! anew in nodes of 4 096, so that the flags stay in the cache.
+//! again in nodes of 4 096, so that the flags stay in the cache.
 //!
 //! Most of an unpruned tree is nodes of a few samples, where a mispredicted branch costs more than the arithmetic. So gains are
 //! computed without branches and searched afterwards, samples are written to both sides of which one counts, and nodes whose
@@ -37,7 +37,7 @@ pub(crate) struct Table<F> {
     pub rows: Vec<u32>,
 }
 
-/// Distinct samples up to which a node's samples are numbered anew, so that what is noted by
+/// Distinct samples up to which a node's samples are numbered again, so that what is noted by
 /// sample lies in the first-level cache until the node's last leaf.
 const LOCAL: usize = 4096;
 
@@ -146,7 +146,7 @@ impl<F: Float> Grower<'_, F> {
         }
     }
 
-    /// Numbers the samples of a range anew, in the first feature's order.
+    /// Numbers the samples of a range again, in the first feature's order.
     fn renumber(&mut self, range: Range<usize>) {
         for (new, drawn) in (0..).zip(&self.orders[0][range.clone()]) {
             self.numbers[drawn.sample as usize] = new;

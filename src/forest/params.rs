@@ -87,7 +87,7 @@ pub enum ForestError {
     /// There is no feature.
     #[error("there are no features to split on")]
     NoFeatures,
-    /// There are more samples than a node can number.
+    /// There are more samples than a forest can index.
     #[error("{samples} samples are more than a forest can index ({most})", most = MOST_SAMPLES)]
     TooManySamples {
         /// Number of samples.

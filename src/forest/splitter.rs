@@ -31,7 +31,7 @@ impl<F> Drawn<F> {
 pub(crate) struct Split<F> {
     pub feature: usize,
     pub threshold: F,
-    /// Distinct samples that go left: the first so many in the feature's order.
+    /// How many distinct samples go left: the first ones in the feature's order.
     pub left: usize,
     pub gain: f64,
 }

@@ -6,16 +6,16 @@
 
 mod adams;
 mod calculix;
-pub mod csv;
+mod csv;
 mod export_curve;
 pub mod fmu;
 mod fmu_export;
 pub mod iso_mme;
-pub mod json;
-pub mod lsdyna;
+mod json;
+mod lsdyna;
 mod mat;
 mod modelica;
-pub mod onnx;
+mod onnx;
 mod radioss;
 pub mod read;
 mod table;

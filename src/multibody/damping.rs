@@ -1,5 +1,7 @@
 //! Dampers: a coefficient over the closing speed.
 
+use crate::piecewise;
+
 /// A damper's coefficient over the magnitude of its speed, piecewise linear, held beyond its
 /// ends.
 ///
@@ -75,10 +77,13 @@ impl Damping {
     pub(crate) fn at(&self, speed_m_per_s: f64) -> f64 {
         let (v, c) = (&self.speed_m_per_s, &self.coefficient_n_s_per_m);
         let speed = speed_m_per_s.abs();
-        match v.partition_point(|&v| v <= speed) {
-            0 => c[0],
-            i if i == v.len() => c[i - 1],
-            i => c[i - 1] + (c[i] - c[i - 1]) * (speed - v[i - 1]) / (v[i] - v[i - 1]),
+        let last = v.len() - 1;
+        if speed >= v[last] {
+            c[last]
+        } else if speed >= v[0] {
+            piecewise::by_product(v, c, piecewise::segment(v, speed), speed)
+        } else {
+            c[0]
         }
     }
 

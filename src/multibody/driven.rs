@@ -17,11 +17,7 @@ pub enum UnloadingChoice {
 
 impl ForceLaw {
     /// The law that follows a curve.
-    pub(crate) fn of_curve(
-        curve: &DrivingCurve,
-        unloading: UnloadingChoice,
-        end: EnvelopeEnd,
-    ) -> Self {
+    pub fn of_curve(curve: &DrivingCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
         let memory = |stiffness_n_per_m: f64| match stiffness_n_per_m > 0.0 {
             true => Unloading::Memory { stiffness_n_per_m },

@@ -46,7 +46,7 @@ impl Method {
     }
 }
 
-/// What is kept of a run beside its summary.
+/// What is kept of a run besides its summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Record {
     /// Histories of all bodies and interfaces.
@@ -67,7 +67,7 @@ pub struct RunSettings {
     pub step_s: f64,
     /// How the motion is integrated.
     pub method: Method,
-    /// What is kept beside the summary.
+    /// What is kept besides the summary.
     pub record: Record,
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::NsdmError;
 use crate::curve::{Envelope, EnvelopeError};
+use crate::piecewise;
 
 /// Largest difference between [`Nsdm::envelope`] and the spring, as a share of its peak.
 const ENVELOPE_ERROR: f64 = 1e-4;
@@ -49,14 +50,11 @@ impl PiecewiseLinear {
     /// Value at `|u|`; the last value beyond the last node.
     pub(crate) fn at(&self, u: f64) -> f64 {
         let u = u.abs();
-        let i = self.nodes.partition_point(|&node| node <= u);
-        if i >= self.nodes.len() {
+        if u >= self.end() {
             return self.values[self.values.len() - 1];
         }
         // Nodes begin at 0, so one lies at or before any magnitude; a NaN takes the first segment.
-        let i = i.max(1);
-        let share = (u - self.nodes[i - 1]) / (self.nodes[i] - self.nodes[i - 1]);
-        self.values[i - 1] + share * (self.values[i] - self.values[i - 1])
+        piecewise::by_share(&self.nodes, &self.values, piecewise::segment(&self.nodes, u), u)
     }
 
     /// Where the last value begins to hold.

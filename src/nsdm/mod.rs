@@ -51,7 +51,7 @@ pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
 pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
 /// Objective of a law that diverges: larger than any other, and comparable.
 const PENALTY: f64 = f64::MAX;
-/// One in so many of the first population begins at least squares, if asked for.
+/// One in this many of the first population begins at least squares, if asked for.
 const LEAST_SQUARES_SHARE: usize = 4;
 /// More would be a mistyped number.
 const MAX_POPULATION: usize = 1_000_000;

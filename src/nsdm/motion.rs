@@ -9,7 +9,7 @@ use super::{NsdmError, check_times};
 
 /// Longest step, in s: the output interval of the reference method.
 const STEP_S: f64 = 0.75e-3;
-/// A step that passes a node of either law is taken again in so many parts.
+/// A step that passes a node of either law is taken again in this many parts.
 ///
 /// The laws are smooth between their nodes, where one step is exact to far more digits than
 /// a fit; nearly all of the error is that of the kinks.

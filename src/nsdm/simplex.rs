@@ -66,7 +66,7 @@ fn search<const N: usize>(
         }
         let centroid: [f64; N] =
             std::array::from_fn(|i| simplex[..N].iter().map(|p| p.genes[i]).sum::<f64>() / n);
-        // From the centroid, so many times as far as the worst point lies on the other side.
+        // From the centroid, this factor times as far as the worst point lies on the other side.
         let along = |far: f64| -> [f64; N] {
             std::array::from_fn(|i| {
                 (centroid[i] + far * (centroid[i] - worst.genes[i])).clamp(0.0, 1.0)

@@ -10,13 +10,13 @@ pub enum PlanError {
     /// No draw at all.
     #[error("sweep.samples is 0: expected 1 or more")]
     NoSample,
-    /// Something is drawn, and nobody says how often.
+    /// A variable is drawn from a distribution, and the number of draws is missing.
     #[error(
         "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid"
     )]
     SamplesMissing,
     /// Nothing is drawn.
-    #[error("sweep.samples is given, but no variable has a distribution: leave samples away")]
+    #[error("sweep.samples is given, but no variable has a distribution: remove samples")]
     SamplesUnused,
     /// Nothing is drawn.
     #[error("sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution")]
@@ -57,7 +57,7 @@ pub enum VaryError {
         key: &'static str,
     },
     /// A key that does not go with another.
-    #[error("{key} does not go with {with}: leave one of them away")]
+    #[error("{key} does not go with {with}: remove one of them")]
     Together {
         /// The key.
         key: &'static str,
@@ -72,7 +72,7 @@ pub enum VaryError {
         /// What is wrong with it.
         source: UnitError,
     },
-    /// A factor that is none.
+    /// A factor that is no number.
     #[error("{key}: \"{text}\" is no number: write a plain one, such as 0.9")]
     NoNumber {
         /// The key.

@@ -252,7 +252,7 @@ pub(crate) enum Spread {
         /// Number of values, 2 or more.
         steps: u64,
     },
-    /// Drawn anew for each item.
+    /// Drawn for each item.
     Drawn(Distribution),
 }
 
@@ -584,11 +584,11 @@ mod tests {
         t("what = \"force\", distribution = \"normal\", mean = 1", "the distribution needs sd = …");
         t(
             "what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1",
-            "sd does not go with uniform: leave one of them away",
+            "sd does not go with uniform: remove one of them",
         );
         t(
             "what = \"force\", values = [1]",
-            "sweep.samples is given, but no variable has a distribution: leave samples away",
+            "sweep.samples is given, but no variable has a distribution: remove samples",
         );
     }
 

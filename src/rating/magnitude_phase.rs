@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A magnitude, a phase and their combination; 0 is none.
+/// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MagnitudePhase {
     /// Above 0 if the prediction is larger.

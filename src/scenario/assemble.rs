@@ -28,7 +28,7 @@ pub enum AssemblyError {
         /// Why not.
         source: SpringError,
     },
-    /// Its damper is none.
+    /// Its damper breaks the rules of a damper.
     #[error("curve \"{curve}\": {source}")]
     Damping {
         /// The curve.

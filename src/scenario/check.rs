@@ -55,7 +55,7 @@ pub enum CheckError {
         name: String,
     },
     /// Limits for no train.
-    #[error("[limits] trains is empty: name one, or leave it away for all")]
+    #[error("[limits] trains is empty: name one, or remove it for all")]
     NoLimitedTrain,
     /// Limits for a train that is not there.
     #[error("[limits] trains: there is no train \"{name}\": the scenario has {known}")]
@@ -119,14 +119,14 @@ pub enum CheckError {
         /// The vehicle.
         vehicle: String,
     },
-    /// Stages that are none.
+    /// Stages that make no curve.
     #[error("curve \"{curve}\": stages is empty")]
     NoStages {
         /// The curve.
         curve: String,
     },
     /// A key that the kind of curve does not take.
-    #[error("curve \"{curve}\": {key} belongs to {of}: leave it away")]
+    #[error("curve \"{curve}\": {key} belongs to {of}: remove it")]
     ForeignKey {
         /// The curve.
         curve: String,

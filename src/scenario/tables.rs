@@ -155,9 +155,9 @@ pub struct CurveTable {
     pub gap: Option<LengthText>,
     /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
     pub tension: Option<String>,
-    /// Damper beside the curve. It acts while the curve has contact, also on a stretch without
-    /// force, but not where memory has left a gap; then it only pushes. With a tension curve it
-    /// acts along both and may pull.
+    /// Damper in parallel with the curve. It acts while the curve has contact, also on a stretch
+    /// without force, but not where memory has left a gap; then it only pushes. With a tension
+    /// curve it acts along both and may pull.
     pub damping: Option<DampingTable>,
     /// Force law.
     #[serde(default)]

@@ -1,5 +1,7 @@
 //! Resampling of histories.
 
+use crate::piecewise;
+
 /// Why a history has no value at a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]
@@ -38,8 +40,7 @@ pub(crate) fn interpolate(
             if at_s.len() == 1 {
                 return Ok(values[0]);
             }
-            let share = (time_s - at_s[i]) / (at_s[i + 1] - at_s[i]);
-            Ok(values[i] + share * (values[i + 1] - values[i]))
+            Ok(piecewise::by_share(at_s, values, i, time_s))
         })
         .collect()
 }

@@ -31,7 +31,7 @@ pub(crate) fn resolve(
             );
             problems.push(Problem::at(ProblemCode::TimeGoesBack, place(i), message));
         } else if goes_back || again {
-            // Where time goes back, a restart may count its cycles anew.
+            // Where time goes back, a restart may count its cycles from 0.
             let stays = |k: usize| {
                 let is_other = || again && is_same(k, i) == Some(false);
                 time[k] < time[i] || time[k] == time[i] && is_other()

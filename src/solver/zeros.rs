@@ -1,7 +1,7 @@
 //! Zeros that look like an overwritten part of a binary file, which has no check sums.
 //!
 //! One value, or all of one entity's, may be zero in one state by physics: a node stands on
-//! a wall, a contact is lost. So only several values beside each other are named.
+//! a wall, a contact is lost. So only several values next to each other are named.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ const MAY_VANISH: [&str; 12] = [
     "swforc",
 ];
 
-/// Entities beside each other that lose one component in one state before that is named.
+/// Entities next to each other that lose one component in one state before that is named.
 const ENTITIES: usize = 3;
 
 /// Whether all components of an entity are needed to tell damage from a quantity that is
@@ -89,7 +89,7 @@ fn runs_of_zeros(section: &str, histories: &[History]) -> Vec<Run> {
     found
 }
 
-/// Entities beside each other whose component vanishes in one state.
+/// Entities next to each other whose component vanishes in one state.
 #[derive(Clone, Copy)]
 struct Run {
     state: usize,
@@ -141,7 +141,7 @@ fn vanishing(values: &[f64]) -> impl Iterator<Item = usize> {
 }
 
 /// Whether a value is behind a state about what it was before: of the same sign and at most
-/// twice as large. At the last state nobody knows.
+/// twice as large. At the last state this cannot be told.
 fn returns(values: &[f64], state: usize) -> bool {
     let (before, behind) = (values[state - 1], values.get(state + 1).copied());
     behind.is_none_or(|behind| (0.5..=2.0).contains(&(behind / before)))

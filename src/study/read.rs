@@ -20,7 +20,7 @@ pub(super) struct RunFiles<'a> {
     recipe: &'a Recipe,
     pub motion: ReadFile<'a>,
     pub force: ReadFile<'a>,
-    /// The contact force beside a body force.
+    /// The contact force where the force is a body force.
     pub contact: Option<ReadFile<'a>>,
 }
 

@@ -23,7 +23,7 @@ pub struct ModelEntry {
     pub complexity: u8,
     /// Whether a chosen model must be at least as good as this one.
     pub baseline: bool,
-    /// Whether it sees parameters beside the speed.
+    /// Whether it sees parameters besides the speed.
     pub sees_features: bool,
     /// Fewest training curves that it answers from.
     pub least_curves: usize,

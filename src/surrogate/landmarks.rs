@@ -2,6 +2,7 @@
 
 use super::CaseCurve;
 use super::curves::least_squares;
+use crate::piecewise;
 use crate::signal::peaks::{PROMINENCE, peaks};
 
 /// Landmarks of neighbouring cases match if they lie no further apart than this share of
@@ -198,31 +199,34 @@ impl Landmarks {
 /// beyond its last landmark.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Warp {
-    knots: Vec<(f64, f64)>,
+    from_m: Vec<f64>,
+    to_m: Vec<f64>,
 }
 
 impl Warp {
     /// From pairs of landmarks `(from, to)` in m, in order of `from`. A pair that would
     /// stretch or squeeze its neighbourhood by more than a factor of four is left out.
     pub(crate) fn new(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let mut knots = vec![(0.0, 0.0)];
+        let (mut from_m, mut to_m) = (vec![0.0], vec![0.0]);
+        let mut last = (0.0, 0.0);
         for (from, to) in pairs {
-            let (f0, t0) = knots[knots.len() - 1];
-            let slope = (to - t0) / (from - f0);
-            if from > f0 && (SLOPES.0..=SLOPES.1).contains(&slope) {
-                knots.push((from, to));
+            let slope = (to - last.1) / (from - last.0);
+            if from > last.0 && (SLOPES.0..=SLOPES.1).contains(&slope) {
+                from_m.push(from);
+                to_m.push(to);
+                last = (from, to);
             }
         }
-        Self { knots }
+        Self { from_m, to_m }
     }
 
     pub(crate) fn at(&self, d: f64) -> f64 {
-        let i = self.knots.partition_point(|k| k.0 <= d).max(1) - 1;
-        let (f0, t0) = self.knots[i];
-        match self.knots.get(i + 1) {
-            Some(&(f1, t1)) => t0 + (d - f0) * (t1 - t0) / (f1 - f0),
-            None => t0 + (d - f0),
+        let (from, to) = (&self.from_m, &self.to_m);
+        let last = from.len() - 1;
+        if last == 0 || d >= from[last] {
+            return to[last] + (d - from[last]);
         }
+        piecewise::by_product(from, to, piecewise::segment(from, d), d)
     }
 }
 

@@ -39,7 +39,7 @@ pub struct Model {
     pub other_mass_kg: Option<f64>,
     /// Units of the solver's files that the training cases come from, for exports.
     pub study_units: Option<UnitSystem>,
-    /// Parameters beside speed that queries must give.
+    /// Parameters besides speed that queries must give.
     pub features: Vec<Feature>,
     /// Hash over the fingerprints of the training cases.
     pub training_hash: String,

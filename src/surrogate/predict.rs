@@ -28,7 +28,7 @@ pub use super::predict_error::PredictError;
 pub use super::predicted::{ForestQuantiles, PredictedCurve, Provenance, Rebound};
 pub use super::query::Query;
 
-/// Points of a predicted curve beside (0, 0), as in the reference data.
+/// Points of a predicted curve besides (0, 0), as in the reference data.
 const POINTS: usize = 400;
 /// The body's motion is followed to this share of the longest training curve.
 const REACH: f64 = 1.5;

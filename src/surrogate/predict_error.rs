@@ -37,7 +37,7 @@ pub enum PredictError {
     },
     /// The energy correction would change the force too much to be one of scale.
     #[error(
-        "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: not the scale is wrong; look at mass, speed and the rule for the maximal crush",
+        "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: the scale is not what is wrong; look at mass, speed and the rule for the maximal crush",
         low = CORRECTION.0, high = CORRECTION.1
     )]
     Correction {

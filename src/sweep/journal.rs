@@ -20,7 +20,7 @@ use crate::file::{WriteError, WriterLock};
 pub struct WriteOptions {
     /// Which items are run.
     pub shard: Shard,
-    /// Begin anew, whatever stands at the output or is left of an earlier run.
+    /// Start from the beginning, whatever stands at the output or is left of an earlier run.
     pub restart: bool,
     /// How many items are run before their rows are written.
     pub chunk: Chunk,
@@ -42,7 +42,7 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 /// `.hdf5`, else CSV.
 ///
 /// Rows go to `OUTPUT.part` first. If that is there from an earlier run of the same sweep, its
-/// whole rows are kept and the run goes on behind them; if `output` itself is there and is this
+/// whole rows are kept and the run goes on after them; if `output` itself is there and is this
 /// sweep's, nothing is run. `progress` is told the number of rows there are, before the first
 /// run and after each chunk, and may break: then `OUTPUT.part` stays for the next time.
 ///

@@ -3,7 +3,7 @@
 //! Item `k` has the same row whatever the threads, the pieces or the share of the work
 //! (`shard`) it is run in. Rows stand in order of items and are written as they come, so
 //! nothing grows with their number. The file under work is its own journal: a run that was
-//! stopped goes on behind its last whole row.
+//! stopped goes on after its last whole row.
 //!
 //! Item k is a function of plan and k alone: grids by division, draws by a stream keyed by seed, variable and item, the strata
 //! of a Latin hypercube by a permutation that is computed (a Feistel network) and never held. So threads, pieces and shards
@@ -92,7 +92,7 @@ pub enum SweepError {
     /// The scenario is wrong, or a file it names.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// Nobody says what is varied.
+    /// Neither scenario nor plan say what is varied.
     #[error("{path}: there is no [sweep]: add one, or give it in another file with --plan")]
     NoPlan {
         /// The scenario, or the file of `--plan`.
@@ -131,7 +131,7 @@ pub enum SweepError {
         /// What is not the same.
         differs: Difference,
     },
-    /// What is there is of nobody we know.
+    /// A file is there that this program has not written.
     #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
     Foreign {
         /// The file.

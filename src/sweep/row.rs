@@ -181,8 +181,8 @@ impl Head {
         )
     }
 
-    /// Reads a head; gives it back with its length in bytes. `None` if it is none of ours, or
-    /// not whole.
+    /// Reads a head; gives it back with its length in bytes. `None` if this program has not
+    /// written it, or not to its end.
     pub(crate) fn read(input: &mut impl std::io::BufRead) -> std::io::Result<Option<(Self, u64)>> {
         let mut text = String::new();
         let mut input = std::io::Read::take(input, MAX_HEAD_BYTES as u64);

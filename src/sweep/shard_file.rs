@@ -14,7 +14,7 @@ pub(super) struct ShardFile {
 }
 
 impl ShardFile {
-    /// Reads the head of a file; `None` if it is none of ours.
+    /// Reads the head of a file; `None` if this program has not written it.
     pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, SweepError> {
         let io = |source| SweepError::Read { path: path.into(), source };
         let mut reader = BufReader::new(file::open(path).map_err(io)?);

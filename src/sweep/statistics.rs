@@ -68,7 +68,7 @@ impl Statistics {
         Self { columns: columns.iter().map(column).collect(), threshold }
     }
 
-    /// Takes the numbers of a row, in order of the columns; NaN is none.
+    /// Takes the numbers of a row, in order of the columns; NaN is left out.
     pub(crate) fn see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
         let sampled = mix(item) <= self.threshold;
         for (column, value) in self.columns.iter_mut().zip(values) {

@@ -203,7 +203,7 @@ impl FinishedTable {
     /// Opens a finished file.
     ///
     /// # Errors
-    /// [`SweepError::Table`] if it is no HDF5 file, or no sweep's.
+    /// [`SweepError::Table`] if it is no HDF5 file, or not the result of a sweep.
     fn open(path: &Path) -> Result<Self, SweepError> {
         let table = Table::open(path, FORMAT)?;
         let head = head(&table)?

@@ -77,7 +77,7 @@ pub enum VariableError {
     /// A speed without its train.
     #[error("name the train: train = \"…\"")]
     NoTrain,
-    /// A curve is varied, and nobody says which.
+    /// A curve is varied, and its name is missing.
     #[error("name the curve: curve = \"…\"")]
     NoCurve,
     /// A mass without its vehicle.

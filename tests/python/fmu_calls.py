@@ -93,6 +93,24 @@ def wrong_order(fmu, kind):
             check("no states are fine", s.i.getContinuousStates(x, 0) in (None, 0))
 
 
+def without_arguments(fmu):
+    """No instance, and no arrays: errors, and no crash."""
+    prefix = f"fmi{fmu.version}"
+    real = "Real" if fmu.version == 2 else "Float64"
+    more = [] if fmu.version == 2 else [1]
+    with Spring(fmu, "cs") as s:
+        for call in [f"Get{real}", f"Set{real}"]:
+            refuses(s, f"{call} without arrays",
+                    lambda: s.i._call(prefix + call, s.i.component, None, 1, None, *more))
+        for call in ["Terminate", "Reset", "EnterInitializationMode", "ExitInitializationMode"]:
+            more = [False, 0.0, 0.0, False, 0.0] if call.startswith("Enter") and fmu.version == 3 else []
+            try:
+                s.i._call(prefix + call, None, *more)
+                check(f"{call} without an instance", False)
+            except FMICallException:
+                check(f"{call} without an instance", True)
+
+
 def instances(fmu, other):
     for token in ["{0}", ""]:
         try:
@@ -242,6 +260,7 @@ def main(path, other_path):
             input_derivatives(fmu)
         else:
             events(fmu)
+        without_arguments(fmu)
         instances(fmu, other)
     print(json.dumps({"made": len(made), "failed": failed}))
 

@@ -2,14 +2,15 @@
 
     python fmu_masters.py FMU RUNS.json
 
-RUNS.json holds mass, speed, duration and two runs of crumple at every 0.05 ms: velocity Verlet with
-a step of its own, and the reference. Prints a JSON object with
+RUNS.json holds mass, speed, duration and runs at every 0.05 ms: crumple's velocity Verlet, plain velocity
+Verlet on its law with the same step, and crumple's reference. Prints a JSON object with
 
-- verlet, reference: largest differences of x, v and force from these runs, in shares of their largest
-  values, for co-simulation (cs) and model exchange (me);
-- rk4: restitution over that of the reference, less 1, of Runge-Kutta by model exchange at 0.75 ms;
-- held, extrapolated: crush and restitution over those of the reference, less 1, where the input is that
-  of the step's begin, by step in ms; extrapolated ones come with the derivative of the input (FMI 2).
+- verlet, plain, reference: largest differences of x, v and force from these runs, in shares of their
+  largest values, for co-simulation (cs) and model exchange (me); those from the reference at 0.01 ms;
+- rk4: of Runge-Kutta by model exchange at 0.75 ms, rebound over that which the law gives from its own
+  crush, less 1; rebound and crush over those of the reference, less 1;
+- held: crush and rebound over those of the reference, less 1, and restitution, of co-simulation whose
+  inputs are those of the step's begin; extrapolated comes with the input's derivative (FMI 2).
 """
 
 import json
@@ -60,20 +61,21 @@ def rk4(spring, asked, step):
     return v
 
 
-def held(spring, asked, step, with_derivative):
-    """A common master: the input of the step's begin, the force of its end. The mass has the force of the
-    last step (Heun within the step where there is a new one): largest x and last v."""
-    mass, x, v, top = asked["mass"], 0.0, asked["speed"], 0.0
-    force = 0.0
+def held(spring, asked, step, order):
+    """Co-simulation with inputs of the step's begin; both sides go exactly along what they are given.
+    Side by side, the mass has the force that is there when the step begins; with the spring first, that of
+    the step's end. Returns the largest x and the last v."""
+    mass, x, v, top, force = asked["mass"], 0.0, asked["speed"], 0.0, 0.0
     for _ in range(round(asked["duration"] / step)):
         spring.set(x)
-        if with_derivative:
+        if order == "extrapolated":
             spring.i.setRealInputDerivatives([spring.vr["deflection"]], [1], [v])
         spring.step(step)
-        # Both go on side by side over the same step: the mass knows the force of its begin.
-        x += step * v - 0.5 * step * step * force / mass
-        v -= step * force / mass
-        force = spring.get("force")
+        new = spring.get("force")
+        pushed = new if order == "spring_first" else force
+        x += step * v - 0.5 * step * step * pushed / mass
+        v -= step * pushed / mass
+        force = new
         top = max(top, x)
     return top, v
 
@@ -89,29 +91,37 @@ def worst(rows, run):
 
 def main(path, runs):
     asked = json.load(open(runs))
-    found = {"verlet": {}, "reference": {}, "held": {}, "extrapolated": {}}
+    found = {"verlet": {}, "plain": {}, "reference": {}, "held": {}}
     with Unpacked(path) as fmu:
         for kind in ["cs", "me"]:
             with Spring(fmu, kind) as spring:
                 every = round(INTERVAL_S / asked["step"])
                 rows = verlet(spring, asked, asked["step"], every)
                 found["verlet"][kind] = worst(rows, asked["verlet"])
+                found["plain"][kind] = worst(rows, asked["plain"])
             with Spring(fmu, kind) as spring:
                 rows = verlet(spring, asked, INTERVAL_S / 5, 5)
                 found["reference"][kind] = worst(rows, asked["reference"])
         with Spring(fmu, "me") as spring:
             v = rk4(spring, asked, 7.5e-4)
-            found["rk4"] = {"restitution": -v / asked["speed"] / asked["restitution"] - 1}
-        for name in ["held"] + ["extrapolated"] * (fmu.version == 2):
+            crush = spring.get("largest_deflection")
+            spring.set(crush)
+            of_law = (2 * spring.get("stored_energy") / asked["mass"]) ** 0.5
+        found["rk4"] = {
+            "of_law": -v / of_law - 1,
+            "of_reference": v / asked["reference"]["v"][-1] - 1,
+            "crush": crush / asked["crush"] - 1,
+        }
+        for order in ["side_by_side", "spring_first"] + ["extrapolated"] * (fmu.version == 2):
             for step in [5e-5, 1e-4, 1e-3]:
                 with Spring(fmu, "cs") as spring:
-                    top, v = held(spring, asked, step, name == "extrapolated")
-                found[name][f"{1e3 * step:g}"] = {
+                    top, v = held(spring, asked, step, order)
+                found["held"][f"{order}, {1e3 * step:g} ms"] = {
                     "crush": top / asked["crush"] - 1,
                     "restitution": -v / asked["speed"],
-                    "restitution_error": -v / asked["speed"] / asked["restitution"] - 1,
+                    "rebound": v / asked["reference"]["v"][-1] - 1,
                 }
-    found["restitution"] = asked["restitution"]
+    found["restitution"] = -asked["reference"]["v"][-1] / asked["speed"]
     found["crush"] = asked["crush"]
     print(json.dumps(found))
 

@@ -19,7 +19,7 @@ pub struct Measured<'a> {
     pub minus_velocity: Option<&'a History>,
     /// The force of the curve.
     pub force: MeasuredForce<'a>,
-    /// Contact force that tells when contact begins, beside a body force.
+    /// Contact force that tells when contact begins, where the force is a body force.
     pub contact: Option<&'a History>,
 }
 

@@ -1,4 +1,4 @@
-//! What is said of a run beside its numbers.
+//! What is said of a run besides its numbers.
 
 /// Choices that were made, and what the user should look at.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -133,7 +133,7 @@ fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
     })
 }
 
-/// The onset of a contact force beside a body force.
+/// The onset of a contact force where the force is a body force.
 fn onset_of(
     contact: &History,
     units: UnitSystem,

@@ -28,6 +28,7 @@ pub struct Spring<'a> {
     pub name: &'a str,
     /// One line for the importer's user.
     pub description: &'a str,
+    /// What it computes.
     pub law: &'a ForceLaw,
     /// What is known of the curve, for documentation/ and extra/.
     pub facts: &'a [(&'static str, String)],
@@ -36,18 +37,41 @@ pub struct Spring<'a> {
 /// Why there is no FMU.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuError {
+    /// The loading branch is longer than the table.
     #[error("an FMU holds at most {room} points of a curve, found {points}")]
-    TooManyPoints { points: usize, room: usize },
+    TooManyPoints {
+        /// Points of the loading branch.
+        points: usize,
+        /// As many as the binary has room for.
+        room: usize,
+    },
+    /// The unloading branch is longer than the table.
     #[error("an FMU holds at most {room} points of an unloading branch, found {points}")]
-    TooManyShapePoints { points: usize, room: usize },
+    TooManyShapePoints {
+        /// Points of the unloading branch.
+        points: usize,
+        /// As many as the binary has room for.
+        room: usize,
+    },
+    /// A number of the law is none.
     #[error("the curve's {what} is no finite number")]
-    NotFinite { what: &'static str },
+    NotFinite {
+        /// Which of its numbers.
+        what: &'static str,
+    },
+    /// A compiled component without its marked block: it was built wrongly.
     #[error("the FMU binary of {platform} has no place for a curve")]
-    NoPlace { platform: &'static str },
+    NoPlace {
+        /// Whose binary it is.
+        platform: &'static str,
+    },
+    /// The archive's format does not allow it.
     #[error("the archive cannot be packed: {0}")]
     Packing(#[from] zip::result::ZipError),
+    /// The archive cannot be written in memory.
     #[error("the archive cannot be packed: {0}")]
     Writing(#[from] std::io::Error),
+    /// JSON cannot hold the facts.
     #[error("the facts of the curve cannot be written: {0}")]
     Facts(#[from] serde_json::Error),
 }

@@ -19,8 +19,8 @@ use motion::{Contact, Motion};
 
 /// A shorter step, in s, says that the force is no function of the state.
 const SHORTEST_S: f64 = 1e-15;
-/// A closing speed as small a share of the fastest body's is none: the deflection then is within
-/// `(1e-8)²` of its top.
+/// A closing speed below this share of the fastest body's counts as zero: the deflection then is
+/// within `(1e-8)²` of its top.
 const TURNED: f64 = 1e-8;
 
 /// Runs the chain and fills in `run`; extremes are those of its steps, contacts those of the
@@ -104,7 +104,7 @@ impl<'a> Reference<'a> {
             let slow = TURNED * self.fastest_m_per_s;
             let turn = if is_exact { self.motion.turn(&self.y, &next, slow) } else { None };
             if let Some(share) = turn {
-                // The secant's step; it is taken anew until it ends at the turn.
+                // The secant's step; it is taken again until it ends at the turn.
                 self.h = share * step;
             } else if is_exact {
                 self.y = next;

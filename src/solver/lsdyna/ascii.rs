@@ -33,7 +33,7 @@ pub(crate) trait Body {
     /// One line below the header, outside a legend, with its line end.
     fn line(&mut self, line: &Line<'_>, states: &mut States<'_>);
 
-    /// A damaged line was left out: what was begun before it cannot go on behind it.
+    /// A damaged line was left out: what was begun before it cannot go on after it.
     fn interrupt(&mut self) {}
 
     /// The file ends within `line`: ends the pending state if the line cannot belong to it.
@@ -161,7 +161,7 @@ impl<'a> Frame<'a> {
                 states.problems.add(ProblemCode::NoVersionLine, place, None, message.into());
             }
         } else if !line.ended && !line.is_blank() {
-            // Nobody knows what is missing from it, not even where all its numbers seem whole.
+            // What is missing from it is not known, not even where all its numbers seem whole.
             if !self.fence.is_open() {
                 body.unfinished(&line, states);
                 if !states.is_pending() {
@@ -262,7 +262,7 @@ fn is_text(line: &Line<'_>, states: &mut States<'_>) -> bool {
     }
     let is_binary = line.is_binary();
     if is_binary {
-        let message = "expected text, found bytes that are none: was the file overwritten?";
+        let message = "expected text, found bytes that are no text: was the file overwritten?";
         states.damage(line, None, message.into());
     }
     !is_binary

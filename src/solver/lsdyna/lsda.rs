@@ -106,7 +106,7 @@ pub(crate) enum Event<'a> {
         name: &'a str,
         payload: Payload,
     },
-    /// A record that makes no sense, at this byte; the walk goes on behind it, or not.
+    /// A record that makes no sense, at this byte; the walk goes on after it, or not.
     Damage {
         at: u64,
         resumed: Option<u64>,

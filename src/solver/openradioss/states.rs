@@ -20,7 +20,7 @@ struct Channel {
     values: Vec<f64>,
 }
 
-/// Values beside each other that a node loses for one state when it stands on a wall: its
+/// Values next to each other that a node loses for one state when it stands on a wall: its
 /// velocity and its acceleration.
 const STANDING: usize = 6;
 
@@ -161,7 +161,7 @@ impl States {
         self.problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
     }
 
-    /// Names the last state above if more values beside each other are zero, though not in the
+    /// Names the last state above if more values next to each other are zero, though not in the
     /// states around it, than a node that stands on a wall has: T01 has no check sums.
     fn look_for_zeros(
         &mut self,

@@ -19,7 +19,7 @@ use crate::history::EntityId;
 pub(crate) use finish::Collected;
 use table::Table;
 
-/// Values that states may lack, beyond so many times the values they have: more are no
+/// Values that states may lack, beyond a multiple of the values they have: more are no
 /// erosion but damage, and would fill the memory.
 pub(crate) const ABSENT_CELLS: usize = 10_000_000;
 pub(crate) const ABSENT_PER_PRESENT: usize = 20;

@@ -39,6 +39,10 @@ static int multiply(spring_t *spring, const char *function, const uint32_t *unkn
     if (said != SAID_OK) {
         return said;
     }
+    if (unknowns > 0 && knowns > 0 &&
+        (unknown == NULL || known == NULL || seed == NULL || result == NULL)) {
+        return spring_say(spring, SAID_ERROR, function, "an array is missing");
+    }
     for (i = 0; i < (is_backward ? knowns : unknowns); i++) {
         result[i] = 0.0;
     }

@@ -6,6 +6,7 @@
     (MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_STEP | MODE_TERMINATED)
 /* Times of a step may differ by this share of it: importers add steps up. */
 #define STEP_SHARE 1e-3
+#define NO_ARRAY "an array is missing"
 
 static int is_finite(double x) {
     return x - x == 0.0;
@@ -46,6 +47,9 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
     int said = spring_in(spring, function, MODE_INSTANTIATED | MODES_TO_GET);
     if (said != SAID_OK || n == 0) {
         return said;
+    }
+    if (vr == NULL || values == NULL) {
+        return spring_say(spring, SAID_ERROR, function, NO_ARRAY);
     }
     now = &spring->now;
     law_energies(&crumple_table, now->input[0], largest_with(now), &stored, &dissipated);
@@ -91,6 +95,9 @@ int spring_set(spring_t *spring, const char *function, const uint32_t *vr, size_
     if (said != SAID_OK) {
         return said;
     }
+    if (n > 0 && (vr == NULL || values == NULL)) {
+        return spring_say(spring, SAID_ERROR, function, NO_ARRAY);
+    }
     /* All or none, so that a refused call changes nothing. */
     for (i = 0; i < n; i++) {
         const char *reason = reason_against_value(spring, vr[i], values[i]);
@@ -114,6 +121,9 @@ int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr,
     int said = spring_in(spring, function, MODE_INITIALIZATION | MODE_STEP);
     if (said != SAID_OK) {
         return said;
+    }
+    if (n > 0 && (vr == NULL || order == NULL || values == NULL)) {
+        return spring_say(spring, SAID_ERROR, function, NO_ARRAY);
     }
     for (i = 0; i < n; i++) {
         if (vr[i] != VR_DEFLECTION) {

@@ -54,7 +54,7 @@ pub(crate) fn read(
     }
     let wanted = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
     let bytes = Bytes::new(parts, &tree.headers);
-    // Damaged records concern all sections: nobody knows what they held.
+    // Damaged records concern all sections: what they held is not known.
     let common = std::mem::take(&mut tree.problems).into_list();
     let mut files = Vec::new();
     for section in tree.sections.iter().filter(|s| wanted(&s.name)) {

@@ -20,7 +20,7 @@ pub(super) fn on_card(card: &Card<'_>) -> String {
     [field(0, "m"), field(1, "sec"), field(2, "kg")].join(" ")
 }
 
-/// The system that a text names, whatever other units it names beside.
+/// The system that a text names, whatever other units it names.
 pub(super) fn system(text: &str) -> Option<UnitSystem> {
     let separators = [' ', '/', ',', ';', '(', ')', '\t'];
     // `kN-mm` is an energy but `mm-t-s` is a system: hyphens part the second only.

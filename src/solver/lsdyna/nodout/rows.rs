@@ -63,7 +63,7 @@ impl Wanted {
         self.start..self.start + self.values()
     }
 
-    /// Whether so many pages of the block are wanted that it is read as a whole.
+    /// Whether enough pages of the block are wanted to read it as a whole.
     pub(crate) fn reads_most(&self, block: &Block) -> bool {
         let pages = self.rows.len() * (PAGE + block.width);
         !self.columns.is_empty() && 2 * pages > block.rows * block.width

@@ -9,7 +9,7 @@
 //! The layout is learned from a state that was read by lines. Of each further state this module verifies the state
 //! line, the column lines, the blank lines, and the ids of the first and last row (of all rows where all are read);
 //! then it takes the wanted rows. Batches of states are parsed in parallel and handed on in order. At the first
-//! surprise the line reader takes that state, and leaping goes on behind it. `tests/stride.rs` holds both ways against
+//! surprise the line reader takes that state, and leaping goes on after it. `tests/stride.rs` holds both ways against
 //! each other, on whole and on damaged files.
 
 use std::io;
