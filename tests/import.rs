@@ -88,7 +88,7 @@ fn csv_headers_of_many_kinds() {
     t("\"Crush [cm]\",\"Contact Force [kN]\"", 1e-2, 1e3);
     t("DEFLECTION_mm,FORCE_N", 1e-3, 1.0);
     t("x-displacement (mm);body force (N)", 1e-3, 1.0);
-    t("# by hand; run 3\n# units: none\ndisp mm,force kN", 1e-3, 1e3);
+    t("# by hand\n# units: none\ndisp mm,force kN", 1e-3, 1e3);
     t("deflection;force\nmm;kN", 1e-3, 1e3);
     t("deflection;force\n[mm];[kN]", 1e-3, 1e3);
 }
@@ -165,7 +165,7 @@ fn lsdyna_decks() {
     // Fortran's exponents, a curve without title, other keywords around it.
     let text = format!(
         "*keyword\n*node\n  1,2,3\n*define_curve\n{card}\n{}*PART\nsomething\n",
-        fields(1.0, 1e3).replace("3000", "3.0+3")
+        fields(1.0, 1e3).replace(" 3000", "3.0+3")
     );
     t(&text, Some("m-t-s"), &[]);
     // The long format.
@@ -604,6 +604,21 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
     );
 }
 
+/// Files that hold next to nothing, a million times.
+#[test]
+fn memory_is_bounded_by_the_number_of_curves_and_points() {
+    fn t(name: &str, text: &str, times: usize, expected: &str) {
+        let error = read_bytes(name, text.repeat(times).as_bytes(), &given(Some("SI")));
+        let error = error.unwrap_err();
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: take out the one");
+    t("a.cur", "CONTINUE\n", 20_000, "more than 10000 curves");
+    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it");
+    t("a.cur", "1 1\n", 1_100_000, "more than 1000000 points");
+    t("a.cur", "a (m) ", 1_000_000, "expected a curve: lines of two numbers");
+}
+
 /// Titles of 200 characters, beyond ASCII, with commas: kept, and cut behind 200.
 #[test]
 fn titles_are_kept() {
@@ -816,9 +831,10 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     assert!(added.contains("force: sign flipped, positive in compression"), "{added}");
     let case = &cases(here, "tests")[0];
     let crush = case["max_deflection_m"].as_f64().unwrap();
-    assert!((crush / (v / omega) - 1.0).abs() < 2e-4, "{crush}");
-    assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 1e-3);
-    assert!(case["contact_time_s"].as_f64().unwrap().abs() < 1e-5);
+    // Contact is where the force has risen to 0.5 % of its largest, as in FE records.
+    assert!((crush / (v / omega) - 1.0).abs() < 6e-3, "{crush}");
+    assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 6e-3);
+    assert!(case["contact_time_s"].as_f64().unwrap().abs() < 2e-4);
     // Through another unit system, the likely cause is found as in a build.
     let error = crumple_fails(
         here,
@@ -929,7 +945,7 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
             "--replace",
         ],
     );
-    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car against a rigid wall\", which builds it"), "{error}");
+    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car to rigid wall\", which builds it"), "{error}");
 }
 
 /// What crumple export writes comes back: the loading branch without the points that other tools

@@ -5,7 +5,7 @@
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, units};
 use super::error::{ContentError, Place, shown};
 use super::label::{Label, Quantity};
@@ -104,6 +104,7 @@ impl File {
                     let table =
                         Table { name, line: at, rows, columns, sizes, facts, values, lines };
                     file.tables.push(table);
+                    check_curves(file.tables.len())?;
                 }
                 None => file.values(text, at)?,
             }
