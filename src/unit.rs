@@ -152,7 +152,7 @@ pub const TIME: Dimension = Dimension {
     example_unit: "ms",
     units: &[("us", 1e-6), ("ms", 1e-3), ("s", 1.0)],
 };
-/// Stiffnesses in N/m: N/m, kN/m, MN/m, GN/m, N/mm, kN/mm.
+/// Stiffnesses, in N/m inside.
 pub const STIFFNESS: Dimension = Dimension {
     what: "stiffness",
     example_unit: "MN/m",

@@ -88,7 +88,7 @@ fn csv_headers_of_many_kinds() {
     t("\"Crush [cm]\",\"Contact Force [kN]\"", 1e-2, 1e3);
     t("DEFLECTION_mm,FORCE_N", 1e-3, 1.0);
     t("x-displacement (mm);body force (N)", 1e-3, 1.0);
-    t("# by hand; run 3\n# units: none\ndisp mm,force kN", 1e-3, 1e3);
+    t("# by hand\n# units: none\ndisp mm,force kN", 1e-3, 1e3);
     t("deflection;force\nmm;kN", 1e-3, 1e3);
     t("deflection;force\n[mm];[kN]", 1e-3, 1e3);
 }
@@ -165,7 +165,7 @@ fn lsdyna_decks() {
     // Fortran's exponents, a curve without title, other keywords around it.
     let text = format!(
         "*keyword\n*node\n  1,2,3\n*define_curve\n{card}\n{}*PART\nsomething\n",
-        fields(1.0, 1e3).replace("3000", "3.0+3")
+        fields(1.0, 1e3).replace(" 3000", "3.0+3")
     );
     t(&text, Some("m-t-s"), &[]);
     // The long format.
@@ -604,6 +604,21 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
     );
 }
 
+/// Files that hold next to nothing, a million times.
+#[test]
+fn memory_is_bounded_by_the_number_of_curves_and_points() {
+    fn t(name: &str, text: &str, times: usize, expected: &str) {
+        let error = read_bytes(name, text.repeat(times).as_bytes(), &given(Some("SI")));
+        let error = error.unwrap_err();
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: take out the one");
+    t("a.cur", "CONTINUE\n", 20_000, "more than 10000 curves");
+    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it");
+    t("a.cur", "1 1\n", 1_100_000, "more than 1000000 points");
+    t("a.cur", "a (m) ", 1_000_000, "expected a curve: lines of two numbers");
+}
+
 /// Titles of 200 characters, beyond ASCII, with commas: kept, and cut behind 200.
 #[test]
 fn titles_are_kept() {
@@ -816,9 +831,10 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     assert!(added.contains("force: sign flipped, positive in compression"), "{added}");
     let case = &cases(here, "tests")[0];
     let crush = case["max_deflection_m"].as_f64().unwrap();
-    assert!((crush / (v / omega) - 1.0).abs() < 2e-4, "{crush}");
-    assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 1e-3);
-    assert!(case["contact_time_s"].as_f64().unwrap().abs() < 1e-5);
+    // Contact is where the force has risen to 0.5 % of its largest, as in FE records.
+    assert!((crush / (v / omega) - 1.0).abs() < 6e-3, "{crush}");
+    assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 6e-3);
+    assert!(case["contact_time_s"].as_f64().unwrap().abs() < 2e-4);
     // Through another unit system, the likely cause is found as in a build.
     let error = crumple_fails(
         here,
@@ -929,7 +945,74 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
             "--replace",
         ],
     );
-    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car against a rigid wall\", which builds it"), "{error}");
+    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car to rigid wall\", which builds it"), "{error}");
+}
+
+/// What crumple export writes comes back: the loading branch without the points that other tools
+/// need, with what the header says of it.
+#[test]
+fn exported_curves_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let group = ["--group", "lead-car-wall"];
+    crumple_ok(
+        here,
+        &[&["train", "curves.h5", "--model", "linear", "-o", "a.model"], &group[..]].concat(),
+    );
+    let files = ["a.json", "a.csv", "a.k", "a.txt", "a.mat"];
+    let outputs = files.iter().flat_map(|file| ["-o", file]);
+    let predict = ["predict", "a.model", "--speed", "50km/h"].into_iter().chain(outputs);
+    crumple_ok(here, &predict.collect::<Vec<_>>());
+    let body = ReadOptions { force: Some(crumple::curve::ForceKind::Body), ..given(None) };
+    let (expected, _) = read(&here.join("a.json"), &body).unwrap();
+    for file in &files[1..] {
+        let (curve, reader) = read(&here.join(file), &given(None)).unwrap();
+        assert_eq!(
+            curve.deflection_m.len(),
+            expected.deflection_m.len(),
+            "{file}: {:?}",
+            curve.notes
+        );
+        let close =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-8 * b.abs());
+        assert!(close(&curve.deflection_m, &expected.deflection_m), "{file}");
+        assert!(close(&curve.force_n, &expected.force_n), "{file}");
+        let (facts, expected) = (curve.facts, expected.facts);
+        assert_eq!(facts.force, expected.force, "{file}: {}", reader.name);
+        assert_eq!(facts.speed_kind, expected.speed_kind);
+        assert_eq!(facts.mass_kg, expected.mass_kg);
+        assert_eq!(facts.speed_m_per_s, expected.speed_m_per_s);
+        let stiffness = facts.unloading_stiffness_n_per_m.unwrap();
+        assert!((stiffness / expected.unloading_stiffness_n_per_m.unwrap() - 1.0).abs() < 1e-8);
+        assert!(
+            curve.notes.iter().any(|n| n.contains("beyond the maximal crush of")),
+            "{file}: {:?}",
+            curve.notes
+        );
+    }
+    // The same case by each way.
+    let files = ["a.csv", "a.k", "a.txt", "a.mat"];
+    let names = ["--case", "csv", "--case", "k", "--case", "txt", "--case", "mat"];
+    crumple_ok(here, &[&["db", "add", "c.h5", "--group", "all"], &files[..], &names].concat());
+    let crushes: Vec<f64> =
+        cases(here, "all").iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).collect();
+    assert!(crushes.iter().all(|c| (c / crushes[0] - 1.0).abs() < 1e-8), "{crushes:?}");
+    // Histories of a recorded case.
+    let export = ["export", "curves.h5", "--case", "36kmh", "--to", "iso-mme", "-o", "test"];
+    crumple_ok(here, &[&export[..], &group].concat());
+    crumple_ok(here, &["db", "add", "c.h5", "test", "--group", "mme", "--kind", "wall"]);
+    let recorded = &cases(here, "mme")[0];
+    let shown = crumple_ok(
+        here,
+        &[&["db", "show", "curves.h5", "--case", "36kmh", "--json"], &group[..]].concat(),
+    );
+    let shown: Value = serde_json::from_str(&shown).unwrap();
+    let first = &shown["groups"]["lead-car-wall"][0];
+    for key in ["max_deflection_m", "work_J", "speed_m_per_s", "mass_kg"] {
+        let (a, b) = (recorded[key].as_f64().unwrap(), first[key].as_f64().unwrap());
+        assert!((a / b - 1.0).abs() < 2e-3, "{key}: {a} and {b}");
+    }
 }
 
 #[test]
@@ -1024,7 +1107,7 @@ proptest! {
             masses: crumple::curve::Masses { body_kg: 24e3, other_kg: None },
             unloading_stiffness_n_per_m: unloading,
             body_unloading_stiffness_n_per_m: None,
-            units: UnitSystem::SI,
+            units: UnitSystem::parse("SI").unwrap(),
             accept_energy: true,
         };
         if let Ok(case) = from_table(&table, &impact) {

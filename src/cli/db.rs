@@ -72,7 +72,7 @@ enum Command {
     #[command(after_help = "Examples:
   crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t
   crumple db add curves.h5 25.json 36.json 50.json --group legacy
-  crumple db add curves.h5 a.k b.k --group pairs --speed 36km/h --speed 54km/h --kind closing --mass 24t --units mm-t-s
+  crumple db add curves.h5 a.k b.k --group pairs --speed 36km/h,54km/h --kind closing --mass 24t --units mm-t-s
   crumple db add curves.h5 T123.mme --group tests --speed 36km/h --mass 24t
   crumple db add --list
 Headers of columns name quantity and unit: d_mm, displacement [mm], F_kN, Force [N], time (ms).")]

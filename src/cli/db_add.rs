@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::arguments::{mass, one_of, parameter, speed};
 use super::db::CaseRow;
+use super::export::{FORCES, units};
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
@@ -28,23 +29,24 @@ pub struct Args {
     /// Group of the database
     #[arg(long, required_unless_present = "list")]
     group: Option<String>,
-    /// Impact speed, once for each file in their order [default: what the file says]
-    #[arg(long, value_parser = speed)]
+    /// Impact speed, one for each file in their order; repeated or after commas [default: what the
+    /// file says]
+    #[arg(long, value_parser = speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
     /// What the speed is measured against [default: what the file says, else the group's]
     #[arg(long, value_parser = one_of(KINDS))]
     kind: Option<SpeedKind>,
     /// Mass of the body [default: what the file says]
-    #[arg(long, value_parser = mass)]
+    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Mass of the other body of a pair [default: what the file says, else that of the body]
-    #[arg(long, value_parser = mass)]
+    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     other_mass: Option<f64>,
     /// Which force the curves are [default: what the file says, else contact]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
-    #[arg(long, value_parser = stiffness)]
+    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
     unloading: Option<f64>,
     /// Units of values that do not say their own, such as mm-t-s or SI
     #[arg(long, value_parser = units)]
@@ -73,15 +75,6 @@ const KINDS: &[(&str, SpeedKind, &str)] = &[
     ("wall", SpeedKind::Wall, "Of one body against a rigid wall"),
     ("closing", SpeedKind::Closing, "Of two bodies against each other"),
 ];
-
-const FORCES: &[(&str, ForceKind, &str)] = &[
-    ("contact", ForceKind::Contact, "What the obstacle feels"),
-    ("body", ForceKind::Body, "The force that moves a body of one mass"),
-];
-
-fn units(text: &str) -> Result<UnitSystem, String> {
-    UnitSystem::parse(text).map_err(|e| e.to_string())
-}
 
 fn stiffness(text: &str) -> Result<f64, String> {
     STIFFNESS.parse_positive(text).map_err(|e| e.to_string())

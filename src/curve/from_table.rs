@@ -119,6 +119,16 @@ impl From<ExtractError> for FromTableError {
 /// # Errors
 /// [`FromTableError`] says what cannot be, and what to change.
 pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableError> {
+    // As many of everything as there are deflections, so that no index is out of bounds.
+    let deflection = table.deflection_m.len();
+    let (force, time) = (table.force_n.len(), table.time_s.map_or(deflection, <[f64]>::len));
+    let body = table.body_force_n.map_or(force, <[f64]>::len);
+    if force != deflection || time != deflection || body != force {
+        return Err(CurveError::Lengths { time, deflection, force: force.min(body) }.into());
+    }
+    if deflection < 2 {
+        return Err(CurveError::TooShort { states: deflection }.into());
+    }
     match table.time_s {
         Some(time_s) => recorded(table, time_s, impact),
         None => retraced(table, impact),

@@ -16,10 +16,10 @@ pub(super) fn of(
     settings: &Settings,
     group: Option<&Case>,
 ) -> Result<Case, ImportError> {
-    let name = case_name(item)?;
     check_name(item, "group", &settings.group)?;
-    check_name(item, "case", &name)?;
     let (curve, reader) = read::read(&item.path, &settings.read)?;
+    let name = case_name(item)?;
+    check_name(item, "case", &name)?;
     let said = Said::of(item, settings, &curve, group)?;
     let stiffness = settings.unloading_stiffness_n_per_m;
     let impact = Impact {

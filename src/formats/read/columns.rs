@@ -9,6 +9,17 @@ use crate::unit::UnitSystem;
 /// Most points of a curve: guards memory. Test records have some ten thousand.
 pub(super) const MAX_POINTS: usize = 1_000_000;
 
+/// Most curves of a file: guards memory, which a curve takes even without points.
+pub(super) const MAX_CURVES: usize = 10_000;
+
+/// Refuses one curve more than a file may have.
+pub(super) fn check_curves(curves: usize) -> Result<(), ContentError> {
+    match curves > MAX_CURVES {
+        true => Err(ContentError::TooManyCurves { most: MAX_CURVES }),
+        false => Ok(()),
+    }
+}
+
 /// Deflections and forces below this share of the largest are zero.
 const NOTHING: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.

@@ -30,8 +30,12 @@ pub fn driving(path: &Path) -> Result<DrivingCurve, ReadCurveError> {
     read().map_err(curve::content(path))
 }
 
-/// Whether the first line that is no comment separates two columns of a curve, or two numbers.
+/// Whether the extension says so, as that of no other tool's files does, or the first line that is
+/// no comment separates two columns of a curve, or two numbers.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
+    if input.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        return true;
+    }
     let Ok(table) = CsvTable::open(input.beginning(), 0) else { return false };
     let row = table.header_row();
     let is_ours = |field| Label::parse(row.field(field)).is_some() || row.number(field).is_ok();

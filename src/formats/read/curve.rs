@@ -177,5 +177,5 @@ pub(super) fn units(
 
 /// An error of content, of the file at `path`.
 pub(super) fn content(path: &Path) -> impl Fn(ContentError) -> ReadCurveError {
-    move |source| ReadCurveError::Content { path: path.into(), source }
+    move |error| ReadCurveError::Content { path: path.into(), source: Box::new(error) }
 }

@@ -45,7 +45,7 @@ pub enum ReadCurveError {
         /// The file.
         path: PathBuf,
         /// What is wrong, with its place.
-        source: ContentError,
+        source: Box<ContentError>,
     },
 }
 
@@ -219,10 +219,14 @@ pub enum ContentError {
         least: usize,
     },
     /// It has too many points.
-    #[error(
-        "the curve has more than {most} points: expected a curve, not a record of one; thin it"
-    )]
+    #[error("the curve has more than {most} points: thin it")]
     TooMany {
+        /// How many there may be.
+        most: usize,
+    },
+    /// It holds too many curves.
+    #[error("the file has more than {most} curves: take out the one that is meant")]
+    TooManyCurves {
         /// How many there may be.
         most: usize,
     },

@@ -6,7 +6,7 @@
 //! of 0 means 1. Lines that begin with `$` are comments, also where a title should stand.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{stated_units, title, units};
 use super::error::{ContentError, Place, shown};
 use super::text::{lines, number};
@@ -110,6 +110,7 @@ impl Deck {
             }
             if line.starts_with('*') {
                 (next, is_long) = deck.keyword(&line);
+                check_curves(deck.curves.len())?;
                 continue;
             }
             next = match next {

@@ -7,7 +7,7 @@
 //! `k_u`, one number, is the unloading stiffness.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::units;
 use super::error::{ContentError, Place, shown};
 use super::modelica::OURS;
@@ -185,6 +185,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, ContentError> {
                 bytes: &bytes[begin..end],
             });
         }
+        check_curves(found.len())?;
         at = end;
     }
     Ok(found)

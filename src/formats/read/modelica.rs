@@ -5,7 +5,7 @@
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, units};
 use super::error::{ContentError, Place, shown};
 use super::label::{Label, Quantity};
@@ -32,7 +32,9 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
             (length, force, None)
         }
         None => {
-            let own = table.name == OURS && file.units.is_none() && input.options.units.is_none();
+            let own = table.name.starts_with(OURS)
+                && file.units.is_none()
+                && input.options.units.is_none();
             let stated = if own { Some((UnitSystem::SI, table.line)) } else { file.units };
             let system = match own {
                 true => {
@@ -50,7 +52,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     Ok(Columns {
         deflection_m: column(0, length),
         force_n: column(1, force),
-        facts: file.facts,
+        facts: table.facts,
         title: Some(table.name.clone()),
         units: system,
         notes,
@@ -66,6 +68,8 @@ struct Table {
     columns: usize,
     /// SI values of the units in its comment: of deflection and force.
     sizes: Option<(f64, f64)>,
+    /// What the comments in front of it say.
+    facts: Facts,
     /// Row by row.
     values: Vec<f64>,
     /// Line of each row's first value.
@@ -96,7 +100,11 @@ impl File {
                     check_size(&name, rows, columns, bytes.len(), at)?;
                     let sizes = sizes(comment);
                     let (values, lines) = (Vec::new(), Vec::new());
-                    file.tables.push(Table { name, line: at, rows, columns, sizes, values, lines });
+                    let facts = file.facts;
+                    let table =
+                        Table { name, line: at, rows, columns, sizes, facts, values, lines };
+                    file.tables.push(table);
+                    check_curves(file.tables.len())?;
                 }
                 None => file.values(text, at)?,
             }
@@ -155,7 +163,9 @@ impl File {
             return Err(ContentError::NoCurve { expected, found });
         }
         let by_name = |name: &str| fitting.iter().find(|t| t.name == name).copied();
-        match (asked, by_name(OURS), &fitting[..]) {
+        // Several of ours are the curves of several speeds.
+        let ours = fitting.iter().filter(|t| t.name.starts_with(OURS)).count();
+        match (asked, by_name(OURS).filter(|_| ours == 1), &fitting[..]) {
             (Some(asked), ..) => by_name(asked)
                 .ok_or_else(|| ContentError::NoSuchCurve { asked: shown(asked), known: known() }),
             (None, Some(ours), _) => Ok(ours),

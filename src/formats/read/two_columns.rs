@@ -6,7 +6,7 @@
 //! separated by blanks, tabs, commas or semicolons; `CONTINUE` ends a curve, and another may follow.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, title};
 use super::error::{ContentError, Place, shown};
 use super::label::{Label, Quantity};
@@ -136,7 +136,7 @@ impl File {
                 file.facts.take(&line[..1], comment, Place::Line(at))?;
                 file.units = file.units.or(stated_units(comment));
                 if let Some(last) = file.curves.last_mut().filter(|c| c.points.is_empty()) {
-                    last.comment = Some((at, comment.into()));
+                    last.comment = Some((at, label(comment)));
                 }
                 continue;
             }
@@ -145,6 +145,7 @@ impl File {
             }
             if line.trim().eq_ignore_ascii_case("CONTINUE") {
                 file.curves.push(Found::default());
+                check_curves(file.curves.len())?;
                 continue;
             }
             if let Some(last) = file.curves.last_mut() {
@@ -194,7 +195,7 @@ impl Found {
             };
         }
         if self.points.is_empty() && self.headers.len() < HEADERS {
-            self.headers.push((at, line.trim().into()));
+            self.headers.push((at, label(line)));
             return Ok(());
         }
         let wrong = words(line).enumerate().find(|(_, word)| number(word).is_none());
@@ -210,6 +211,13 @@ impl Found {
             },
         })
     }
+}
+
+/// Characters of a title or label that are looked at.
+const LABEL: usize = 300;
+
+fn label(line: &str) -> String {
+    line.trim().chars().take(LABEL).collect()
 }
 
 fn words(line: &str) -> impl Iterator<Item = &str> {
