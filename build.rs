@@ -23,7 +23,8 @@ const PLATFORMS: [Platform; 2] = [
     Platform {
         folders: ["win64", "x86_64-windows"],
         extension: "dll",
-        flags: &["-static-libgcc", "-Wl,--no-insert-timestamp"],
+        // Otherwise the address follows from the file's name.
+        flags: &["-static-libgcc", "-Wl,--no-insert-timestamp", "-Wl,--image-base=0x180000000"],
     },
 ];
 

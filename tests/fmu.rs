@@ -118,6 +118,12 @@ fn binaries_lie_where_each_version_looks_for_them() {
             let files = files(fmu("my spring", law, version));
             let path = format!("binaries/{folder}/my_spring.{extension}");
             assert_eq!(files.contains_key(&path), is_there, "{path}");
+            if let (true, Some(library)) = (extension == "so", files.get(&path)) {
+                // Importers on old systems load it too.
+                let text = String::from_utf8_lossy(library);
+                let versions: Vec<&str> = text.split("GLIBC_").skip(1).collect();
+                assert!(!versions.is_empty() && versions.iter().all(|v| v.starts_with("2.2.5\0")));
+            }
             let has_build = files.contains_key("sources/buildDescription.xml");
             assert_eq!(has_build, version == FmiVersion::Fmi3);
         }

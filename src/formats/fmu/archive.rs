@@ -71,7 +71,7 @@ fn documentation(spring: &Spring<'_>) -> String {
     )
 }
 
-/// The facts for programs, in their order.
+/// The facts for programs.
 fn facts(spring: &Spring<'_>) -> Result<String, FmuError> {
     let mut facts = serde_json::Map::new();
     facts.insert("name".into(), spring.name.into());

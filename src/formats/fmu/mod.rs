@@ -154,7 +154,7 @@ fn token(spring: &Spring<'_>, version: FmiVersion, table: &Table) -> String {
 mod tests {
     use super::*;
     use crate::curve::Envelope;
-    use crate::multibody::{EnvelopeEnd, Unloading};
+    use crate::multibody::{EnvelopeEnd, Unloading, UnloadingShape};
 
     fn law(points: usize) -> ForceLaw {
         let d = (0..points).map(|i| i as f64 * 1e-3).collect();
@@ -180,9 +180,20 @@ mod tests {
 
     #[test]
     fn refuses_more_points_than_there_is_room_for() {
-        let law = law(4097);
-        let spring = Spring { name: "a", description: "", law: &law, facts: &[] };
-        let error = archive(&spring, FmiVersion::Fmi3).unwrap_err();
-        assert_eq!(error.to_string(), "an FMU holds at most 4096 points of a curve, found 4097");
+        let refused = |law: &ForceLaw| {
+            let spring = Spring { name: "a", description: "", law, facts: &[] };
+            archive(&spring, FmiVersion::Fmi3).unwrap_err().to_string()
+        };
+        let points = "an FMU holds at most 4096 points of a curve, found 4097";
+        assert_eq!(refused(&law(4097)), points);
+
+        let d: Vec<f64> = (0..1100).map(|i| 1.0 - f64::from(i) * 1e-4).collect();
+        let f: Vec<f64> = (0..1100).map(|i| 1099.0 - f64::from(i)).collect();
+        let shape = UnloadingShape::of_branch(&d, &f).unwrap();
+        let envelope = Envelope::new(vec![0.0, 1.0], vec![0.0, 1e6]).unwrap();
+        let unloading = Unloading::Memory { stiffness_n_per_m: 40e6 };
+        let law = ForceLaw::shaped(envelope, unloading, shape, EnvelopeEnd::Hold);
+        let points = "an FMU holds at most 1024 points of an unloading branch, found 1100";
+        assert_eq!(refused(&law), points);
     }
 }
