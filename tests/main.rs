@@ -11,6 +11,7 @@ mod deck;
 mod documents;
 mod engine;
 mod examples;
+mod exports;
 mod files;
 mod fmu;
 mod forest;

@@ -1,0 +1,454 @@
+//! Exports: the files that other tools take, read or run by these tools or by the closest reader there is.
+//!
+//! CRUMPLE_PYTHON_EXPORTS names a Python with tests/python/requirements-exports.txt, as tests/run sets it; CalculiX
+//! (`ccx`) and Octave (`octave-cli`) are looked for on the path.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::common::{
+    crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, root, run_python,
+};
+use crumple::formats::FORMATS;
+use crumple::formats::read::{self, ReadOptions};
+use crumple::unit::UnitSystem;
+use serde_json::{Value, json};
+
+/// Units in which the exports of this test stand; readers of files without units are told them.
+const UNITS: &str = "mm-t-s";
+/// Exports of one curve, by file.
+const FILES: [(&str, &[&str]); 12] = [
+    ("a.csv", &[]),
+    ("a.k", &[]),
+    ("s06.k", &["--material", "s06"]),
+    ("mat121.k", &["--material", "mat121", "--deck"]),
+    ("deck.k", &["--deck"]),
+    ("a.rad", &["--units", UNITS]),
+    ("a.inp", &[]),
+    ("a.cmd", &[]),
+    ("a.adm", &[]),
+    ("a.spr", &[]),
+    ("a.mat", &[]),
+    ("a.txt", &[]),
+];
+
+fn exports_python(script: &str, arguments: &[&str]) -> Value {
+    run_python(python_of("CRUMPLE_PYTHON_EXPORTS"), script, arguments)
+}
+
+fn export(folder: &Path, input: &str, output: &str, more: &[&str]) {
+    crumple_ok(folder, &[&["export", input, "-q", "-o", output][..], more].concat());
+}
+
+/// A predicted curve with other points: (deflection in m, body force in N).
+fn with_points(folder: &Path, name: &str, points: &[(f64, f64)]) {
+    let text = fs::read_to_string(folder.join("lead50.json")).unwrap();
+    let mut curve: Value = serde_json::from_str(&text).unwrap();
+    let (d, f): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+    curve["max_deflection_m"] = json!(d[d.len() - 1]);
+    curve["deflection_m"] = json!(d);
+    curve["force_N"] = json!(f);
+    curve["body_force_N"] = json!(f);
+    curve.as_object_mut().unwrap().remove("force_low_N");
+    curve.as_object_mut().unwrap().remove("force_high_N");
+    fs::write(folder.join(name), curve.to_string()).unwrap();
+}
+
+/// A spike of 6 MN at 10 mm in front of folds, as nose plates give it.
+fn spike(points: u32) -> Vec<(f64, f64)> {
+    let end = 0.9;
+    let mut curve: Vec<(f64, f64)> = (0..points)
+        .map(|i| {
+            let d = end * f64::from(i) / f64::from(points - 1);
+            (d, if i == 0 { 0.0 } else { 1.5e6 + 3e5 * (40.0 * d).sin() })
+        })
+        .collect();
+    curve.retain(|p| p.0 == 0.0 || p.0 > 0.021);
+    curve.splice(1..1, [(0.01, 6e6), (0.02, 1.5e6)]);
+    curve
+}
+
+/// Force at 200 deflections within the digits of the format, or within 0.2 % of the largest force where a format
+/// takes few points; energy to the maximal crush within 0.1 % as the tool interpolates, also of a sharp spike.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn other_tools_read_the_exported_points() {
+    let folder = demo_folder();
+    let here = folder.path();
+    with_points(here, "spike.json", &spike(401));
+    with_points(here, "few.json", &spike(40));
+    for curve in ["lead50.json", "spike.json", "few.json"] {
+        for (file, more) in FILES {
+            export(here, curve, file, more);
+        }
+        export(here, curve, "a.mo", &[]);
+        let paths: Vec<String> = FILES
+            .iter()
+            .map(|f| f.0)
+            .chain(["a.mo"])
+            .map(|f| here.join(f).display().to_string())
+            .collect();
+        let json = here.join(curve).display().to_string();
+        let arguments: Vec<&str> =
+            [json.as_str()].into_iter().chain(paths.iter().map(String::as_str)).collect();
+        let found = exports_python("exports_points.py", &arguments);
+        let found = found.as_object().unwrap();
+        assert_eq!(found.len(), FILES.len() + 1 + 4 * 2, "three readers of each deck");
+        for (name, seen) in found {
+            let of = |key: &str| seen[key].as_f64().unwrap();
+            let is_thinned = name.starts_with("a.inp") || name.starts_with("a.mo");
+            let bound = if is_thinned { 2e-3 } else { 2e-8 };
+            assert!(of("force") < bound, "{curve} {name}: force off by {}", of("force"));
+            assert!(of("linear").abs() < 1e-3, "{curve} {name}: energy, {seen}");
+            assert!(of("beyond") > 1.5, "{curve} {name} ends at the maximal crush: {seen}");
+            // Tools that interpolate by splines.
+            if ["a.cmd", "a.adm", "a.spr"].iter().any(|f| name.starts_with(f)) {
+                assert!(of("akima").abs() < 1e-3, "{curve} {name}: energy, {seen}");
+                assert!(of("cubic").abs() < 1e-3, "{curve} {name}: energy, {seen}");
+                assert!(of("points") >= 200.0);
+            }
+        }
+    }
+}
+
+/// A scenario of one mass on a curve file at the curve's own speed, and crumple's run of it.
+fn own_run(folder: &Path, curve: &str, law: &str) -> String {
+    let scenario = format!(
+        "[run]\nduration = \"150ms\"\noutput_interval = \"0.75ms\"\n\
+         [curves]\nnose = {{ file = \"{curve}\", force = \"body\", law = \"{law}\" }}\n\
+         [[train]]\nname = \"A\"\nspeed = \"50km/h\"\nvehicles = [ {{ name = \"A1\", mass = \"24.0t\" }} ]\n\
+         [wall]\n[contact]\ncurve = \"nose\"\n"
+    );
+    fs::write(folder.join("one.toml"), scenario).unwrap();
+    crumple_ok(folder, &["simulate", "one.toml", "-q", "-o", "own.csv"]);
+    folder.join("own.csv").display().to_string()
+}
+
+/// CalculiX runs the deck: an elastic spring of 200 rows.
+#[test]
+#[ignore = "needs CalculiX (ccx), scipy in the Python clients"]
+fn calculix_moves_a_mass_as_our_elastic_run() {
+    let found = Command::new("ccx").arg("-v").output();
+    assert!(found.is_ok(), "this test needs CalculiX: ccx is not on the path (calculix-ccx)");
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead50.json", "deck.inp", &["--deck"]);
+    let own = own_run(here, "lead50.json", "elastic");
+    let deck = here.join("deck.inp").display().to_string();
+    let found = exports_python("exports_motion.py", &["calculix", &deck, &own]);
+    assert!(found["x"].as_f64().unwrap() < 1e-4, "{found}");
+    assert!(found["v"].as_f64().unwrap() < 1e-3, "{found}");
+    assert!((found["restitution"].as_f64().unwrap() - 1.0).abs() < 1e-4, "{found}");
+}
+
+/// A Modelica compiler runs the package with its memory.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn rumoca_moves_a_mass_as_our_run() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead50.json", "a.mo", &[]);
+    let own = own_run(here, "lead50.json", "memory");
+    let package = here.join("a.mo").display().to_string();
+    let found = exports_python("exports_motion.py", &["modelica", &package, &own]);
+    assert!(found["x"].as_f64().unwrap() < 1e-5, "{found}");
+    assert!(found["v"].as_f64().unwrap() < 1e-4, "{found}");
+    assert!(found["force"].as_f64().unwrap() < 2e-3, "{found}");
+    let [theirs, ours] = ["restitution", "own_restitution"].map(|k| found[k].as_f64().unwrap());
+    assert!((theirs / ours - 1.0).abs() < 1e-3, "{found}");
+}
+
+/// An oracle of loading and rebound: the curve file's numbers with the unloading line in a tool of its own.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn exudyn_rebounds_as_our_run() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let own = own_run(here, "lead50.json", "memory");
+    let curve = here.join("lead50.json").display().to_string();
+    let found = run_python(python(), "exports_motion.py", &["exudyn", &curve, &own]);
+    for key in ["x", "v"] {
+        assert!(found[key].as_f64().unwrap() < 1e-6, "{found}");
+    }
+}
+
+/// Octave reads the matrices and interpolates them.
+#[test]
+#[ignore = "needs Octave (octave-cli)"]
+fn octave_reads_the_matrices() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead50.json", "a.mat", &[]);
+    let program = "load('a.mat'); x = linspace(0, max_deflection_m, 200); \
+        printf('%.17g ', interp1(fd_load(:,1), fd_load(:,2), x)); \
+        printf('\\n%.17g %.17g %.17g\\n', k_u, fd_unload(2,1), fd_unload(2,2)); disp(facts(1,:))";
+    let output = Command::new("octave-cli").args(["--quiet", "--eval", program]).current_dir(here).output();
+    let output = output.expect("this test needs Octave: octave-cli is not on the path (octave)");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let numbers = |line: &str| -> Vec<f64> {
+        line.split_whitespace().map(|n| n.parse().unwrap()).collect()
+    };
+    let (forces, unloading) = (numbers(lines[0]), numbers(lines[1]));
+    let curve: Value =
+        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
+    let (d, f) = (column("deflection_m"), column("body_force_N"));
+    let envelope = crumple::curve::Envelope::new(d, f).unwrap();
+    assert_eq!(forces.len(), 200);
+    for (i, force) in forces.iter().enumerate() {
+        let expected = envelope.force_at(envelope.end_m() * i as f64 / 199.0);
+        assert!((force - expected).abs() < 1e-6 * envelope.peak_force_n(), "{i}");
+    }
+    assert_eq!(unloading[0], curve["body_unloading_stiffness_N_per_m"].as_f64().unwrap());
+    assert_eq!(unloading[1], envelope.end_m());
+    assert!(lines[2].starts_with("curve: lead-car-wall 50 km/h"));
+}
+
+/// pyisomme reads the channels of a case, and those of a multi-body run.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn pyisomme_reads_the_channels() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let case = ["--group", "lead-car-wall", "--case", "36kmh", "--to", "iso-mme"];
+    export(here, "curves.h5", "case", &case);
+    crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", "run.mme"]);
+    let read = |path: &str| {
+        let path = here.join(path).display().to_string();
+        run_python(python_of("CRUMPLE_PYTHON_ISOMME"), "exports_iso_mme.py", &[&path])
+    };
+    let case = read("case/lead-car-wall-36kmh.mme");
+    let shown = crumple_ok(
+        here,
+        &["db", "show", "curves.h5", "--group", "lead-car-wall", "--case", "36kmh", "--json"],
+    );
+    let shown: Value = serde_json::from_str(&shown).unwrap();
+    let shown = &shown["groups"]["lead-car-wall"][0];
+    for (code, key) in [
+        ("11VEHC000000DSXP", "deflection_m"),
+        ("11VEHC000000VEXP", "closing_speed_m_per_s"),
+        ("11VEHC000000FOXP", "force_N"),
+    ] {
+        same_columns(&case[code], &shown[key]);
+    }
+    let run = read("run.mme/run.mme");
+    let csv = crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", "-"]);
+    let mut lines = csv.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').map(|n| n.parse().unwrap()).collect()).collect();
+    let first = header.iter().position(|h| h.starts_with("v_m_per_s")).unwrap();
+    let speeds: Vec<f64> = rows.iter().map(|row| row[first]).collect();
+    same_columns(&run["11VEHCCG0000VEXP"], &json!(speeds));
+}
+
+fn same_columns(a: &Value, b: &Value) {
+    let values = |v: &Value| -> Vec<f64> { serde_json::from_value(v.clone()).unwrap() };
+    let (a, b) = (values(a), values(b));
+    assert_eq!(a.len(), b.len());
+    let largest = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a - b).abs() <= 1e-8 * largest, "{a} and {b}");
+    }
+}
+
+/// h5py and pandas-like readers get the table over speed and deflection.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn h5py_reads_the_table_of_a_model() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead.model", "table.h5", &["--to", "table"]);
+    export(here, "lead.model", "table.csv", &["--to", "table", "--speed", "36km/h,50km/h"]);
+    let arguments = ["table.h5", "table.csv"].map(|f| here.join(f).display().to_string());
+    let found = run_python(python(), "exports_table.py", &[&arguments[0], &arguments[1]]);
+    // At 50 km/h, the curve that predict gives.
+    let curve: Value =
+        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
+    let envelope =
+        crumple::curve::Envelope::new(column("deflection_m"), column("body_force_N")).unwrap();
+    let (d, f): (Vec<f64>, Vec<f64>) = serde_json::from_value(found["at_50kmh"].clone()).unwrap();
+    for (d, f) in d.iter().zip(&f).filter(|p| *p.0 < envelope.end_m()) {
+        assert!((f - envelope.force_at(*d)).abs() < 1e-3, "at {d} m");
+    }
+    assert!(found["speeds"].as_u64().unwrap() >= 25);
+    assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
+}
+
+/// What our own readers have of what we write: the same bits, or the format's nine digits.
+#[test]
+fn our_readers_give_back_what_was_exported() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = fs::read_to_string(here.join("lead50.json")).unwrap();
+    let curve: Value = serde_json::from_str(&text).unwrap();
+    let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
+    let (d, f) = (column("deflection_m"), column("body_force_N"));
+    for (file, bound) in [("a.csv", 5e-9), ("a.k", 5e-9), ("a.txt", 5e-9), ("a.mat", 0.0)] {
+        for tail in ["none", "bottom"] {
+            export(here, "lead50.json", file, &["--tail", tail]);
+            let units = UnitSystem::parse("SI").unwrap();
+            let options = ReadOptions { units: Some(units), ..ReadOptions::default() };
+            let read = read::read(&here.join(file), &options).unwrap();
+            let close = |a: f64, b: f64| (a - b).abs() <= bound * b.abs();
+            assert_eq!(read.deflection_m.len(), d.len(), "{file} {tail}: {:?}", read.notes);
+            for i in 0..d.len() {
+                assert!(close(read.deflection_m[i], d[i]), "{file} {tail} point {i}");
+                assert!(close(read.force_n[i], f[i]), "{file} {tail} point {i}");
+            }
+        }
+    }
+}
+
+/// What a format cannot take is refused with its reason, in every format that takes curves.
+#[test]
+fn odd_curves_are_refused_by_every_format() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let good = [(0.0, 0.0), (0.1, 1e6), (0.2, 1.2e6), (0.3, 1e6), (0.4, 1e6)];
+    let change = |at: usize, point: (f64, f64)| {
+        let mut points = good.to_vec();
+        points[at] = point;
+        points
+    };
+    let cases = [
+        (change(2, (0.2, -1e6)), "the force of point 3 is below 0"),
+        (change(2, (0.05, 1e6)), "the deflection must increase, found 0.05 m after 0.1 m at point 3"),
+        (good[..3].to_vec(), "takes 4 points or more, found 3"),
+        (change(0, (0.1, 0.0)), "the deflection must begin at 0"),
+    ];
+    for (points, expected) in &cases {
+        with_points(here, "odd.json", points);
+        for format in FORMATS.iter().filter(|f| !f.takes_model() && !f.takes_case()) {
+            let output = crumple_in(here, &["export", "odd.json", "--to", format.name, "-o", "odd.out"]);
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{}: {error}", format.name);
+            let says = error.contains(expected) || error.contains("is below 0");
+            assert!(says, "{} does not say {expected}: {error}", format.name);
+            assert!(!here.join("odd.out").exists());
+        }
+    }
+    // JSON has no NaN: its reader says so with the place.
+    let text = fs::read_to_string(here.join("lead50.json")).unwrap();
+    fs::write(here.join("nan.json"), text.replacen("\"force_N\": [\n    0.0", "\"force_N\": [\n    NaN", 1)).unwrap();
+    let error = crumple_fails(here, 1, &["export", "nan.json", "--to", "csv"]);
+    assert!(error.contains("nan.json") && error.contains("line"), "{error}");
+}
+
+/// Names of groups become titles, identifiers and file names that targets read.
+#[test]
+fn odd_titles_are_handled_by_every_format() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = fs::read_to_string(here.join("lead50.json")).unwrap();
+    let mut curve: Value = serde_json::from_str(&text).unwrap();
+    for (i, name) in
+        ["x".repeat(200), "Führerstand, vorn".into(), "$ $*lead".into(), "a\"b\\c<&>\u{7}\nd".into()]
+            .iter()
+            .enumerate()
+    {
+        curve["provenance"]["group"] = json!(name);
+        fs::write(here.join("odd.json"), curve.to_string()).unwrap();
+        for format in FORMATS.iter().filter(|f| !f.takes_model() && !f.takes_case()) {
+            let output = format!("odd{i}.{}", format.extensions[0]);
+            export(here, "odd.json", &output, &["--to", format.name]);
+            let bytes = fs::read(here.join(&output)).unwrap();
+            let Ok(text) = String::from_utf8(bytes) else { continue };
+            for (n, line) in text.lines().enumerate() {
+                let is_control = |c: char| c.is_control() && c != '\t';
+                assert!(!line.contains(is_control), "{output} line {n}: {line:?}");
+            }
+        }
+        let deck = fs::read_to_string(here.join(format!("odd{i}.k"))).unwrap();
+        let title = deck.lines().skip_while(|l| *l != "*DEFINE_CURVE_TITLE").nth(1).unwrap();
+        assert!(title.is_ascii() && title.len() <= 80 && !title.contains(','), "{title}");
+        assert!(!title.starts_with(['$', '*']), "{title}");
+    }
+}
+
+/// A whole group goes into one file or one folder; a model gives any speeds.
+#[test]
+fn groups_and_several_speeds_are_exported_at_once() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "curves.h5", "wall.k", &["--group", "lead-car-wall"]);
+    let deck = fs::read_to_string(here.join("wall.k")).unwrap();
+    assert_eq!(deck.matches("*DEFINE_CURVE_TITLE").count(), 7);
+    export(here, "curves.h5", "wall", &["--group", "lead-car-wall", "--to", "csv"]);
+    assert_eq!(entries(&here.join("wall")).len(), 7);
+    export(here, "lead.model", "fmus", &["--speed", "36km/h,50km/h", "--to", "fmi2"]);
+    assert_eq!(
+        entries(&here.join("fmus")),
+        ["lead-car-wall-36kmh-fmi2.fmu", "lead-car-wall-50kmh-fmi2.fmu"]
+    );
+    // A case and a prediction have the same keys.
+    export(here, "curves.h5", "case.json", &["--group", "lead-car-wall", "--case", "36kmh"]);
+    let case: Value =
+        serde_json::from_str(&fs::read_to_string(here.join("case.json")).unwrap()).unwrap();
+    for key in ["deflection_m", "force_N", "unloading_stiffness_N_per_m", "provenance", "energy_J"] {
+        assert!(!case[key].is_null(), "{key}");
+    }
+    let t = |code: i32, arguments: &[&str], expected: &str| {
+        let error = crumple_fails(here, code, arguments);
+        assert!(error.contains(expected), "{arguments:?} said:\n{error}");
+    };
+    t(2, &["export", "lead.model", "--to", "csv"], "name the speeds of the model's curves with --speed");
+    t(
+        2,
+        &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"],
+        "this export gives 7 files: name a folder",
+    );
+    t(2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"], "gives 7 files");
+    t(
+        2,
+        &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
+        "has no case at 37 km/h: it has 12 km/h",
+    );
+    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "is of one speed and mass");
+    t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
+    t(1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"], "one curve");
+    t(2, &["export", "lead50.json", "--to", "iso-mme"], "iso-mme takes histories over time");
+    t(2, &["export", "lead50.json", "--to", "table"], "table takes a model");
+}
+
+/// The command says the restitution that the target's unloading gives beside ours, and softens on request.
+#[test]
+fn the_targets_rebound_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let notes = |more: &[&str]| -> Vec<String> {
+        let arguments = [&["export", "lead50.json", "--json", "-o", "x.k"][..], more].concat();
+        let said: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
+        serde_json::from_value(said["notes"].clone()).unwrap()
+    };
+    let restitutions = |note: &str| -> Vec<f64> {
+        let numbers = note.split([' ', ',', '(']).filter_map(|w| w.parse::<f64>().ok());
+        numbers.filter(|n| *n < 1.0 && *n > 0.0).collect()
+    };
+    // S08 is bound to the steepest rise, which the contact force has at its first flank.
+    let hard = notes(&["--force", "contact"]);
+    let [theirs, ours] = restitutions(&hard[0])[..] else { panic!("{hard:?}") };
+    assert!(theirs < 0.7 * ours, "{hard:?}");
+    assert!(hard[1].contains("--soften"), "{hard:?}");
+    let soft = notes(&["--force", "contact", "--soften"]);
+    let [theirs, ours] = restitutions(&soft[0])[..] else { panic!("{soft:?}") };
+    assert!((theirs / ours - 1.0).abs() < 0.01, "{soft:?}");
+    let own = notes(&["--force", "contact", "--material", "mat121"]);
+    let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
+    assert_eq!(theirs, ours);
+    // The softened curve keeps the energy.
+    let work = |file: &str| {
+        let units = UnitSystem::parse("SI").unwrap();
+        let options = ReadOptions { units: Some(units), ..ReadOptions::default() };
+        let curve = read::read(&here.join(file), &options).unwrap();
+        crumple::curve::Envelope::new(curve.deflection_m, curve.force_n).unwrap().work()
+    };
+    for (file, more) in [("hard.csv", &[][..]), ("soft.csv", &["--soften"])] {
+        export(here, "lead50.json", file, &[&["--force", "contact", "--tail", "none"], more].concat());
+    }
+    assert!((work("soft.csv") / work("hard.csv") - 1.0).abs() < 1e-3);
+    assert!(root().join("docs/feeding/README.md").is_file());
+}
