@@ -80,7 +80,7 @@ pub struct Target {
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Which force [default: body; a JSON file of crumple predict holds both]
+    /// Which force [default: body; JSON of a model's or a database's curve holds both]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Number of the first curve in the target's deck
@@ -248,9 +248,24 @@ fn export(
     }
     if format.takes_case() {
         let cases = input.cases(&chosen, format.name)?;
+        if let (Some(force), Some(case)) = (args.target.force, cases.first())
+            && force != case.force_kind
+        {
+            return Err(Failure::Usage(format!(
+                "{} holds a case's histories, which are of the {} force: remove --force",
+                format.name,
+                case.force_kind.name()
+            )));
+        }
         return Ok((format.export_cases(&cases, &args.target.options(output))?, Vec::new()));
     }
-    let curves = input.curves(&chosen)?;
+    let mut curves = input.curves(&chosen)?;
+    if let (Input::Curve(curve), true, None) =
+        (input, format.holds_both_forces(), args.target.force)
+    {
+        // The file itself holds both.
+        curves[0].curve = curve.of_force(ForceKind::Body)?;
+    }
     let mut warnings: Vec<String> = Vec::new();
     for warning in curves.iter().flat_map(|c| &c.curve.warnings).map(ToString::to_string) {
         if !warnings.contains(&warning) {

@@ -243,18 +243,10 @@ fn recorded(
     };
     let extracted = extract::extract(&measured, &setup)?;
     let mut warnings = extracted.warnings;
-    if let Some(stiffness) = impact.unloading_stiffness_n_per_m {
-        let found = extracted.unloading_stiffness_n_per_m;
-        match found {
-            Some(found) => notes.push(format!(
-                "unloading: {:.4} MN/m as the record has it, {:.4} MN/m is stated",
-                found / 1e6,
-                stiffness / 1e6
-            )),
-            None => warnings.push(
-                "unloading: a record over time keeps its own, which it does not hold; the stated one is not used"
-                    .into(),
-            ),
+    if let Some(stated) = impact.unloading_stiffness_n_per_m {
+        match unloading_of_record(extracted.unloading_stiffness_n_per_m, stated) {
+            Ok(note) => notes.push(note),
+            Err(warning) => warnings.push(warning),
         }
     }
     notes.extend(extracted.notes);
@@ -268,6 +260,19 @@ fn recorded(
         notes,
         warnings,
     })
+}
+
+/// What is said of a stated stiffness, in N/m, beside the one that the record holds: a note, or a warning
+/// if it holds none.
+fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String> {
+    match found {
+        Some(found) => Ok(format!(
+            "unloading: {:.4} MN/m as the record has it, {:.4} MN/m is stated",
+            found / 1e6,
+            stated / 1e6
+        )),
+        None => Err("unloading: a record over time keeps its own, which it does not hold; the stated one is not used".into()),
+    }
 }
 
 /// Whether the force of a record rises above its threshold within the first interval: what lies

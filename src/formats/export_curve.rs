@@ -185,6 +185,28 @@ impl ExportCurve {
         )
     }
 
+    /// What to say of a target that unloads with the steepest rise where that is more than the
+    /// curve's own stiffness.
+    pub fn steepest_notes(&self, target: &str, other: &str) -> Vec<String> {
+        let (own, steepest) = (self.stiffness_n_per_m(), self.loading.max_slope());
+        let unloading = TargetUnloading::Line(own.max(steepest));
+        let mut notes = vec![self.restitution_note(target, unloading)];
+        if steepest > own * 1.01 {
+            notes.push(format!(
+                "{target} unloads with the steepest rise, {:.1} MN/m, which is more than the curve's own {:.1} MN/m: --soften makes the steep flank less steep at equal energy{other}",
+                steepest / 1e6,
+                own / 1e6
+            ));
+        }
+        if self.is_softened {
+            notes.push(format!(
+                "the flank that was steeper than {:.1} MN/m has been made less steep, with the same energy to the maximal crush",
+                own / 1e6
+            ));
+        }
+        notes
+    }
+
     /// What the curve is, in one line, for headers and titles.
     pub fn headline(&self) -> String {
         let group = self.predicted.provenance.group.replace(char::is_control, " ");

@@ -2,13 +2,12 @@
 //!
 //! Layout: Radioss reference guide. TYPE4 takes compression in the third quadrant. Hardening flag 2
 //! (uncoupled): after the crush the spring unloads with K1 and has no force in tension, where isotropic
-//! hardening (1) would pull.
+//! hardening (1) would pull. The solver takes the smaller of the curve and a line of K1 (OpenRadioss,
+//! `redef3.F`), so K1 is at least the steepest rise.
 
 use super::lsdyna::InUnits;
 use super::text::{Lines, nine_digits, title};
-use super::{
-    ExportCurve, ExportError, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s,
-};
+use super::{ExportCurve, ExportError, Exported, NUMBER_OF_STATES, Options, run_time_s};
 use crate::unit::UnitSystem;
 
 /// Columns of a title.
@@ -35,8 +34,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         describe(&mut lines, curve, units);
         function(&mut lines, curve, units, id);
         property(&mut lines, curve, units, id);
-        let unloading = TargetUnloading::Line(curve.stiffness_n_per_m());
-        notes.push(curve.restitution_note("Radioss TYPE4", unloading));
+        notes.extend(curve.steepest_notes("Radioss TYPE4", ""));
         if options.deck {
             model(&mut lines, curve, units, id);
             files.push((format!("{stem}_0001.rad"), engine(curve, units, &stem)));
@@ -103,7 +101,9 @@ fn property(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let one = nine_digits(1.0);
     // A spring needs a mass of its own: a millionth of the body's.
     let mass = 1e-6 * curve.predicted.mass_kg / units.0.mass_kg;
-    let stiffness = units.stiffness(curve.stiffness_n_per_m());
+    // With a softer K1 the solver would cut the flanks that are steeper, and their energy.
+    let stiffness = curve.stiffness_n_per_m().max(curve.loading.max_slope());
+    let stiffness = units.stiffness(stiffness);
     lines.add(format_args!("/PROP/TYPE4/{id}"));
     lines.add(format_args!("{}", title(&curve.headline(), TITLE_WIDTH)));
     lines.add(format_args!(

@@ -122,12 +122,13 @@ mod tests {
     fn holds_and_then_rises_with_the_unloading_stiffness() {
         let with = with_tail(&curve(), None, 50e6, Tail::Bottom).unwrap();
         assert_eq!(with.deflection_m()[..101], curve().deflection_m()[..]);
-        assert_eq!(with.force_at(1.4), 1e6);
+        assert!((with.force_at(1.4) - 1e6).abs() < 1e-3);
         let rise = with.force_at(1.53) - with.force_at(1.52);
         assert!((rise / 0.01 / 50e6 - 1.0).abs() < 1e-9);
         assert!(with.peak_force_n() >= 3e6);
         let held = with_tail(&curve(), None, 50e6, Tail::Hold).unwrap();
-        assert_eq!((held.end_m(), held.peak_force_n()), (1.5, 1e6));
+        assert!((held.end_m() - 1.5).abs() < 1e-9);
+        assert!((held.peak_force_n() - 1e6).abs() < 1e-3);
         assert_eq!(with_tail(&curve(), None, 50e6, Tail::None).unwrap(), curve());
     }
 

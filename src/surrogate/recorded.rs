@@ -34,19 +34,12 @@ impl PredictedCurve {
         let force_n = at(&declared.loading);
         let steepest = declared.loading.max_slope();
         let loading = Envelope::new(deflection_m.clone(), force_n.clone())?;
-        let kinetic_energy_j = case.masses.kinetic_energy_j(case.speed);
         let driving = body.as_ref().unwrap_or(&declared);
         let top_n = driving.loading.force_at(driving.loading.end_m());
         let rebound = driving.unloading.stiffness_n_per_m().map(|stiffness_n_per_m| Rebound {
             speed_m_per_s: top_n / (stiffness_n_per_m * case.masses.effective_kg()).sqrt(),
             stiffness_n_per_m,
         });
-        let mut parameters: BTreeMap<String, Parameter> = case.parameters.clone();
-        if let Some(other) = case.masses.other_kg {
-            parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
-        }
-        let speed = case.speed.m_per_s;
-        let over_kinetic = |work_j: f64| work_j / kinetic_energy_j;
         let mut curve = Self {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
@@ -58,7 +51,7 @@ impl PredictedCurve {
             drives: case.force_kind.drives().into(),
             rebound,
             max_deflection_m: loading.end_m(),
-            speed_m_per_s: speed,
+            speed_m_per_s: case.speed.m_per_s,
             speed_kind: case.speed.kind,
             mass_kg: case.masses.body_kg,
             energy_j: loading.work(),
@@ -68,24 +61,7 @@ impl PredictedCurve {
                 .then(|| Warning::truncated_training_run(&case.name))
                 .into_iter()
                 .collect(),
-            provenance: Provenance {
-                written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
-                group: case.group.clone(),
-                force_kind: case.force_kind,
-                training_hash: case.fingerprint.clone(),
-                study_units: case.units(),
-                training_speeds_m_per_s: vec![speed],
-                in_range: true,
-                nearest_training_speed_m_per_s: speed,
-                distance_to_nearest_m_per_s: 0.0,
-                max_crush_rule: None,
-                max_crush: MaxCrush::NONE,
-                kinetic_energy_j,
-                energy_over_kinetic: over_kinetic(loading.work()),
-                body_energy_over_kinetic: body.as_ref().map(|b| over_kinetic(b.loading.work())),
-                band: None,
-                parameters,
-            },
+            provenance: provenance(case, loading.work(), body.as_ref().map(|b| b.loading.work())),
             deflection_m,
             force_n,
         };
@@ -94,6 +70,34 @@ impl PredictedCurve {
             curve.body_unloading_stiffness_n_per_m = Some(curve.stiffness_at_end(&body.loading));
         }
         Ok(curve)
+    }
+}
+
+/// Where a case comes from; the works are those of its declared force and of the body's, in J.
+fn provenance(case: &Case, work_j: f64, body_work_j: Option<f64>) -> Provenance {
+    let kinetic_energy_j = case.masses.kinetic_energy_j(case.speed);
+    let speed = case.speed.m_per_s;
+    let mut parameters: BTreeMap<String, Parameter> = case.parameters.clone();
+    if let Some(other) = case.masses.other_kg {
+        parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
+    }
+    Provenance {
+        written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
+        group: case.group.clone(),
+        force_kind: case.force_kind,
+        training_hash: case.fingerprint.clone(),
+        study_units: case.units(),
+        training_speeds_m_per_s: vec![speed],
+        in_range: true,
+        nearest_training_speed_m_per_s: speed,
+        distance_to_nearest_m_per_s: 0.0,
+        max_crush_rule: None,
+        max_crush: MaxCrush::NONE,
+        kinetic_energy_j,
+        energy_over_kinetic: work_j / kinetic_energy_j,
+        body_energy_over_kinetic: body_work_j.map(|work_j| work_j / kinetic_energy_j),
+        band: None,
+        parameters,
     }
 }
 

@@ -48,7 +48,9 @@ def read_keyword(text):
     known = facts(lines, "$ ")
     units = re.search(r"length (\S+) m, force (\S+) N", known["units of the points"])
     start = next(i for i, line in enumerate(lines) if line.startswith("*DEFINE_CURVE"))
-    body = [line for line in lines[start + 2 :] if not line.startswith(("$", "*"))]
+    behind = lines[start + 2 :]
+    end = next(i for i, line in enumerate(behind) if line.startswith("*"))
+    body = [line for line in behind[:end] if not line.startswith("$")]
     points = [[float(line[:20]), float(line[20:40])] for line in body[1:]]
     return numpy.array(points) * [float(units[1]), float(units[2])], known
 

@@ -96,31 +96,15 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
 
 /// What the material's unloading gives beside ours.
 fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
-    let (own, steepest) = (curve.stiffness_n_per_m(), curve.loading.max_slope());
-    let stiffness = match material {
-        Material::S08 => own.max(steepest),
-        Material::Mat121 | Material::S06 => own,
-    };
-    let name = match material {
-        Material::S08 => "LS-DYNA's S08",
-        Material::Mat121 => "LS-DYNA's MAT_121",
-        Material::S06 => "LS-DYNA's S06",
-    };
-    let mut notes = vec![curve.restitution_note(name, TargetUnloading::Line(stiffness))];
-    if stiffness > own * 1.01 {
-        notes.push(format!(
-            "S08 unloads with the steepest rise, {:.1} MN/m, which is more than KU, {:.1} MN/m: --soften makes the steep flank less steep at equal energy, --material mat121 unloads with its own stiffness",
-            steepest / 1e6,
-            own / 1e6
-        ));
+    let own = TargetUnloading::Line(curve.stiffness_n_per_m());
+    match material {
+        Material::S08 => {
+            let other = ", --material mat121 unloads with its own stiffness";
+            curve.steepest_notes("LS-DYNA's S08", other)
+        }
+        Material::Mat121 => vec![curve.restitution_note("LS-DYNA's MAT_121", own)],
+        Material::S06 => vec![curve.restitution_note("LS-DYNA's S06", own)],
     }
-    if curve.is_softened {
-        notes.push(format!(
-            "the flank that was steeper than {:.1} MN/m has been made less steep, with the same energy to the maximal crush",
-            own / 1e6
-        ));
-    }
-    notes
 }
 
 fn describe(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
