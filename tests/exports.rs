@@ -8,7 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::common::{
-    crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, root, run_python,
+    crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, root,
+    run_python,
 };
 use crumple::formats::FORMATS;
 use crumple::formats::read::{self, ReadOptions};
@@ -183,13 +184,13 @@ fn octave_reads_the_matrices() {
     let program = "load('a.mat'); x = linspace(0, max_deflection_m, 200); \
         printf('%.17g ', interp1(fd_load(:,1), fd_load(:,2), x)); \
         printf('\\n%.17g %.17g %.17g\\n', k_u, fd_unload(2,1), fd_unload(2,2)); disp(facts(1,:))";
-    let output = Command::new("octave-cli").args(["--quiet", "--eval", program]).current_dir(here).output();
+    let output =
+        Command::new("octave-cli").args(["--quiet", "--eval", program]).current_dir(here).output();
     let output = output.expect("this test needs Octave: octave-cli is not on the path (octave)");
     let text = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<&str> = text.lines().collect();
-    let numbers = |line: &str| -> Vec<f64> {
-        line.split_whitespace().map(|n| n.parse().unwrap()).collect()
-    };
+    let numbers =
+        |line: &str| -> Vec<f64> { line.split_whitespace().map(|n| n.parse().unwrap()).collect() };
     let (forces, unloading) = (numbers(lines[0]), numbers(lines[1]));
     let curve: Value =
         serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
@@ -316,14 +317,18 @@ fn odd_curves_are_refused_by_every_format() {
     };
     let cases = [
         (change(2, (0.2, -1e6)), "the force of point 3 is below 0"),
-        (change(2, (0.05, 1e6)), "the deflection must increase, found 0.05 m after 0.1 m at point 3"),
+        (
+            change(2, (0.05, 1e6)),
+            "the deflection must increase, found 0.05 m after 0.1 m at point 3",
+        ),
         (good[..3].to_vec(), "takes 4 points or more, found 3"),
         (change(0, (0.1, 0.0)), "the deflection must begin at 0"),
     ];
     for (points, expected) in &cases {
         with_points(here, "odd.json", points);
         for format in FORMATS.iter().filter(|f| !f.takes_model() && !f.takes_case()) {
-            let output = crumple_in(here, &["export", "odd.json", "--to", format.name, "-o", "odd.out"]);
+            let output =
+                crumple_in(here, &["export", "odd.json", "--to", format.name, "-o", "odd.out"]);
             let error = String::from_utf8_lossy(&output.stderr);
             assert_eq!(output.status.code(), Some(1), "{}: {error}", format.name);
             let says = error.contains(expected) || error.contains("is below 0");
@@ -333,7 +338,11 @@ fn odd_curves_are_refused_by_every_format() {
     }
     // JSON has no NaN: its reader says so with the place.
     let text = fs::read_to_string(here.join("lead50.json")).unwrap();
-    fs::write(here.join("nan.json"), text.replacen("\"force_N\": [\n    0.0", "\"force_N\": [\n    NaN", 1)).unwrap();
+    fs::write(
+        here.join("nan.json"),
+        text.replacen("\"force_N\": [\n    0.0", "\"force_N\": [\n    NaN", 1),
+    )
+    .unwrap();
     let error = crumple_fails(here, 1, &["export", "nan.json", "--to", "csv"]);
     assert!(error.contains("nan.json") && error.contains("line"), "{error}");
 }
@@ -345,10 +354,14 @@ fn odd_titles_are_handled_by_every_format() {
     let here = folder.path();
     let text = fs::read_to_string(here.join("lead50.json")).unwrap();
     let mut curve: Value = serde_json::from_str(&text).unwrap();
-    for (i, name) in
-        ["x".repeat(200), "Führerstand, vorn".into(), "$ $*lead".into(), "a\"b\\c<&>\u{7}\nd".into()]
-            .iter()
-            .enumerate()
+    for (i, name) in [
+        "x".repeat(200),
+        "Führerstand, vorn".into(),
+        "$ $*lead".into(),
+        "a\"b\\c<&>\u{7}\nd".into(),
+    ]
+    .iter()
+    .enumerate()
     {
         curve["provenance"]["group"] = json!(name);
         fs::write(here.join("odd.json"), curve.to_string()).unwrap();
@@ -388,14 +401,19 @@ fn groups_and_several_speeds_are_exported_at_once() {
     export(here, "curves.h5", "case.json", &["--group", "lead-car-wall", "--case", "36kmh"]);
     let case: Value =
         serde_json::from_str(&fs::read_to_string(here.join("case.json")).unwrap()).unwrap();
-    for key in ["deflection_m", "force_N", "unloading_stiffness_N_per_m", "provenance", "energy_J"] {
+    for key in ["deflection_m", "force_N", "unloading_stiffness_N_per_m", "provenance", "energy_J"]
+    {
         assert!(!case[key].is_null(), "{key}");
     }
     let t = |code: i32, arguments: &[&str], expected: &str| {
         let error = crumple_fails(here, code, arguments);
         assert!(error.contains(expected), "{arguments:?} said:\n{error}");
     };
-    t(2, &["export", "lead.model", "--to", "csv"], "name the speeds of the model's curves with --speed");
+    t(
+        2,
+        &["export", "lead.model", "--to", "csv"],
+        "name the speeds of the model's curves with --speed",
+    );
     t(
         2,
         &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"],
@@ -407,9 +425,17 @@ fn groups_and_several_speeds_are_exported_at_once() {
         &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
         "has no case at 37 km/h: it has 12 km/h",
     );
-    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "is of one speed and mass");
+    t(
+        2,
+        &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"],
+        "is of one speed and mass",
+    );
     t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
-    t(1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"], "one curve");
+    t(
+        1,
+        &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"],
+        "one curve",
+    );
     t(2, &["export", "lead50.json", "--to", "iso-mme"], "iso-mme takes histories over time");
     t(2, &["export", "lead50.json", "--to", "table"], "table takes a model");
 }
@@ -447,7 +473,12 @@ fn the_targets_rebound_is_said() {
         crumple::curve::Envelope::new(curve.deflection_m, curve.force_n).unwrap().work()
     };
     for (file, more) in [("hard.csv", &[][..]), ("soft.csv", &["--soften"])] {
-        export(here, "lead50.json", file, &[&["--force", "contact", "--tail", "none"], more].concat());
+        export(
+            here,
+            "lead50.json",
+            file,
+            &[&["--force", "contact", "--tail", "none"], more].concat(),
+        );
     }
     assert!((work("soft.csv") / work("hard.csv") - 1.0).abs() < 1e-3);
     assert!(root().join("docs/feeding/README.md").is_file());
