@@ -246,8 +246,8 @@ fn tests_that_need_clients_are_found_by_name() {
         let text = fs::read_to_string(&path).unwrap();
         for behind in text.split("#[ignore = \"needs the Python clients").skip(1) {
             let name = behind.split("fn ").nth(1).unwrap().split('(').next().unwrap();
-            let is_found =
-                ["clients", "documents", "fmu"].contains(&module) || name.contains("h5py");
+            let is_found = ["clients", "documents", "exports", "fmu"].contains(&module)
+                || name.contains("h5py");
             assert!(is_found, "{module}::{name} needs h5py in its name");
         }
     }
@@ -311,8 +311,7 @@ fn the_database_layout_is_described() {
 const MOST_LINES: usize = 60;
 
 /// Longer functions, and why a cut would make them worse.
-const LONG_FUNCTIONS: [(&str, &str, &str); 1] =
-    [("src/cli/predict.rs", "print", "one line of output after another, none of them nested")];
+const LONG_FUNCTIONS: [(&str, &str, &str); 0] = [];
 
 /// Where each function of a formatted file begins and how many lines it has, with its name.
 fn functions(text: &str) -> Vec<(String, usize)> {

@@ -17,6 +17,7 @@ mod plot;
 mod predict;
 mod progress;
 mod rate;
+mod run_channels;
 mod shell;
 mod simulate;
 mod sweep;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
-use crumple::formats::ExportInput;
+use crumple::formats::{ExportInput, Exported, Format};
 use crumple::surrogate::band::{Band, LeftOutSpeeds};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::predict_beyond;
@@ -80,22 +80,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (curve, beyond) = predict_beyond(&model, &query)?;
     let input = [ExportInput { curve, beyond: Some(beyond) }];
     let curve = &input[0].curve;
-    // All files are encoded before the first is written.
-    let mut files = Vec::new();
-    for (path, format) in args.output.iter().zip(formats) {
-        let exported = args.target.export(format, &input, Some(path))?;
-        let [(_, bytes)] = &exported.files[..] else {
-            return Err(Failure::Usage(format!(
-                "-o {}: this gives several files: crumple export --to {} -o FOLDER",
-                path.display(),
-                format.name
-            )));
-        };
-        files.push(bytes.clone());
-        if !options.quiet && !options.json {
-            exported.notes.iter().for_each(|note| output::say(&format!("note: {note}")));
-        }
-    }
+    let files = files(args, &formats, &input, options)?;
     let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
@@ -115,6 +100,34 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }
 
+/// The bytes of every output: all are encoded before the first is written.
+fn files(
+    args: &Args,
+    formats: &[&Format],
+    input: &[ExportInput],
+    options: GlobalOptions,
+) -> Result<Vec<Vec<u8>>, Failure> {
+    let mut files = Vec::new();
+    for (path, format) in args.output.iter().zip(formats) {
+        let Exported { files: mut exported, notes } =
+            args.target.export(format, input, Some(path))?;
+        match (exported.pop(), exported.is_empty()) {
+            (Some((_, bytes)), true) => files.push(bytes),
+            _ => {
+                return Err(Failure::Usage(format!(
+                    "-o {}: this gives several files: crumple export --to {} -o FOLDER",
+                    path.display(),
+                    format.name
+                )));
+            }
+        }
+        if !options.quiet && !options.json {
+            notes.iter().for_each(|note| output::say(&format!("note: {note}")));
+        }
+    }
+    Ok(files)
+}
+
 /// Where a band's curve lies, and what the band comes from.
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
@@ -124,6 +137,27 @@ fn rests_on(band: &Band, in_range: bool) -> String {
         LeftOutSpeeds::Ends => "end{s} of the range left out, growing with the distance",
     };
     format!("{place}, from {} {}", band.curves, speeds.replace("{s}", s))
+}
+
+/// The unloading stiffness of each force, and the rebound.
+fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+    let unloading = |out: &mut dyn Write, kind: ForceKind, stiffness: f64| {
+        writeln!(
+            out,
+            "  unloading            {:.1} MN/m of the {} force, which drives {}",
+            stiffness / 1e6,
+            kind.name(),
+            kind.drives()
+        )
+    };
+    unloading(out, curve.provenance.force_kind, curve.unloading_stiffness_n_per_m)?;
+    if let Some(stiffness) = curve.body_unloading_stiffness_n_per_m {
+        unloading(out, ForceKind::Body, stiffness)?;
+    }
+    if let Some(rebound) = curve.rebound {
+        writeln!(out, "  rebound              {}", km_per_h(rebound.speed_m_per_s))?;
+    }
+    Ok(())
 }
 
 fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
@@ -161,22 +195,7 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     if let Some(share) = provenance.body_energy_over_kinetic {
         writeln!(out, "  energy of body force {:.2} %", share * 100.0)?;
     }
-    let unloading = |out: &mut dyn Write, kind: ForceKind, stiffness: f64| {
-        writeln!(
-            out,
-            "  unloading            {:.1} MN/m of the {} force, which drives {}",
-            stiffness / 1e6,
-            kind.name(),
-            kind.drives()
-        )
-    };
-    unloading(out, provenance.force_kind, curve.unloading_stiffness_n_per_m)?;
-    if let Some(stiffness) = curve.body_unloading_stiffness_n_per_m {
-        unloading(out, ForceKind::Body, stiffness)?;
-    }
-    if let Some(rebound) = curve.rebound {
-        writeln!(out, "  rebound              {}", km_per_h(rebound.speed_m_per_s))?;
-    }
+    print_unloading(out, curve)?;
     if let Some(band) = &provenance.band {
         writeln!(
             out,

@@ -1,7 +1,7 @@
 //! `crumple simulate`: the multi-body run of a scenario.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crumple::file::write_whole;
 use crumple::multibody::{
@@ -13,6 +13,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::output;
+use super::run_channels;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inputs};
 
 /// Run a scenario and write the histories of every body and interface
@@ -20,11 +21,12 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
 #[command(after_help = "Examples:
   crumple simulate scenario.toml -o result.csv
   crumple simulate scenario.toml --json > result.json
+  crumple simulate scenario.toml -o result.mme      # an ISO-MME folder
   crumple simulate scenario.toml -o - | head        # CSV on standard output")]
 pub struct Args {
     /// Scenario (TOML)
     scenario: PathBuf,
-    /// Result as CSV; "-" is standard output
+    /// Result as CSV, or as a folder of ISO-MME (.mme); "-" is standard output
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
@@ -104,9 +106,9 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = &args.output {
         keep_inputs(&args.scenario, output)?;
         let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));
-        if !is_stdout(output) && !is_csv {
+        if !is_stdout(output) && !is_csv && !is_mme(output) {
             return Err(Failure::Usage(format!(
-                "-o {}: a run is written as CSV: name a .csv file, or use --json",
+                "-o {}: a run is written as CSV or ISO-MME: name a .csv file or an .mme folder, or use --json",
                 output.display()
             )));
         }
@@ -122,9 +124,13 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let columns = columns(&prepared, &run);
     let to_stdout = args.output.as_deref().is_some_and(is_stdout);
     if let Some(path) = args.output.as_ref().filter(|_| !to_stdout) {
-        let mut csv = Vec::new();
-        write_csv(&mut csv, &columns)?;
-        write_whole(path, &csv)?;
+        if is_mme(path) {
+            run_channels::write(path, &prepared, &run)?;
+        } else {
+            let mut csv = Vec::new();
+            write_csv(&mut csv, &columns)?;
+            write_whole(path, &csv)?;
+        }
     }
     let summary = summary(&prepared, &run);
     if options.json {
@@ -143,6 +149,11 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         })?;
     }
     Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+/// Whether an output is a folder of ISO-MME.
+fn is_mme(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mme"))
 }
 
 /// Column names and values, in the order of the scenario.

@@ -145,7 +145,7 @@ impl Envelope {
 
     /// `∫F dd` from 0 to `deflection_m`, exact for the piecewise linear force; beyond the
     /// end the last force is held. In J.
-    pub(crate) fn work_to(&self, deflection_m: f64) -> f64 {
+    pub fn work_to(&self, deflection_m: f64) -> f64 {
         let end = self.deflection_m.len() - 1;
         if deflection_m >= self.deflection_m[end] {
             return self.work_j[end] + self.force_n[end] * (deflection_m - self.deflection_m[end]);
@@ -156,13 +156,13 @@ impl Envelope {
     }
 
     /// `∫F dd` over the whole table, in J.
-    pub(crate) fn work(&self) -> f64 {
+    pub fn work(&self) -> f64 {
         self.work_j[self.work_j.len() - 1]
     }
 
     /// The deflection at which the envelope has taken up `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
-    pub(crate) fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
+    pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;
         match self.work_j.iter().position(|&w| w >= energy_j) {
             Some(0) => Some(0.0),
@@ -192,7 +192,7 @@ impl Envelope {
     }
 
     /// Largest force, in N.
-    pub(crate) fn peak_force_n(&self) -> f64 {
+    pub fn peak_force_n(&self) -> f64 {
         self.force_n.iter().copied().fold(0.0, f64::max)
     }
 

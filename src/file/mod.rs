@@ -53,7 +53,7 @@ fn is_pipe(_: fs::FileType) -> bool {
 /// Opens a file for reading; all else is refused before it is opened.
 ///
 /// # Errors
-/// As of [`kind`], and for a pipe.
+/// Where there is no such file, and for folders, devices and pipes, with what to do instead.
 pub fn open(path: &Path) -> io::Result<File> {
     match kind(path)? {
         Kind::File => File::open(path),

@@ -187,9 +187,9 @@ impl ExportCurve {
 
     /// What the curve is, in one line, for headers and titles.
     pub fn headline(&self) -> String {
+        let group = self.predicted.provenance.group.replace(char::is_control, " ");
         format!(
-            "{} {} ({})",
-            self.predicted.provenance.group,
+            "{group} {} ({})",
             km_per_h(self.predicted.speed_m_per_s),
             self.predicted.speed_kind.name()
         )

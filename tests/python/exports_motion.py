@@ -8,6 +8,7 @@ OWN.csv is what `crumple simulate` wrote of body A1. Prints the largest differen
 force over their maxima, and the restitutions.
 """
 
+import contextlib
 import csv
 import json
 import pathlib
@@ -81,6 +82,7 @@ def exudyn(path, run):
         top = numpy.interp(largest[0], deflection, force)
         return max(0.0, top - stiffness * (largest[0] - x))
 
+    exu.config.suppressWarnings = True
     system = exu.SystemContainer()
     model = system.AddSystem()
     ground = model.AddNode(NodePointGround())
@@ -122,7 +124,8 @@ def exudyn(path, run):
 
 tool, file, path = sys.argv[1:]
 run = own(path)
-time, x, v, f = {"calculix": calculix, "modelica": modelica, "exudyn": exudyn}[tool](file, run)
+with contextlib.redirect_stdout(sys.stderr):
+    time, x, v, f = {"calculix": calculix, "modelica": modelica, "exudyn": exudyn}[tool](file, run)
 keep = run["time_s"] <= time[-1]
 at = run["time_s"][keep]
 
