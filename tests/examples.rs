@@ -85,6 +85,25 @@ fn train_set() {
     );
 }
 
+/// The pictures of docs/feeding are what the example draws; each is small.
+#[test]
+fn feeding_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    example("feeding_pictures", &[folder.path().to_str().unwrap()]);
+    let there = root().join("docs/feeding");
+    let mut committed = crate::common::entries(&there);
+    committed.retain(|name| name.ends_with(".svg"));
+    assert_eq!(committed, crate::common::entries(folder.path()));
+    for name in committed {
+        let drawn = std::fs::read(folder.path().join(&name)).unwrap();
+        assert!(
+            drawn == std::fs::read(there.join(&name)).unwrap(),
+            "{name}: draw it again: cargo run --release --example feeding_pictures docs/feeding"
+        );
+        assert!(drawn.len() < 15_000, "{name} has {} bytes", drawn.len());
+    }
+}
+
 #[test]
 fn every_example_is_run_here() {
     let here = std::fs::read_to_string(root().join("tests/examples.rs")).unwrap();

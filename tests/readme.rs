@@ -31,6 +31,18 @@ documents! {
     formats_and_damage_hold: "docs/formats-and-damage.md";
     forest_holds: "docs/forest.md";
     sweeps_hold: "docs/sweeps.md";
+    feeding_holds: "docs/feeding/README.md";
+    feeding_lsdyna_holds: "docs/feeding/lsdyna.md";
+    feeding_radioss_holds: "docs/feeding/radioss.md";
+    feeding_calculix_holds: "docs/feeding/calculix.md";
+    feeding_adams_holds: "docs/feeding/adams.md";
+    feeding_fmi_holds: "docs/feeding/fmi.md";
+    feeding_modelica_holds: "docs/feeding/modelica.md";
+    feeding_matlab_holds: "docs/feeding/matlab.md";
+    feeding_iso_mme_holds: "docs/feeding/iso-mme.md";
+    feeding_two_variables_holds: "docs/feeding/two-variables.md";
+    feeding_other_tools_holds: "docs/feeding/other-tools.md";
+    feeding_importing_holds: "docs/feeding/importing.md";
 }
 
 /// Runs all commands of a document and holds it against what they print.
@@ -111,9 +123,32 @@ fn run(line: &str, here: &Path) -> String {
 
 #[test]
 fn every_document_is_held() {
-    for name in crate::common::entries(&root().join("docs")) {
-        let name = format!("docs/{name}");
-        assert!(DOCUMENTS.contains(&name.as_str()), "{name} is not in the list of this file");
+    let mut folders = vec!["docs".to_string()];
+    while let Some(folder) = folders.pop() {
+        for name in crate::common::entries(&root().join(&folder)) {
+            let name = format!("{folder}/{name}");
+            if root().join(&name).is_dir() {
+                folders.push(name);
+            } else if !name.ends_with(".svg") {
+                assert!(
+                    DOCUMENTS.contains(&name.as_str()),
+                    "{name} is not in the list of this file"
+                );
+            }
+        }
+    }
+}
+
+/// Each page on feeding a tool has a command that is run, and each picture is shown.
+#[test]
+fn pages_on_feeding_have_commands_and_pictures() {
+    let pages = DOCUMENTS.iter().filter(|name| name.starts_with("docs/feeding/"));
+    let texts: Vec<String> =
+        pages.map(|name| std::fs::read_to_string(root().join(name)).unwrap()).collect();
+    assert!(texts.iter().all(|text| text.contains("```sh\ncrumple ")));
+    for name in crate::common::entries(&root().join("docs/feeding")) {
+        let is_shown = texts.iter().any(|text| text.contains(&format!("]({name})")));
+        assert!(is_shown || name == "README.md", "no page shows or names {name}");
     }
 }
 
