@@ -96,27 +96,16 @@ fn lsdyna(recorded: &ExportInput) -> Anything<String> {
     Ok(svg(&[(0, "crumple"), (1, "MAT_121 and S06"), (2, "S08")], &[left, right]))
 }
 
-/// Hardening 2 follows K1 where the curve rises more steeply.
+/// K1 is at least the steepest rise, so the way back is steeper than ours where a flank is.
 fn radioss(recorded: &ExportInput) -> Anything<String> {
     let curve = ready(recorded, ForceKind::Body)?;
-    let k1 = curve.stiffness_n_per_m();
-    // What has no force any more when it is let go from here.
-    let mut set_m = 0.0_f64;
-    let steps = (0..=4000).map(|i| curve.max_crush_m() * f64::from(i) / 4000.0);
-    let followed: Points = steps
-        .map(|d| {
-            let force = curve.loading.force_at(d).min(k1 * (d - set_m));
-            set_m = d - force / k1;
-            (d, force)
-        })
-        .collect();
-    let there_and_back = [followed.clone(), on_line(&curve, k1)].concat();
+    let k1 = curve.stiffness_n_per_m().max(curve.loading.max_slope());
     let mut left = Panel::whole("run at 48 km/h, body force");
-    left.line(0, points(&curve.loading));
-    left.line(1, there_and_back);
-    let mut right = Panel::around([0.0, 0.16], [0.0, 3.0], 0.04, 1.0, "the first flanks");
-    right.line(0, loading(&curve));
-    right.line(1, followed);
+    left.line(0, both_ways(&curve));
+    left.line(1, [loading(&curve), on_line(&curve, k1)].concat());
+    let mut right = Panel::around_end(&curve, "its end");
+    right.line(0, both_ways(&curve));
+    right.line(1, [loading(&curve), on_line(&curve, k1)].concat());
     Ok(svg(&[(0, "crumple"), (1, "Radioss TYPE4, H = 2, unloading with K1")], &[left, right]))
 }
 
