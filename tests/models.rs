@@ -155,13 +155,13 @@ fn the_band_knows_where_it_is() {
     let (inner, ends) = (validation.band.unwrap(), validation.band_outside.unwrap());
     assert_eq!((inner.curves, ends.curves), (3, 2));
     // Left out, 10, 13 and 17 leave gaps of 6, 7 and 7; 7 and 20 lie 3 from the others.
-    assert!((inner.span_m_per_s.unwrap() - 20.0 / 3.0).abs() < 1e-12);
-    assert!((ends.span_m_per_s.unwrap() - 3.0).abs() < 1e-12);
+    assert!((inner.span_m_per_s - 20.0 / 3.0).abs() < 1e-12);
+    assert!((ends.span_m_per_s - 3.0).abs() < 1e-12);
     let at = |v: f64| curve(&model, v).provenance.band.unwrap();
     for (v, gap) in [(8.0, 3.0), (12.9, 3.0), (13.0, 4.0), (15.0, 4.0), (17.5, 3.0), (20.0, 3.0)] {
         let expected = inner.pointwise_share * (gap * 3.0 / 20.0_f64).powf(0.65);
         assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
-        assert_eq!(at(v).span_m_per_s, Some(gap));
+        assert_eq!(at(v).span_m_per_s, gap);
     }
     let edge = at(20.0).pointwise_share;
     for (v, distance) in [(6.0, 1.0), (22.0, 2.0), (24.0, 4.0), (60.0, 40.0)] {

@@ -266,7 +266,7 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
 
 /// A band of the validation, with the span that it is stated for.
 fn band_line(band: &Band) -> String {
-    let span = km_per_h(band.span_m_per_s.unwrap_or_default());
+    let span = km_per_h(band.span_m_per_s);
     let (of, place) = match band.left_out {
         LeftOutSpeeds::Inner => (
             "curve",

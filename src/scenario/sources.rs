@@ -64,10 +64,9 @@ impl Sources {
     /// # Errors
     /// [`ScenarioError`] names the curve or file.
     pub(crate) fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
-        let mut databases = BTreeMap::new();
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
-            let source = CurveSource::read(path, name, table, &mut databases)?;
+            let source = CurveSource::read(path, name, table)?;
             curves.insert(name.clone(), source);
         }
         Ok(Self { curves })
@@ -133,12 +132,7 @@ pub enum StageError {
 
 impl CurveSource {
     /// Reads what the table of curve `name` in the scenario at `path` asks for.
-    fn read(
-        path: &Path,
-        name: &str,
-        table: &CurveTable,
-        databases: &mut BTreeMap<PathBuf, Database>,
-    ) -> Result<Self, ScenarioError> {
+    fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, ScenarioError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let curve = || name.to_string();
         let wrong = |source| ScenarioError::Source { path: path.into(), source };
@@ -163,11 +157,8 @@ impl CurveSource {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));
                 let (group, case) =
                     case.ok_or_else(|| wrong(SourceError::NoCase { curve: curve() }))?;
-                let path = folder.join(database);
-                if !databases.contains_key(&path) {
-                    databases.insert(path.clone(), Database::read(&path)?);
-                }
-                Ok(Self::Case(Box::new(databases[&path].case(&path, group, case)?.clone())))
+                let database = folder.join(database);
+                Ok(Self::Case(Box::new(Database::read_case(&database, Some(group), case)?)))
             }
             (None, None, None, Some(stages)) => staged(stages)
                 .map(Self::Stages)

@@ -76,10 +76,8 @@ pub struct Band {
     pub left_out: LeftOutSpeeds,
     /// What the half widths below hold for. `inner`: distance of the two training speeds that a
     /// query lies between, and the widths go with its power 0.65; `ends`: distance to the
-    /// nearest training speed, and they are in proportion to it. Absent in files of earlier
-    /// versions, whose widths hold nowhere in particular.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub span_m_per_s: Option<f64>,
+    /// nearest training speed, and they are in proportion to it.
+    pub span_m_per_s: f64,
     /// Half width at any one deflection, as a share of the local level of the force.
     pub pointwise_share: f64,
     /// Half width that the whole curve keeps to.
@@ -172,19 +170,18 @@ impl Band {
             level: LEVEL,
             curves: curves.len(),
             left_out,
-            span_m_per_s: Some(span_m_per_s),
+            span_m_per_s,
             pointwise_share: over_span(&squares),
             simultaneous_share: over_span(&largest),
             coverage: None,
         })
     }
 
-    /// The same band over another span; `None` if the scaled widths are no finite numbers, or if the band is
-    /// of an earlier version, which does not say its own.
+    /// The same band over another span; `None` if the scaled widths are no finite numbers.
     pub(crate) fn over(self, span_m_per_s: f64) -> Option<Self> {
-        let factor = (span_m_per_s / self.span_m_per_s?).powf(self.left_out.power());
+        let factor = (span_m_per_s / self.span_m_per_s).powf(self.left_out.power());
         let band = Self {
-            span_m_per_s: Some(span_m_per_s),
+            span_m_per_s,
             pointwise_share: factor * self.pointwise_share,
             simultaneous_share: factor * self.simultaneous_share,
             ..self
@@ -197,7 +194,8 @@ impl Band {
         let sound = |share: f64| (0.0..=WIDEST).contains(&share);
         sound(self.pointwise_share)
             && sound(self.simultaneous_share)
-            && self.span_m_per_s.is_none_or(|span| span > 0.0 && span.is_finite())
+            && self.span_m_per_s > 0.0
+            && self.span_m_per_s.is_finite()
     }
 
     /// Lowest and highest force at each of a curve's even deflections, in N; never below 0.
@@ -269,7 +267,7 @@ mod tests {
         let band = |n: usize| Band::of(Inner, &vec![one.clone(); n]).unwrap();
         assert!((band(1).pointwise_share - 0.63138).abs() < 1e-12);
         assert!((band(3).pointwise_share - 0.23534).abs() < 1e-12);
-        assert_eq!(band(3).span_m_per_s, Some(4.0));
+        assert_eq!(band(3).span_m_per_s, 4.0);
         assert_eq!(band(1).coverage, None);
         assert_eq!(band(2).coverage, Some(1.0));
         assert!(Band::of(Inner, &[]).is_none());
@@ -328,8 +326,6 @@ mod tests {
         assert!(kind == Ends && (outside - 0.584 * 1.5).abs() < 1e-12);
         assert_eq!(at(inner, None, &speeds, 12.0), None);
         assert_eq!(at(None, ends, &speeds, 8.0), None);
-        let old = Band { span_m_per_s: None, ..inner.unwrap() };
-        assert_eq!(at(Some(old), None, &speeds, 8.0), None, "does not know its gaps");
     }
 
     #[test]

@@ -239,10 +239,6 @@ impl Model {
         if of.band.or(of.band_outside).is_none() {
             return Ok(None);
         }
-        if of.band.is_some_and(|band| band.span_m_per_s.is_none()) {
-            let why = "that of the model file, of an earlier version, does not know the gaps that it holds for: train the model again";
-            return Err(Warning::no_band(why));
-        }
         if let Some((feature, ..)) = self.features_outside(at).next() {
             let name = feature.name();
             let why = format!("no case outside the training cases' {name} was left out");
