@@ -198,7 +198,7 @@ impl Flow<'_> {
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
         let (curve, beyond) = predict_beyond(model, &Query::at(SPEED_M_PER_S))?;
         let input = [ExportInput { curve, beyond: Some(beyond) }];
-        for name in ["lead50.json", "lead50.csv", "lead50.k"] {
+        for name in ["lead50.json", "lead50.csv", "lead50.k", "lead50.mo", "lead50.fmu"] {
             let path = self.path(name);
             let format = formats::by_extension(&path)?;
             for (_, bytes) in format.export(&input, &formats::Options::default())?.files {

@@ -83,9 +83,9 @@ pub struct Target {
     /// Which force [default: body; JSON of a model's or a database's curve holds both]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
-    /// Number of the first curve in the target's deck
-    #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
-    curve_id: u32,
+    /// Number of the first curve in the target's deck [default: 101]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
+    curve_id: Option<u32>,
     /// What the curve does beyond the maximal crush [default: bottom for multi-body tools]
     #[arg(long, value_parser = one_of(TAILS))]
     tail: Option<Tail>,
@@ -152,7 +152,7 @@ impl Target {
     fn options(&self, path: Option<&Path>) -> Options {
         Options {
             units: self.units,
-            id: self.curve_id,
+            id: self.curve_id.unwrap_or(Options::default().id),
             force: self.force.unwrap_or(ForceKind::Body),
             tail: self.tail,
             soften: self.soften,
@@ -190,13 +190,32 @@ impl Target {
         })
     }
 
+    /// Refuses what none of the formats has a use for.
+    pub fn check(&self, formats: &[&Format]) -> Result<(), Failure> {
+        let is_of_none = |takes: fn(&Format) -> bool| !formats.iter().any(|f| takes(f));
+        for (option, is_asked, takes) in [
+            ("--deck", self.deck, Format::has_deck as fn(&Format) -> bool),
+            ("--material", self.material.is_some(), Format::has_materials),
+            ("--curve-id", self.curve_id.is_some(), Format::has_ids),
+            ("--tail", self.tail.is_some(), Format::takes_tail),
+            ("--soften", self.soften, Format::takes_tail),
+        ] {
+            if is_asked && is_of_none(takes) {
+                let those: Vec<&str> =
+                    FORMATS.iter().filter(|f| takes(f)).map(|f| f.name).collect();
+                return Err(Failure::Usage(format!("{option} is for {}", those.join(", "))));
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses what a whole model has no use for.
     fn check_for_model(&self, format: &Format) -> Result<(), Failure> {
-        let of_curves = self.units.is_some() || self.soften || self.deck || self.material.is_some();
+        let of_curves = self.units.is_some() || self.soften;
         let forced = self.force.is_some() && format.name == "onnx";
         match of_curves || forced {
             true => Err(Failure::Usage(format!(
-                "{} holds a whole model in SI: remove --units, --soften, --material, --deck{}",
+                "{} holds a whole model in SI: remove --units and --soften{}",
                 format.name,
                 if forced { " and --force: it is of the recipe's force" } else { "" }
             ))),
@@ -214,6 +233,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = output {
         keep_input(path, output)?;
     }
+    args.target.check(&[format])?;
     let input = Input::read(path)?;
     let (exported, warnings) = export(args, format, &input, output)?;
     for warning in &warnings {

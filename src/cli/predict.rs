@@ -63,6 +63,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         .iter()
         .map(|path| args.target.format(Some(path.as_path()).filter(|path| !is_stdout(path))))
         .collect::<Result<Vec<_>, _>>()?;
+    args.target.check(&formats)?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
         return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));

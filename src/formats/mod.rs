@@ -303,6 +303,30 @@ impl Format {
         matches!(self.writer, Writer::Whole(_))
     }
 
+    /// Whether it can be a complete input of one mass on the spring.
+    pub fn has_deck(&self) -> bool {
+        ["lsdyna", "radioss", "calculix"].contains(&self.name)
+    }
+
+    /// Whether it has several spring materials.
+    pub fn has_materials(&self) -> bool {
+        self.name == "lsdyna"
+    }
+
+    /// Whether its curves can go on beyond the maximal crush.
+    pub fn takes_tail(&self) -> bool {
+        match self.writer {
+            Writer::Each(_) | Writer::Together(_) => true,
+            Writer::Model(_) => self.name == "table",
+            Writer::Whole(_) | Writer::Case(_) => false,
+        }
+    }
+
+    /// Whether curves have numbers in it.
+    pub fn has_ids(&self) -> bool {
+        self.has_deck() || self.name == "adams"
+    }
+
     /// The files of a model.
     ///
     /// # Errors
