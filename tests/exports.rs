@@ -148,9 +148,11 @@ fn calculix_moves_a_mass_as_our_elastic_run() {
 fn rumoca_moves_a_mass_as_our_run() {
     let folder = demo_folder();
     let here = folder.path();
-    export(here, "lead50.json", "a.mo", &[]);
+    // By itself: the compiler reads all packages of a folder, and the demo has written this one, too.
+    fs::create_dir(here.join("package")).unwrap();
+    export(here, "lead50.json", "package/a.mo", &[]);
     let own = own_run(here, "lead50.json", "memory");
-    let package = here.join("a.mo").display().to_string();
+    let package = here.join("package/a.mo").display().to_string();
     let found = exports_python("exports_motion.py", &["modelica", &package, &own]);
     assert!(found["x"].as_f64().unwrap() < 1e-5, "{found}");
     assert!(found["v"].as_f64().unwrap() < 1e-4, "{found}");
@@ -260,10 +262,18 @@ fn same_columns(a: &Value, b: &Value) {
 fn h5py_reads_the_table_of_a_model() {
     let folder = demo_folder();
     let here = folder.path();
-    export(here, "lead.model", "table.h5", &["--to", "table"]);
+    // The vehicle pair has the shortest crush beside the longest.
+    let curves: Vec<String> = ["3km/h", "6km/h", "25km/h", "72km/h"]
+        .iter()
+        .map(|v| crumple_ok(here, &["predict", "vehicle.model", "--speed", v, "--json"]))
+        .collect();
+    fs::write(here.join("curves.json"), format!("[{}]", curves.join(","))).unwrap();
+    export(here, "vehicle.model", "table.h5", &["--to", "table"]);
     export(here, "lead.model", "table.csv", &["--to", "table", "--speed", "36km/h,50km/h"]);
-    let arguments = ["table.h5", "table.csv"].map(|f| here.join(f).display().to_string());
-    let found = run_python(python(), "exports_table.py", &[&arguments[0], &arguments[1]]);
+    let arguments =
+        ["table.h5", "table.csv", "curves.json"].map(|f| here.join(f).display().to_string());
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let found = run_python(python(), "exports_table.py", &arguments);
     // At 50 km/h, the curve that predict gives.
     let curve: Value =
         serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
@@ -273,8 +283,10 @@ fn h5py_reads_the_table_of_a_model() {
     let (d, f): (Vec<f64>, Vec<f64>) = serde_json::from_value(found["at_50kmh"].clone()).unwrap();
     for (d, f) in d.iter().zip(&f).filter(|p| *p.0 < envelope.end_m()) {
         let off = (f - envelope.force_at(*d)).abs() / envelope.peak_force_n();
-        assert!(off < 1e-7, "at {d} m: {off}");
+        assert!(off < 2e-3, "at {d} m: {off}");
     }
+    let worst = found["worst_energy"].as_f64().unwrap();
+    assert!(worst < 1e-3, "energy of a speed's row to its maximal crush is off by {worst}");
     assert!(found["speeds"].as_u64().unwrap() >= 25);
     assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
 }
@@ -384,6 +396,87 @@ fn odd_titles_are_handled_by_every_format() {
     }
 }
 
+/// Facts that no impact has are refused when a curve is read.
+#[test]
+fn impossible_facts_are_refused() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = fs::read_to_string(here.join("lead50.json")).unwrap();
+    for (key, value) in [
+        ("speed_m_per_s", 0.0),
+        ("mass_kg", -1.0),
+        ("unloading_stiffness_N_per_m", 0.0),
+        ("body_unloading_stiffness_N_per_m", -5.0),
+        ("max_deflection_m", 2.0),
+    ] {
+        let mut curve: Value = serde_json::from_str(&text).unwrap();
+        curve[key] = json!(value);
+        fs::write(here.join("odd.json"), curve.to_string()).unwrap();
+        let error =
+            crumple_fails(here, 1, &["export", "odd.json", "--to", "fmi2", "-o", "odd.fmu"]);
+        assert!(error.contains(&format!("{key} is")), "{key}: {error}");
+    }
+}
+
+/// A force at contact keeps its energy where a target needs the origin.
+#[test]
+fn a_force_at_contact_keeps_its_energy() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let points: Vec<(f64, f64)> = (0..6).map(|i| (0.18 * f64::from(i), 2.47e6)).collect();
+    with_points(here, "constant.json", &points);
+    export(here, "constant.json", "a.k", &["--tail", "none"]);
+    let (read, _) = read::read(&here.join("a.k"), &ReadOptions::default()).unwrap();
+    assert_eq!((read.deflection_m[0], read.force_n[0]), (0.0, 0.0));
+    let energy = crumple::curve::Envelope::new(read.deflection_m, read.force_n).unwrap().work();
+    assert!((energy / (0.9 * 2.47e6) - 1.0).abs() < 1e-3, "{energy}");
+}
+
+/// A table of force over deflection comes out of a database as it went in, also as the force that moves a body: its
+/// motion was made of it.
+#[test]
+fn an_imported_curve_is_exported_as_it_was() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let rows: Vec<String> =
+        spike(61).iter().map(|(d, f)| format!("{},{}", d * 1e3, f / 1e3)).collect();
+    fs::write(
+        here.join("legacy.csv"),
+        format!("displacement [mm],Force [kN]\n{}\n", rows.join("\n")),
+    )
+    .unwrap();
+    crumple_ok(
+        here,
+        &[
+            "db",
+            "add",
+            "legacy.h5",
+            "legacy.csv",
+            "--group",
+            "g",
+            "--speed",
+            "11m/s",
+            "--kind",
+            "wall",
+            "--mass",
+            "24t",
+        ],
+    );
+    export(here, "legacy.h5", "back.csv", &["--tail", "none"]);
+    let units = UnitSystem::parse("SI").ok();
+    let (back, _) =
+        read::read(&here.join("back.csv"), &ReadOptions { units, ..ReadOptions::default() })
+            .unwrap();
+    let back = crumple::curve::Envelope::new(back.deflection_m, back.force_n).unwrap();
+    for (d, f) in spike(61) {
+        assert!(
+            (back.force_at(d) - f).abs() < 1e-3 * 6e6,
+            "at {d} m: {} for {f}",
+            back.force_at(d)
+        );
+    }
+}
+
 /// A whole group goes into one file or one folder; a model gives any speeds.
 #[test]
 fn groups_and_several_speeds_are_exported_at_once() {
@@ -440,6 +533,35 @@ fn groups_and_several_speeds_are_exported_at_once() {
     );
     t(2, &["export", "lead50.json", "--to", "iso-mme"], "iso-mme takes histories over time");
     t(2, &["export", "lead50.json", "--to", "table"], "table takes a model");
+    // What a format has no use for is refused.
+    t(
+        2,
+        &["export", "lead50.json", "--to", "csv", "--deck"],
+        "--deck is for lsdyna, radioss, calculix",
+    );
+    t(
+        2,
+        &["export", "lead50.json", "--to", "mat", "--material", "s06"],
+        "--material is for lsdyna",
+    );
+    t(2, &["export", "lead50.json", "--to", "json", "--tail", "hold"], "--tail is for csv, lsdyna");
+    t(
+        2,
+        &["export", "lead.model", "--to", "onnx", "--speed", "50km/h"],
+        "holds a whole model: remove --speed",
+    );
+    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model is of one group");
+    t(
+        2,
+        &["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"],
+        "name a folder, and the kind of file with --to spr",
+    );
+    export(here, "curves.h5", "sprs", &["--group", "lead-car-wall", "--to", "spr"]);
+    assert!(entries(&here.join("sprs")).iter().all(|name| name.ends_with(".spr")));
+    // Two curves of one speed keep apart, in their files and in the names within.
+    export(here, "lead.model", "twice.cmd", &["--speed", "36km/h,36km/h"]);
+    let twice = fs::read_to_string(here.join("twice.cmd")).unwrap();
+    assert!(twice.contains("lead_car_wall_36kmh ") && twice.contains("lead_car_wall_36kmh_2 "));
 }
 
 /// The command says the restitution that the target's unloading gives beside ours, and softens on request.
@@ -467,6 +589,12 @@ fn the_targets_rebound_is_said() {
     let own = notes(&["--force", "contact", "--material", "mat121"]);
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
+    assert!(soft.iter().any(|note| note.contains("the largest force goes from")), "{soft:?}");
+    // A change that would be too large is refused.
+    let arguments =
+        ["export", "curves.h5", "--group", "vehicle-pair", "--speed", "3km/h", "--to", "lsdyna"];
+    let error = crumple_fails(here, 1, &[&arguments[..], &["--soften"]].concat());
+    assert!(error.contains("without changing the curve's end"), "{error}");
     // The softened curve keeps the energy.
     let work = |file: &str| {
         let units = UnitSystem::parse("SI").unwrap();

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crumple::curve::ForceKind;
+use crumple::curve::{ForceKind, Parameter};
 use crumple::formats::{self, ExportError, Exported, FORMATS, Format, Material, Options, Tail};
+use crumple::surrogate::Query;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::PredictError;
 use crumple::unit::UnitSystem;
@@ -63,6 +64,9 @@ struct Which {
     /// Answer further outside a model's training speeds than a third of their range
     #[arg(long)]
     extrapolate: bool,
+    /// Value of a model's further parameter, as NAME=VALUE; may be repeated
+    #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
+    parameter: Vec<(String, Parameter)>,
     /// Group of a database (default: the only one)
     #[arg(long)]
     group: Option<String>,
@@ -158,8 +162,13 @@ impl Target {
             soften: self.soften,
             material: self.material.unwrap_or_default(),
             deck: self.deck,
-            extension: path.and_then(Path::extension).and_then(|e| e.to_str()).map(Into::into),
+            extension: path
+                .and_then(Path::extension)
+                .and_then(|e| e.to_str())
+                .or(self.to.as_deref())
+                .map(Into::into),
             speeds_m_per_s: Vec::new(),
+            query: Query::at(0.0),
         }
     }
 
@@ -239,7 +248,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     for warning in &warnings {
         options.warn(warning);
     }
-    Destination { output, format }.write(exported, options)?;
+    Destination { output, format, warnings: &warnings }.write(exported, options)?;
     Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }
 
@@ -250,21 +259,29 @@ fn export(
     input: &Input,
     output: Option<&Path>,
 ) -> Result<(Exported, Vec<String>), Failure> {
-    let Which { speed, mass, max_crush, extrapolate, group, case } = &args.which;
+    let Which { speed, mass, max_crush, extrapolate, parameter, group, case } = &args.which;
     let chosen = Chosen {
         speeds_m_per_s: speed,
-        mass_kg: *mass,
-        rule: *max_crush,
-        extrapolate: *extrapolate,
+        query: Query {
+            mass_kg: *mass,
+            rule: *max_crush,
+            extrapolate: *extrapolate,
+            parameters: parameter.iter().cloned().collect(),
+            ..Query::at(0.0)
+        },
         group: group.as_deref(),
         cases: case,
     };
     if format.takes_model() {
         args.target.check_for_model(format)?;
+        chosen.check_for_model(format.name == "table")?;
         let model = input.model(format.name)?;
         let mut options = args.target.options(output);
         options.speeds_m_per_s = speed.clone();
-        return Ok((format.export_model(model, &options)?, Vec::new()));
+        options.query = chosen.query;
+        let mut exported = format.export_model(model, &options)?;
+        let warnings = std::mem::take(&mut exported.warnings);
+        return Ok((exported, warnings));
     }
     if format.takes_case() {
         let cases = input.cases(&chosen, format.name)?;

@@ -9,7 +9,6 @@ use crumple::dataset::is_same_speed;
 use crumple::file;
 use crumple::formats::ExportInput;
 use crumple::formats::read::json::{self, CurveFileError};
-use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
 use crumple::unit::km_per_h;
@@ -26,9 +25,8 @@ pub enum Input {
 /// Which curves of it.
 pub struct Chosen<'a> {
     pub speeds_m_per_s: &'a [f64],
-    pub mass_kg: Option<f64>,
-    pub rule: Option<MaxCrushRule>,
-    pub extrapolate: bool,
+    /// What is asked of a model; its speed is not used.
+    pub query: Query,
     pub group: Option<&'a str>,
     pub cases: &'a [String],
 }
@@ -95,16 +93,36 @@ impl Input {
 impl Chosen<'_> {
     fn refuse_all(&self, what: &str) -> Result<(), Failure> {
         let is_asked = !self.speeds_m_per_s.is_empty()
-            || self.mass_kg.is_some()
-            || self.rule.is_some()
-            || self.extrapolate
+            || self.asks_a_model()
             || self.group.is_some()
             || !self.cases.is_empty();
         match is_asked {
             true => Err(Failure::Usage(format!(
-                "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --group, --case, or give the model or the database"
+                "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
             ))),
             false => Ok(()),
+        }
+    }
+
+    /// Whether anything is asked that only a model can answer.
+    fn asks_a_model(&self) -> bool {
+        let Query { mass_kg, rule, extrapolate, parameters, .. } = &self.query;
+        mass_kg.is_some() || rule.is_some() || *extrapolate || !parameters.is_empty()
+    }
+
+    /// Refuses what an export of a whole model has no use for; a table takes all that is asked of
+    /// a model.
+    pub fn check_for_model(&self, is_table: bool) -> Result<(), Failure> {
+        let of_database = self.group.is_some() || !self.cases.is_empty();
+        let of_curve = self.asks_a_model() || !self.speeds_m_per_s.is_empty();
+        match (of_database, of_curve && !is_table) {
+            (true, _) => Err(Failure::Usage(
+                "--group and --case are for a database: a model is of one group".into(),
+            )),
+            (false, true) => Err(Failure::Usage(
+                "this holds a whole model: remove --speed, --mass, --max-crush, --extrapolate, --parameter".into(),
+            )),
+            (false, false) => Ok(()),
         }
     }
 
@@ -122,12 +140,7 @@ impl Chosen<'_> {
             )));
         }
         let curve = |&speed: &f64| {
-            let query = Query {
-                mass_kg: self.mass_kg,
-                rule: self.rule,
-                extrapolate: self.extrapolate,
-                ..Query::at(speed)
-            };
+            let query = Query { speed_m_per_s: speed, ..self.query.clone() };
             let (curve, beyond) = predict_beyond(model, &query)?;
             Ok(ExportInput { curve, beyond: Some(beyond) })
         };
@@ -135,8 +148,8 @@ impl Chosen<'_> {
     }
 
     fn of_database(&self, path: &Path, database: &Database) -> Result<Vec<Case>, Failure> {
-        if self.mass_kg.is_some() || self.rule.is_some() || self.extrapolate {
-            let message = "--mass, --max-crush and --extrapolate are for a model: a recorded case has its own mass and crush";
+        if self.asks_a_model() {
+            let message = "--mass, --max-crush, --extrapolate and --parameter are for a model: a recorded case has its own mass and crush";
             return Err(Failure::Usage(message.into()));
         }
         let (group, cases) = database.group_or_only(path, self.group)?;

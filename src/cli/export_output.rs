@@ -15,6 +15,8 @@ pub struct Destination<'a> {
     /// Standard output if absent.
     pub output: Option<&'a Path>,
     pub format: &'a Format,
+    /// Of the curves.
+    pub warnings: &'a [String],
 }
 
 /// A file that would go to standard output, within a JSON document.
@@ -23,6 +25,7 @@ struct Text<'a> {
     format: &'static str,
     text: String,
     notes: &'a [String],
+    warnings: &'a [String],
 }
 
 #[derive(Serialize)]
@@ -32,6 +35,7 @@ struct Document<'a> {
     output: String,
     files: Vec<String>,
     notes: &'a [String],
+    warnings: &'a [String],
 }
 
 impl Destination<'_> {
@@ -58,6 +62,7 @@ impl Destination<'_> {
                 output: path.display().to_string(),
                 files: files.iter().map(|f| f.display().to_string()).collect(),
                 notes,
+                warnings: self.warnings,
             });
         }
         output::print(|out| files.iter().try_for_each(|f| writeln!(out, "wrote {}", f.display())))
@@ -76,6 +81,7 @@ impl Destination<'_> {
                 format: name,
                 text: text.into(),
                 notes: &exported.notes,
+                warnings: self.warnings,
             }),
             Err(_) if options.json => {
                 Err(Failure::Usage(format!("{name} is binary: name a file with -o")))
@@ -89,12 +95,14 @@ impl Destination<'_> {
         if exported.files.len() == 1 && !path.is_dir() {
             return Ok(vec![path.into()]);
         }
-        if !path.is_dir() && path.extension().is_some() {
+        // A file's name for several; what is called .mme is a folder.
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        let names_a_file = self.format.extensions.contains(&extension);
+        if !path.is_dir() && names_a_file && !self.format.takes_case() {
             return Err(Failure::Usage(format!(
-                "-o {}: this export gives {} files: name a folder (without an extension), and the format with --to {}",
+                "-o {}: this export gives {} files: name a folder, and the kind of file with --to {extension}",
                 path.display(),
-                exported.files.len(),
-                self.format.name
+                exported.files.len()
             )));
         }
         Ok(exported.files.iter().map(|(name, _)| path.join(name)).collect())

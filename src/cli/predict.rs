@@ -110,7 +110,7 @@ fn files(
 ) -> Result<Vec<Vec<u8>>, Failure> {
     let mut files = Vec::new();
     for (path, format) in args.output.iter().zip(formats) {
-        let Exported { files: mut exported, notes } =
+        let Exported { files: mut exported, notes, .. } =
             args.target.export(format, input, Some(path))?;
         match (exported.pop(), exported.is_empty()) {
             (Some((_, bytes)), true) => files.push(bytes),

@@ -97,12 +97,13 @@ impl DrivingCurve {
     /// # Errors
     /// [`NoDrivingCurve`] if the case has no such curve.
     pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
-        if force == ForceKind::Body && case.force_kind == ForceKind::Contact {
+        let is_other = force == ForceKind::Body && case.force_kind == ForceKind::Contact;
+        if is_other && !case.moves_by_its_force() {
             return Self::recorded(case).ok_or(NoDrivingCurve::NoMotion);
         }
         Ok(Self {
             unloading: CurveUnloading::of(case.unloading_stiffness_n_per_m),
-            force: Some(case.force_kind),
+            force: Some(force),
             speed_kind: Some(case.speed.kind),
             speed_m_per_s: Some(case.speed.m_per_s),
             ..Self::bare(case.loading()?.envelope)

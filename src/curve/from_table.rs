@@ -11,7 +11,9 @@
 use std::sync::Arc;
 
 use super::contact;
-use super::extract::{self, ExtractError, Measured, MeasuredForce, Setup, Stated, StatedContact};
+use super::extract::{
+    self, ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact,
+};
 use super::recipe::{
     DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
 };
@@ -242,13 +244,8 @@ fn recorded(
         others: &[],
     };
     let extracted = extract::extract(&measured, &setup)?;
-    let mut warnings = extracted.warnings;
-    if let Some(stated) = impact.unloading_stiffness_n_per_m {
-        match unloading_of_record(extracted.unloading_stiffness_n_per_m, stated) {
-            Ok(note) => notes.push(note),
-            Err(warning) => warnings.push(warning),
-        }
-    }
+    let (of_unloading, warnings) = remarks(&extracted, impact)?;
+    notes.extend(of_unloading);
     notes.extend(extracted.notes);
     Ok(FromTable {
         sampled: extracted.sampled,
@@ -261,6 +258,40 @@ fn recorded(
         warnings,
     })
 }
+
+/// What is said of a record under an impact: notes and warnings.
+fn remarks(
+    extracted: &Extracted,
+    impact: &Impact,
+) -> Result<(Vec<String>, Vec<String>), FromTableError> {
+    let (mut notes, mut warnings) = (Vec::new(), extracted.warnings.clone());
+    if let Some(found) = other_speed(&extracted.closing_speed_m_per_s, impact.speed.m_per_s) {
+        if !impact.accept_energy {
+            let cause = "the times are in another unit, or the speed is that of another run".into();
+            return Err(FromTableError::Impossible { found, cause });
+        }
+        warnings.push(format!("accept_energy: {found}"));
+    }
+    if let Some(stated) = impact.unloading_stiffness_n_per_m {
+        match unloading_of_record(extracted.unloading_stiffness_n_per_m, stated) {
+            Ok(note) => notes.push(note),
+            Err(warning) => warnings.push(warning),
+        }
+    }
+    Ok((notes, warnings))
+}
+
+/// A record begins with its impact speed: what it begins with, if that is more than a quarter off.
+fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
+    let begins = closing_m_per_s.iter().take(FIRST_STATES).copied().fold(0.0, f64::max);
+    let ratio = begins / stated_m_per_s;
+    (!(0.8..=1.25).contains(&ratio)).then(|| {
+        format!("its deflection begins with {begins:.4} m/s, {stated_m_per_s:.4} m/s is stated")
+    })
+}
+
+/// States in which the speed of a record's beginning is looked for.
+const FIRST_STATES: usize = 4;
 
 /// What is said of a stated stiffness, in N/m, beside the one that the record holds: a note, or a warning
 /// if it holds none.

@@ -293,6 +293,13 @@ impl Case {
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
+    /// Whether its motion was made of its own force, as of an imported table without times: then
+    /// that force is also the one that moves the body.
+    pub(crate) fn moves_by_its_force(&self) -> bool {
+        let recipe: Option<serde_json::Value> = serde_json::from_str(&self.recipe).ok();
+        recipe.is_some_and(|r| r["imported"]["moves_by_its_force"] == true)
+    }
+
     /// Largest deflection, in m.
     pub fn max_deflection_m(&self) -> f64 {
         self.original.deflection_m[self.loading_end()]

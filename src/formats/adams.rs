@@ -22,6 +22,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
     let mut notes = Vec::new();
     let mut together = Lines::default();
     for (k, curve) in curves.iter().enumerate() {
+        let curve = &curve.begun_at_origin()?;
         let spline = Spline::of(curve, units, options.id + k as u32)?;
         notes.push(curve.restitution_note("Adams", TargetUnloading::Elastic));
         match extension {
@@ -34,7 +35,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
         files.push((format!("{stem}.{extension}"), together.into_bytes()));
     }
-    Ok(Exported { files, notes })
+    Ok(Exported { files, notes, ..Exported::default() })
 }
 
 struct Spline<'a> {

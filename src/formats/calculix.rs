@@ -24,6 +24,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
     let mut lines = Lines::default();
     let mut notes = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
+        let curve = &curve.begun_at_origin()?;
         let id = options.id + k as u32;
         let given = curve.deflection_m().len();
         let loading = thinned(&curve.loading, MOST_ROWS - 1, curve.end)?;
@@ -60,7 +61,11 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         }
     }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
-    Ok(Exported { files: vec![(format!("{stem}.inp"), lines.into_bytes())], notes })
+    Ok(Exported {
+        files: vec![(format!("{stem}.inp"), lines.into_bytes())],
+        notes,
+        ..Exported::default()
+    })
 }
 
 fn ascii(text: &str) -> String {

@@ -2,7 +2,7 @@
 
 use super::tail::{Tail, with_tail};
 use super::text::nine_digits;
-use super::thin::softened;
+use super::thin::{Softened, from_origin, softened};
 use super::{ExportError, Options};
 use crate::curve::{DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
@@ -34,8 +34,10 @@ pub struct ExportCurve {
     /// How the target goes on beyond the maximal crush.
     pub tail: Tail,
     follows_faster_runs: bool,
-    /// Whether a steep flank was made softer for the target.
-    pub is_softened: bool,
+    /// Largest force before and after, in N, where a steep flank was made less steep.
+    pub softening: Option<(f64, f64)>,
+    /// Ordinal among the curves of the same group and speed of one export, counted from 1.
+    pub ordinal: usize,
 }
 
 /// How a target lets go of the energy that it has stored at the maximal crush.
@@ -63,9 +65,18 @@ impl ExportCurve {
         let mut loading = predicted.envelope()?;
         let end = loading.deflection_m().len() - 1;
         let stiffness = predicted.unloading_stiffness_n_per_m;
-        let soft = if soften { softened(&loading, stiffness, end) } else { None };
-        let is_softened = soft.is_some();
-        loading = soft.unwrap_or(loading);
+        let own_peak_n = loading.peak_force_n();
+        let mut softening = None;
+        if soften {
+            match softened(&loading, stiffness, end) {
+                Softened::Nothing => {}
+                Softened::Curve(soft) => {
+                    softening = Some((own_peak_n, soft.peak_force_n()));
+                    loading = soft;
+                }
+                Softened::Impossible => return Err(ExportError::NotSoftened { stiffness }),
+            }
+        }
         let beyond = input.beyond.as_ref().map(|beyond| match force {
             ForceKind::Contact => &beyond.declared,
             ForceKind::Body => &beyond.body,
@@ -73,20 +84,22 @@ impl ExportCurve {
         let follows_faster_runs = beyond.is_some_and(|b| b.end_m() > loading.end_m());
         let with_tail = with_tail(&loading, beyond, stiffness, tail)?;
         let band = predicted.force_low_n.as_ref().zip(predicted.force_high_n.as_ref());
-        // In the tail the band is as wide as at the end, as a share of the force.
+        // In the tail the band is as wide as at the end. It is not that of a softened curve.
         let widened = |edge: &[f64]| -> Vec<f64> {
-            let share = edge[end] / loading.force_n()[end];
-            let tail = with_tail.force_n()[end + 1..].iter().map(|f| f * share);
+            let width = edge[end] - loading.force_n()[end];
+            let tail = with_tail.force_n()[end + 1..].iter().map(|f| (f + width).max(0.0));
             edge.iter().copied().chain(tail).collect()
         };
-        let band = band.map(|(low, high)| (widened(low), widened(high)));
+        let band =
+            band.filter(|_| softening.is_none()).map(|(low, high)| (widened(low), widened(high)));
         Ok(Self {
             loading: with_tail,
             end,
             band,
             tail,
             follows_faster_runs,
-            is_softened,
+            softening,
+            ordinal: 1,
             predicted,
         })
     }
@@ -94,6 +107,30 @@ impl ExportCurve {
     /// The same curve through other points; `end` is the index of the maximal crush among them.
     pub fn through(self, loading: Envelope, end: usize) -> Self {
         Self { loading, end, band: None, ..self }
+    }
+
+    /// The same curve for tools that need the origin: a force at contact is reached over a
+    /// thousandth of the maximal crush, with the same energy.
+    ///
+    /// # Errors
+    /// [`ExportError::Curve`] if that makes no curve.
+    pub fn begun_at_origin(&self) -> Result<Self, ExportError> {
+        Ok(match from_origin(&self.loading, self.end)? {
+            Some((loading, end)) => self.clone().through(loading, end),
+            None => self.clone(),
+        })
+    }
+
+    /// What softening has changed, in one line.
+    pub fn softening_note(&self) -> Option<String> {
+        let (before, after) = self.softening?;
+        Some(format!(
+            "{}: flanks steeper than {:.1} MN/m have been made less steep, with the same energy to the maximal crush; the largest force goes from {:.3} to {:.3} MN",
+            self.headline(),
+            self.stiffness_n_per_m() / 1e6,
+            before / 1e6,
+            after / 1e6
+        ))
     }
 
     /// Deflection at each point, in m.
@@ -148,12 +185,11 @@ impl ExportCurve {
 
     /// Speed of separation over impact speed, as the target unloads from the maximal crush.
     pub fn restitution(&self, unloading: TargetUnloading) -> f64 {
-        let mass = self.effective_mass_kg();
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
             TargetUnloading::Elastic => self.loading.work_to(self.max_crush_m()),
         };
-        (2.0 * stored_j / mass).sqrt() / self.predicted.speed_m_per_s
+        self.restitution_of(stored_j)
     }
 
     /// The law of crumple's own runs: it unloads with its stiffness. Beyond the last point the force
@@ -166,9 +202,16 @@ impl ExportCurve {
         ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
     }
 
-    /// Speed of separation over impact speed in crumple's own runs.
+    /// Speed of separation over impact speed in crumple's own runs, whose curve is not softened.
     pub fn own_restitution(&self) -> f64 {
-        self.restitution(TargetUnloading::Line(self.stiffness_n_per_m()))
+        let end_n = self.predicted.force_n.last().copied().unwrap_or_default();
+        let stored_j = 0.5 * end_n * end_n / self.stiffness_n_per_m();
+        self.restitution_of(stored_j)
+    }
+
+    /// Speed of separation over impact speed, from the energy in J that comes back.
+    fn restitution_of(&self, stored_j: f64) -> f64 {
+        (2.0 * stored_j / self.effective_mass_kg()).sqrt() / self.predicted.speed_m_per_s
     }
 
     /// What the target's unloading gives beside ours, in one line.
@@ -198,12 +241,6 @@ impl ExportCurve {
                 own / 1e6
             ));
         }
-        if self.is_softened {
-            notes.push(format!(
-                "the flank that was steeper than {:.1} MN/m has been made less steep, with the same energy to the maximal crush",
-                own / 1e6
-            ));
-        }
         notes
     }
 
@@ -219,7 +256,7 @@ impl ExportCurve {
 
     /// Group and speed as a file's name without its extension.
     pub fn file_stem(&self) -> String {
-        file_stem(&self.predicted)
+        numbered(file_stem(&self.predicted), self.ordinal)
     }
 
     /// Group and speed as an identifier of letters, digits and underscores.
@@ -237,7 +274,7 @@ impl ExportCurve {
         let curve = &self.predicted;
         let kind = curve.provenance.force_kind;
         let steepest = self.loading.max_slope();
-        vec![
+        let mut facts = vec![
             ("curve", self.headline()),
             ("force_kind", kind.name().into()),
             ("drives", kind.drives().into()),
@@ -255,7 +292,11 @@ impl ExportCurve {
             ("model", curve.model.clone()),
             ("training_hash", curve.provenance.training_hash.clone()),
             ("written_by", curve.provenance.written_by.clone()),
-        ]
+        ];
+        if let Some(other) = self.other_mass_kg() {
+            facts.insert(7, ("other_mass_kg", other.to_string()));
+        }
+        facts
     }
 
     /// The warnings of the prediction.
@@ -300,6 +341,11 @@ pub(super) fn file_stem(curve: &PredictedCurve) -> String {
     format!("{group}-{speed}")
 }
 
+/// A name that is told apart from earlier ones of the same kind.
+fn numbered(name: String, ordinal: usize) -> String {
+    if ordinal > 1 { format!("{name}-{ordinal}") } else { name }
+}
+
 /// A character that every file system takes in a name.
 pub(super) fn plain(c: char) -> char {
     if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }
@@ -319,6 +365,14 @@ impl Options {
         usual: Tail,
     ) -> Result<Vec<ExportCurve>, ExportError> {
         let tail = self.tail.unwrap_or(usual);
-        inputs.iter().map(|i| ExportCurve::new(i, self.force, tail, self.soften)).collect()
+        let mut curves: Vec<ExportCurve> = Vec::new();
+        for input in inputs {
+            let mut curve = ExportCurve::new(input, self.force, tail, self.soften)?;
+            let name = file_stem(&curve.predicted);
+            let same = curves.iter().filter(|c| file_stem(&c.predicted) == name);
+            curve.ordinal = 1 + same.count();
+            curves.push(curve);
+        }
+        Ok(curves)
     }
 }

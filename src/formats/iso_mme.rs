@@ -125,7 +125,7 @@ pub fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, ExportE
     for (k, channel) in channels.iter().enumerate() {
         files.push((format!("Channel/{name}.{:03}", k + 1), values(test, channel).into_bytes()));
     }
-    Ok(Exported { files, notes: Vec::new() })
+    Ok(Exported { files, ..Exported::default() })
 }
 
 /// A line of a header: the key padded to 28 columns.

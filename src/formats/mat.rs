@@ -37,7 +37,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
     }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
-    Ok(Exported { files: vec![(format!("{stem}.mat"), bytes)], notes })
+    Ok(Exported { files: vec![(format!("{stem}.mat"), bytes)], notes, ..Exported::default() })
 }
 
 fn columns(rows: &[(f64, f64)]) -> Vec<Vec<f64>> {

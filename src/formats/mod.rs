@@ -27,8 +27,8 @@ use std::path::Path;
 
 use crate::curve::{Case, EnvelopeError, ForceKind};
 use crate::forest::OnnxError;
-use crate::surrogate::Model;
 use crate::surrogate::predict::PredictError;
+use crate::surrogate::{Model, Query};
 use crate::unit::UnitSystem;
 
 pub use export_curve::{ExportCurve, ExportInput, TargetUnloading};
@@ -178,6 +178,8 @@ pub struct Options {
     pub extension: Option<String>,
     /// Speeds in m/s of a table over speeds; none for even steps over the training speeds.
     pub speeds_m_per_s: Vec<f64>,
+    /// Mass, rule and parameters of a table; its speed is not used.
+    pub query: Query,
 }
 
 impl Default for Options {
@@ -192,6 +194,7 @@ impl Default for Options {
             deck: false,
             extension: None,
             speeds_m_per_s: Vec::new(),
+            query: Query::at(0.0),
         }
     }
 }
@@ -204,12 +207,14 @@ pub struct Exported {
     pub files: Vec<(String, Vec<u8>)>,
     /// What the user should know of what the target makes of the curves.
     pub notes: Vec<String>,
+    /// Warnings of the curves that were made for it.
+    pub warnings: Vec<String>,
 }
 
 impl Exported {
     /// One file and nothing to say.
     pub(crate) fn file(name: impl Into<String>, bytes: Vec<u8>) -> Self {
-        Self { files: vec![(name.into(), bytes)], notes: Vec::new() }
+        Self { files: vec![(name.into(), bytes)], ..Self::default() }
     }
 }
 
@@ -261,6 +266,14 @@ pub enum ExportError {
     /// The curve lacks the force, or is damaged.
     #[error(transparent)]
     Predict(Box<PredictError>),
+    /// Softening would change more than the flanks.
+    #[error(
+        "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften", stiffness / 1e6
+    )]
+    NotSoftened {
+        /// The unloading stiffness, in N/m.
+        stiffness: f64,
+    },
     /// What was made of the curve is none.
     #[error("the curve cannot be prepared: {0}")]
     Curve(#[from] EnvelopeError),
@@ -346,7 +359,15 @@ impl Format {
         let Writer::Case(write) = self.writer else {
             return Err(self.unfit("curves: it has no histories"));
         };
-        let all = cases.iter().map(|case| write(case, options)).collect::<Result<_, _>>()?;
+        let mut all =
+            cases.iter().map(|case| write(case, options)).collect::<Result<Vec<_>, _>>()?;
+        if let [_, _, ..] = &all[..] {
+            // Each test has a folder of its own.
+            for (exported, case) in all.iter_mut().zip(cases) {
+                let folder: String = case.name.chars().map(export_curve::plain).collect();
+                exported.files.iter_mut().for_each(|f| f.0 = format!("{folder}/{}", f.0));
+            }
+        }
         Ok(joined(all))
     }
 
@@ -380,11 +401,19 @@ impl Format {
             }
             Writer::Each(write) => {
                 let curves = options.ready(inputs, self.tail)?;
-                joined(curves.iter().map(|c| write(c, options)).collect::<Result<_, _>>()?)
+                let files = curves.iter().map(|c| write(c, options)).collect::<Result<_, _>>()?;
+                with_notes(joined(files), &curves)
             }
-            Writer::Together(write) => write(&options.ready(inputs, self.tail)?, options)?,
+            Writer::Together(write) => {
+                let curves = options.ready(inputs, self.tail)?;
+                with_notes(write(&curves, options)?, &curves)
+            }
         };
-        Ok(with_names_of_their_own(exported))
+        let mut exported = with_names_of_their_own(exported);
+        if options.deck && options.force == ForceKind::Contact {
+            exported.notes.push("the deck's one mass moves by the contact force, which one rigid mass does not follow (mass that the crush zone stops early is in it): its crush and rebound are not the run's; the body force is for that".into());
+        }
+        Ok(exported)
     }
 
     fn unfit(&self, needs: impl Into<String>) -> ExportError {
@@ -405,8 +434,15 @@ fn joined(all: Vec<Exported>) -> Exported {
     for one in all {
         whole.files.extend(one.files);
         whole.notes.extend(one.notes);
+        whole.warnings.extend(one.warnings);
     }
     whole
+}
+
+/// What has been done to the curves, behind the target's own notes.
+fn with_notes(mut exported: Exported, curves: &[ExportCurve]) -> Exported {
+    exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
+    exported
 }
 
 /// Curves of one speed would overwrite each other's files: the later ones are numbered.
@@ -429,9 +465,12 @@ fn with_names_of_their_own(mut exported: Exported) -> Exported {
 /// # Errors
 /// [`ExportError::NoSuchFormat`] lists the names there are.
 pub fn by_name(name: &str) -> Result<&'static Format, ExportError> {
+    // "--to spr" names one of the kinds of file of a format.
+    let by_kind = || FORMATS.iter().find(|f| f.extensions.contains(&name));
     FORMATS
         .iter()
         .find(|f| f.name == name)
+        .or_else(by_kind)
         .ok_or_else(|| ExportError::NoSuchFormat { name: name.into(), known: names() })
 }
 

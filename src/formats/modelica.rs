@@ -77,7 +77,11 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
         }
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
     }
-    Exported { files: vec![(format!("{stem}.txt"), lines.into_bytes())], notes }
+    Exported {
+        files: vec![(format!("{stem}.txt"), lines.into_bytes())],
+        notes,
+        ..Exported::default()
+    }
 }
 
 /// A constant array.

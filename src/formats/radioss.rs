@@ -21,10 +21,13 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         return Err(ExportError::Unfit { format: "radioss --deck", needs });
     }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
+    // It names the run, too.
+    let stem: String = stem.chars().take(TITLE_WIDTH - 20).collect();
     let mut lines = Lines::default();
     let mut notes = Vec::new();
     let mut files = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
+        let curve = &curve.begun_at_origin()?;
         let units = curve.predicted.provenance.study_units;
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         let id = options.id + k as u32;
@@ -44,7 +47,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         true => files.insert(0, (format!("{stem}_0000.rad"), lines.into_bytes())),
         false => files.push((format!("{stem}.rad"), lines.into_bytes())),
     }
-    Ok(Exported { files, notes })
+    Ok(Exported { files, notes, ..Exported::default() })
 }
 
 fn begin(lines: &mut Lines, curve: &ExportCurve, units: InUnits, stem: &str) {
@@ -168,12 +171,12 @@ fn model(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
         lines.add(format_args!("#  Tra rot   skew_ID  grnod_ID"));
         lines.add(format_args!("   {along}11 111{:>10}{node:>10}", 0));
     }
-    for (kind, id) in [("NODE", 2), ("SPRING", 1)] {
-        lines.add(format_args!("/TH/{kind}/{id}"));
+    for (kind, ids) in [("NODE", &[1, 2][..]), ("SPRING", &[1])] {
+        lines.add(format_args!("/TH/{kind}/1"));
         lines.add(format_args!("{}", kind.to_lowercase()));
         lines.add(format_args!("#      var"));
         lines.add(format_args!("DEF"));
-        lines.add(format_args!("{id:>10}"));
+        ids.iter().for_each(|id| lines.add(format_args!("{id:>10}")));
     }
     lines.add(format_args!("/END"));
 }

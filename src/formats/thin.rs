@@ -1,5 +1,8 @@
 //! Fewer points for tools with small tables, more for tools that interpolate by splines.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use crate::curve::{Envelope, EnvelopeError};
 
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
@@ -11,16 +14,7 @@ use crate::curve::{Envelope, EnvelopeError};
 /// [`EnvelopeError`] if the result is no envelope.
 pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
-    let mut left: Vec<usize> = (0..d.len()).collect();
-    while left.len() > most.max(3) {
-        let area = |w: &[usize]| {
-            let (a, b, c) = (w[0], w[1], w[2]);
-            0.5 * ((d[b] - d[a]) * (f[c] - f[a]) - (d[c] - d[a]) * (f[b] - f[a])).abs()
-        };
-        let areas = left.windows(3).enumerate().filter(|(_, w)| w[1] != kept);
-        let Some((i, _)) = areas.min_by(|a, b| area(a.1).total_cmp(&area(b.1))) else { break };
-        left.remove(i + 1);
-    }
+    let left = kept_points(d, f, most.max(3), kept);
     let mut force_n: Vec<f64> = left.iter().map(|&i| f[i]).collect();
     let deflection_m: Vec<f64> = left.iter().map(|&i| d[i]).collect();
     let plain = Envelope::new(deflection_m.clone(), force_n.clone())?;
@@ -30,6 +24,43 @@ pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, E
         force_n[..until].iter_mut().for_each(|f| *f *= scale);
     }
     Envelope::new(deflection_m, force_n)
+}
+
+/// Indices of the points that are left when the one with the smallest triangle is removed again and
+/// again; the ends and `kept` stay.
+fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
+    let n = d.len();
+    let (mut before, mut after): (Vec<usize>, Vec<usize>) =
+        (0..n).map(|i| (i.saturating_sub(1), (i + 1).min(n - 1))).unzip();
+    let area = |a: usize, b: usize, c: usize| {
+        0.5 * ((d[b] - d[a]) * (f[c] - f[a]) - (d[c] - d[a]) * (f[b] - f[a])).abs()
+    };
+    let mut areas: Vec<f64> = (0..n).map(|i| area(before[i], i, after[i])).collect();
+    // Smallest first: bits of numbers that are not below 0 are in the numbers' order.
+    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (1..n.saturating_sub(1))
+        .filter(|&i| i != kept)
+        .map(|i| Reverse((areas[i].to_bits(), i)))
+        .collect();
+    let mut is_left = vec![true; n];
+    let mut left = n;
+    while left > most {
+        let Some(Reverse((bits, i))) = queue.pop() else { break };
+        // An entry from before a neighbour was removed.
+        if !is_left[i] || bits != areas[i].to_bits() {
+            continue;
+        }
+        is_left[i] = false;
+        left -= 1;
+        let (a, c) = (before[i], after[i]);
+        (after[a], before[c]) = (c, a);
+        for k in [a, c] {
+            if k != 0 && k != n - 1 && k != kept {
+                areas[k] = area(before[k], k, after[k]);
+                queue.push(Reverse((areas[k].to_bits(), k)));
+            }
+        }
+    }
+    (0..n).filter(|&i| is_left[i]).collect()
 }
 
 /// Fewest points of a table that splines go through.
@@ -72,13 +103,34 @@ pub fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
     Envelope::new(deflection_m, force_n)
 }
 
+/// What came of making steep flanks less steep.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Softened {
+    /// There is none that steep.
+    Nothing,
+    /// The softer curve.
+    Curve(Envelope),
+    /// The energy could only be kept by changing the curve's end, or forces by more than a quarter.
+    Impossible,
+}
+
 /// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
-/// `end`: a too steep flank begins earlier on its line, and the peak behind it is raised for what
-/// the flank has lost. `None` if no rise is that steep, or if the energy cannot be kept.
-pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelope> {
-    if curve.max_slope() <= stiffness_n_per_m {
-        return None;
+/// `end`: a too steep flank begins earlier on its line, and the forces around it are raised for what
+/// the flank has lost, by a quarter at most and not in the last twentieth of the deflection.
+pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Softened {
+    if curve.max_slope() <= stiffness_n_per_m * (1.0 + 1e-9) {
+        return Softened::Nothing;
     }
+    let found = soften(curve, stiffness_n_per_m, end);
+    // The body rebounds from the end's force.
+    let keeps_end = |c: &Envelope| {
+        (c.force_n()[end] - curve.force_n()[end]).abs() <= SAME_END * curve.force_n()[end]
+    };
+    let is_soft = |c: &Envelope| c.max_slope() <= stiffness_n_per_m * (1.0 + 1e-6);
+    found.filter(|c| is_soft(c) && keeps_end(c)).map_or(Softened::Impossible, Softened::Curve)
+}
+
+fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelope> {
     let d = curve.deflection_m();
     let wanted_j = curve.work_to(d[end]);
     // Raised before the rise is limited, so that no limited slope is steep again.
@@ -93,10 +145,11 @@ pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<
     };
     let limited = with(1.0, 0)?;
     let last = (0..=end).rfind(|&i| limited.force_n()[i] < curve.force_n()[i])?;
+    let most = d.partition_point(|&x| x <= REACH * d[end]).saturating_sub(1).max(1);
     // What is raised: twice as far as the limit reaches, more if that does not suffice.
-    let mut until = (2 * last).clamp(1, end);
+    let mut until = (2 * last).clamp(1, most);
     loop {
-        let (mut low, mut high) = (1.0_f64, 2.0_f64);
+        let (mut low, mut high) = (1.0_f64, MOST_RAISED);
         if with(high, until)?.work_to(d[end]) >= wanted_j {
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
@@ -107,12 +160,49 @@ pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<
             }
             return with(high, until);
         }
-        if until == end {
+        if until == most {
             return None;
         }
-        until = (2 * until).min(end);
+        until = (2 * until).min(most);
     }
 }
+
+/// Share by which the force at the maximal crush may change.
+const SAME_END: f64 = 0.01;
+/// Up to this share of the maximal crush forces may be raised: the end, from which a body rebounds,
+/// stays.
+const REACH: f64 = 0.95;
+/// Forces are raised by at most this factor.
+const MOST_RAISED: f64 = 1.25;
+
+/// The curve from the origin: a force at zero deflection is reached within a thousandth of the deflection of
+/// `end`, at the same energy to there. The second value is the index of `end` among the points. `None` for a
+/// curve that begins at the origin already.
+///
+/// # Errors
+/// [`EnvelopeError`] if the result is no envelope.
+pub fn from_origin(
+    curve: &Envelope,
+    end: usize,
+) -> Result<Option<(Envelope, usize)>, EnvelopeError> {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    if f[0] <= 0.0 {
+        return Ok(None);
+    }
+    let ramp_m = (RAMP * d[end]).min(0.5 * d[1]);
+    let mut deflection_m = d.to_vec();
+    let mut force_n = f.to_vec();
+    deflection_m.insert(1, ramp_m);
+    force_n.insert(1, curve.force_at(ramp_m));
+    force_n[0] = 0.0;
+    let plain = Envelope::new(deflection_m.clone(), force_n.clone())?;
+    let scale = curve.work_to(d[end]) / plain.work_to(d[end]);
+    force_n[..=end + 1].iter_mut().for_each(|f| *f *= scale);
+    Ok(Some((Envelope::new(deflection_m, force_n)?, end + 1)))
+}
+
+/// A force at contact is reached over this share of the maximal crush.
+const RAMP: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
@@ -159,11 +249,23 @@ mod tests {
     }
 
     #[test]
+    fn a_force_at_contact_begins_at_the_origin_with_the_same_energy() {
+        let constant = Envelope::new(vec![0.0, 0.2, 1.0], vec![2e6; 3]).unwrap();
+        let (ramped, end) = from_origin(&constant, 2).unwrap().unwrap();
+        assert_eq!((ramped.force_n()[0], ramped.deflection_m()[end]), (0.0, 1.0));
+        assert!((ramped.work() / constant.work() - 1.0).abs() < 1e-12);
+        assert!((ramped.force_at(0.5) / 2e6 - 1.0).abs() < 1e-3);
+        assert_eq!(from_origin(&ramped, end).unwrap(), None);
+    }
+
+    #[test]
     fn a_softened_flank_keeps_the_energy() {
-        let soft = softened(&curve(), 200e6, 400).unwrap();
+        let Softened::Curve(soft) = softened(&curve(), 200e6, 400) else { panic!("not softened") };
         assert!(soft.max_slope() <= 200e6 * (1.0 + 1e-9));
         assert!((soft.work() / curve().work() - 1.0).abs() < 1e-9);
         assert_eq!(soft.force_n()[0], 0.0);
-        assert_eq!(softened(&curve(), 700e6, 400), None);
+        assert_eq!(soft.force_n()[381..], curve().force_n()[381..]);
+        assert_eq!(softened(&curve(), 700e6, 400), Softened::Nothing);
+        assert_eq!(softened(&curve(), 1e6, 400), Softened::Impossible);
     }
 }

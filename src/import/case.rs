@@ -111,6 +111,8 @@ struct Imported<'a> {
     curve: Option<&'a str>,
     /// Whether the motion is that of the file's times.
     has_times: bool,
+    /// Whether the motion was made of the case's own force, which then moves the body, too.
+    moves_by_its_force: bool,
     force: ForceKind,
     speed_m_per_s: f64,
     mass_kg: f64,
@@ -140,6 +142,7 @@ fn recipe(
             format,
             curve: settings.read.curve.as_deref(),
             has_times: curve.time_s.is_some(),
+            moves_by_its_force: curve.time_s.is_none() && curve.body_force_n.is_none(),
             force: said.force,
             speed_m_per_s: said.speed.m_per_s,
             mass_kg: said.masses.body_kg,

@@ -154,6 +154,25 @@ impl PredictedCurve {
                 "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
             )));
         }
+        for (name, value) in [
+            ("speed_m_per_s", Some(self.speed_m_per_s)),
+            ("mass_kg", Some(self.mass_kg)),
+            ("max_deflection_m", Some(self.max_deflection_m)),
+            ("body_unloading_stiffness_N_per_m", self.body_unloading_stiffness_n_per_m),
+        ] {
+            if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+                return Err(PredictError::Damaged(format!(
+                    "{name} is {value}: expected more than 0"
+                )));
+            }
+        }
+        let end = self.deflection_m.last().copied().unwrap_or_default();
+        if (end / self.max_deflection_m - 1.0).abs() > SAME_END {
+            return Err(PredictError::Damaged(format!(
+                "max_deflection_m is {}, but the points end at {end} m",
+                self.max_deflection_m
+            )));
+        }
         for (name, band) in [
             ("force_low_N", &self.force_low_n),
             ("force_high_N", &self.force_high_n),
@@ -170,12 +189,7 @@ impl PredictedCurve {
             }
         }
         let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
-        match envelope.first_pulling_point() {
-            Some(point) => Err(PredictError::Damaged(format!(
-                "force_N of point {point} is below 0: an interface only pushes"
-            ))),
-            None => Ok(envelope),
-        }
+        pushing("force_N", envelope)
     }
 
     /// The curve of one force alone, with the unloading that belongs to it. What is of the
@@ -307,11 +321,27 @@ impl PredictedCurve {
     pub(crate) fn driving_envelope(&self) -> Result<Envelope, PredictError> {
         let declared = self.envelope()?;
         match &self.body_force_n {
-            Some(force_n) => Ok(Envelope::new(self.deflection_m.clone(), force_n.clone())?),
+            Some(force_n) => {
+                let envelope = Envelope::new(self.deflection_m.clone(), force_n.clone())?;
+                pushing("body_force_N", envelope)
+            }
             None if self.provenance.force_kind == ForceKind::Contact => {
                 Err(PredictError::NoBodyForce)
             }
             None => Ok(declared),
         }
+    }
+}
+
+/// The last point may differ by this share from the maximal crush beside it.
+const SAME_END: f64 = 1e-6;
+
+/// An envelope of the forces called `name`, none of which pulls.
+fn pushing(name: &str, envelope: Envelope) -> Result<Envelope, PredictError> {
+    match envelope.first_pulling_point() {
+        Some(point) => Err(PredictError::Damaged(format!(
+            "{name} of point {point} is below 0: an interface only pushes"
+        ))),
+        None => Ok(envelope),
     }
 }

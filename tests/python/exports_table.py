@@ -10,6 +10,17 @@ with h5py.File(sys.argv[1]) as file:
     shape = list(file["force_N"].shape)
     speeds, deflections = len(file["speed_m_per_s"]), len(file["deflection_m"])
     assert isinstance(file.attrs["force_kind"], str)
+    # Each row's work to its maximal crush, against the curve that crumple gives at that speed.
+    curves = json.load(open(sys.argv[3]))
+    deflection = file["deflection_m"][:]
+    worst = 0.0
+    for speed, end, row in zip(file["speed_m_per_s"], file["max_deflection_m"], file["force_N"]):
+        own = next((c for c in curves if abs(c["speed_m_per_s"] / speed - 1) < 1e-9), None)
+        if own:
+            fine = numpy.unique(numpy.append(deflection[deflection < end], end))
+            work = numpy.trapezoid(numpy.interp(fine, deflection, row), fine)
+            energy = numpy.trapezoid(own["body_force_N"], own["deflection_m"])
+            worst = max(worst, abs(work / energy - 1))
 lines = [line for line in open(sys.argv[2]) if line[0].isdigit()]
 table = numpy.loadtxt(lines, delimiter=",")
 keep = abs(table[:, 0] - 50 / 3.6) < 1e-6
@@ -18,6 +29,7 @@ json.dump(
         "shape": shape,
         "speeds": speeds,
         "deflections": deflections,
+        "worst_energy": worst,
         "at_50kmh": [table[keep, 1].tolist(), table[keep, 2].tolist()],
     },
     sys.stdout,

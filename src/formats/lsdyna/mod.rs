@@ -74,6 +74,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
     let mut notes = Vec::new();
     lines.add(format_args!("*KEYWORD"));
     for (k, curve) in curves.iter().enumerate() {
+        let curve = &curve.begun_at_origin()?;
         let units = curve.predicted.provenance.study_units;
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         let first = options.id + 2 * k as u32;
@@ -91,7 +92,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
     }
     lines.add(format_args!("*END"));
     let name = format!("{}.k", curves.first().map_or("curves".into(), ExportCurve::file_stem));
-    Ok(Exported { files: vec![(name, lines.into_bytes())], notes })
+    Ok(Exported { files: vec![(name, lines.into_bytes())], notes, ..Exported::default() })
 }
 
 /// What the material's unloading gives beside ours.
@@ -150,7 +151,8 @@ fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Id
     lines.add(format_args!(
         "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
         ids.material,
-        "1.0e-12",
+        // A discrete beam needs a mass of its own: with VOL 1, a millionth of the body's.
+        ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg),
         ten_columns(units.stiffness(curve.stiffness_n_per_m())),
         "2.0",
         "0.0",
