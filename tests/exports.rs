@@ -477,6 +477,35 @@ fn an_imported_curve_is_exported_as_it_was() {
     }
 }
 
+/// What the command line says of an imported curve wins, and the differences from the file are named; a pair keeps its
+/// other mass on the way out and in.
+#[test]
+fn what_is_said_of_an_import_and_what_its_file_says() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "vehicle.model", "pair.csv", &["--speed", "36km/h", "--tail", "none"]);
+    let text = fs::read_to_string(here.join("pair.csv")).unwrap();
+    assert!(text.contains("# other_mass_kg: 20240"));
+    fs::write(
+        here.join("uneven.csv"),
+        text.replace("# other_mass_kg: 20240", "# other_mass_kg: 22000"),
+    )
+    .unwrap();
+    let add = |file: &str, group: &str, more: &[&str]| -> Value {
+        let arguments =
+            [&["db", "add", "said.h5", file, "--group", group, "--json"][..], more].concat();
+        serde_json::from_str(&crumple_ok(here, &arguments)).unwrap()
+    };
+    let added = add("uneven.csv", "pair", &[]).to_string();
+    let shown = crumple_ok(here, &["db", "ls", "said.h5", "--json"]);
+    assert!(shown.contains("\"other_mass_kg\": 22000.0"), "{added} {shown}");
+    let said =
+        add("pair.csv", "wall", &["--kind", "wall", "--unloading", "30MN/m", "--accept-energy"]);
+    let said = said.to_string();
+    assert!(said.contains("the file says closing, wall is used"), "{said}");
+    assert!(said.contains("unloading stiffness: the file says"), "{said}");
+}
+
 /// A whole group goes into one file or one folder; a model gives any speeds.
 #[test]
 fn groups_and_several_speeds_are_exported_at_once() {

@@ -29,6 +29,7 @@ impl Said {
         let m_per_s = both.speed()?;
         let masses = both.masses(kind)?;
         let force = both.force()?;
+        both.unloading()?;
         let (notes, warnings) = (both.notes, both.warnings);
         Ok(Self { speed: Speed { m_per_s, kind }, masses, force, notes, warnings })
     }
@@ -74,6 +75,12 @@ impl Both<'_> {
     }
 
     fn kind(&mut self, group: Option<&Case>) -> Result<SpeedKind, ImportError> {
+        if let (Some(stated), Some(found)) = (self.settings.kind, self.facts.speed_kind)
+            && stated != found
+        {
+            let (stated, found) = (stated.name(), found.name());
+            self.warnings.push(format!("speed: the file says {found}, {stated} is used"));
+        }
         match (self.settings.kind, self.facts.speed_kind, group) {
             (Some(kind), ..) | (None, Some(kind), _) => Ok(kind),
             (None, None, Some(case)) => {
@@ -112,6 +119,14 @@ impl Both<'_> {
             }
         };
         Ok(Masses { body_kg, other_kg })
+    }
+
+    /// Says where the stated unloading stiffness is not the file's; which is used is decided elsewhere.
+    fn unloading(&mut self) -> Result<(), ImportError> {
+        let stated = self.settings.unloading_stiffness_n_per_m;
+        let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
+        let shown = |k: f64| format!("{:.4} MN/m", k / 1e6);
+        self.either("unloading stiffness", both, shown).map(|_| ())
     }
 
     fn force(&mut self) -> Result<ForceKind, ImportError> {
