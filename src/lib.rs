@@ -31,6 +31,14 @@
 
 pub mod unit;
 
+mod clock;
+
+mod guess;
+
+pub mod plural;
+
+pub mod plot;
+
 pub mod history;
 
 pub mod signal;
@@ -51,7 +59,11 @@ pub mod database;
 
 pub mod build;
 
+pub mod init;
+
 pub mod dataset;
+
+pub mod curate;
 
 mod piecewise;
 
@@ -80,5 +92,11 @@ pub mod sweep;
 pub mod rating;
 
 pub mod assess;
+
+pub mod charts;
+
+pub mod report;
+
+pub mod failure;
 
 pub mod file;

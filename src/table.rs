@@ -42,7 +42,18 @@ impl<'a> CsvTable<'a> {
     /// If the header is no UTF-8.
     pub(crate) fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
-        let separator = separator(text);
+        Self::separated(text, lines_before, separator(text))
+    }
+
+    /// The same, where what separates the columns is known.
+    ///
+    /// # Errors
+    /// If the header is no UTF-8.
+    pub(crate) fn separated(
+        text: &'a [u8],
+        lines_before: u64,
+        separator: u8,
+    ) -> Result<Self, csv::Error> {
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
@@ -87,6 +98,11 @@ impl Row {
         self.record.get(field).unwrap_or_default()
     }
 
+    /// The texts of all fields.
+    pub(crate) fn fields(&self) -> impl Iterator<Item = &str> {
+        self.record.iter()
+    }
+
     /// The finite number in a field, counted from 0; between semicolons or tabs with a decimal
     /// comma or point.
     ///
@@ -112,7 +128,7 @@ impl Row {
 
 /// What separates the columns of the first line of `text` that is no comment (`#`): the first
 /// comma, semicolon or tab outside of quotes.
-fn separator(text: &[u8]) -> u8 {
+pub(crate) fn separator(text: &[u8]) -> u8 {
     let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
     let mut lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     let header = lines.find(|line| !line.is_empty() && line[0] != b'#').unwrap_or_default();

@@ -3,7 +3,19 @@
 //! Everything inside is SI. A number typed by a user carries its unit
 //! (`36km/h`, `24t`, `0.75ms`); a solver's file carries none, so a
 //! [`UnitSystem`] is declared once in the study manifest.
+//!
+//! ```
+//! use crumple::unit::{MASS, SPEED, UnitSystem, km_per_h};
+//!
+//! assert_eq!(SPEED.parse("36km/h")?, 10.0);
+//! assert_eq!(MASS.parse("24t")?, 24_000.0);
+//! // Megagrams, millimetres and seconds make newtons.
+//! assert_eq!(UnitSystem::parse("mm-t-s")?.force(), 1.0);
+//! assert_eq!(km_per_h(10.0), "36 km/h");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+use crate::guess;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -71,7 +83,10 @@ pub enum UnitError {
         example: String,
     },
     /// The unit does not belong to this kind of quantity.
-    #[error("{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}")]
+    #[error(
+        "{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}{}",
+        guess::hint(unit, known)
+    )]
     UnknownUnit {
         /// What kind of quantity was expected.
         what: &'static str,
@@ -104,7 +119,8 @@ pub enum UnitError {
     },
     /// The text names no unit system.
     #[error(
-        "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\""
+        "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\"{}",
+        guess::hint(text, "SI, mm-t-s, kg-mm-ms, m-kg-s, mm-kg-ms, mm-g-ms")
     )]
     UnknownSystem {
         /// The text as given.
@@ -342,6 +358,21 @@ impl UnitSystem {
     pub fn force(&self) -> f64 {
         self.mass_kg * self.acceleration()
     }
+
+    /// Names of its units of length, mass and time; `?` for one that has none.
+    pub(crate) fn names(&self) -> (&'static str, &'static str, &'static str) {
+        let name = |table: &[(&'static str, f64)], size: f64| {
+            table.iter().find(|(_, unit)| *unit == size).map_or("?", |(name, _)| *name)
+        };
+        (name(LENGTHS, self.length_m), name(MASSES, self.mass_kg), name(TIMES, self.time_s))
+    }
+}
+
+/// The name among `names`, each a thousand times the one before from an SI unit on, of a unit of
+/// that size in SI; else what the system's units make of it.
+pub(crate) fn named_or(size: f64, names: &[&str], made: impl FnOnce() -> String) -> String {
+    let is_size = |k: usize| (size / 1e3f64.powi(k as i32) - 1.0).abs() < 1e-9;
+    names.iter().enumerate().find(|(k, _)| is_size(*k)).map_or_else(made, |(_, n)| n.to_string())
 }
 
 fn size_in(table: &[(&str, f64)], unit: &str) -> Option<f64> {
@@ -359,11 +390,8 @@ impl fmt::Display for UnitSystem {
         if *self == Self::SI {
             return f.write_str("SI");
         }
-        let name = |table: &[(&'static str, f64)], size: f64| {
-            table.iter().find(|(_, unit)| *unit == size).map_or("?", |(name, _)| name)
-        };
-        let (length, mass) = (name(LENGTHS, self.length_m), name(MASSES, self.mass_kg));
-        write!(f, "{length}-{mass}-{}", name(TIMES, self.time_s))
+        let (length, mass, time) = self.names();
+        write!(f, "{length}-{mass}-{time}")
     }
 }
 
@@ -507,7 +535,7 @@ mod tests {
         t(
             &SPEED,
             "36kmh",
-            "speed \"36kmh\" has the unknown unit \"kmh\": use one of km/h, m/s, mm/ms, mm/s, mph",
+            "speed \"36kmh\" has the unknown unit \"kmh\": use one of km/h, m/s, mm/ms, mm/s, mph; did you mean \"km/h\"?",
         );
         t(&MASS, "t24", "mass \"t24\" is not a number with a unit: write for example 24t");
         t(&SPEED, "1e999m/s", "speed \"1e999m/s\" is out of range: it must be finite");

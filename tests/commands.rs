@@ -526,7 +526,15 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     // All three files hold the same curve: JSON both forces, the others that of one mass.
     let written: Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
-    assert_eq!(written, curve);
+    // What is printed says beside it what each file's target makes of the curve.
+    let mut printed = curve.clone();
+    let exports = printed.as_object_mut().unwrap().remove("exports").unwrap();
+    assert_eq!(written, printed);
+    let of = |k: usize, key: &str| exports[k][key].to_string();
+    assert_eq!((of(1, "output"), of(1, "format")), ("\"a.csv\"".into(), "\"csv\"".into()));
+    assert_eq!(of(0, "notes"), "[]");
+    assert!(of(1, "notes").contains("written without a band"), "{exports}");
+    assert!(of(2, "notes").contains("restitution"), "{exports}");
     let csv = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
     let csv: Vec<(f64, f64)> = csv
         .lines()
@@ -779,6 +787,7 @@ fn wall_curves_do_not_drive_pairs() {
 #[test]
 fn every_command_has_help_with_examples() {
     for command in [
+        "init",
         "inspect",
         "histories",
         "build",
@@ -807,6 +816,9 @@ fn json_is_one_document() {
     let here = folder.path();
     for line in [
         "inspect fe/lead-car-wall/36kmh/nodout",
+        "inspect fe",
+        "init fe/lead-car-wall",
+        "init --scenario lead.model -o new.toml",
         "histories fe/lead-car-wall/36kmh/rwforc",
         "histories fe/lead-car-wall/36kmh/rwforc -o a.csv",
         "build fe/lead-car-wall/study.toml -o curves.h5",

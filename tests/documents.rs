@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::common::{build_fixture, crumple_in, crumple_ok, fixture, python, root};
+use crate::common::{
+    build_fixture, crumple_in, crumple_ok, demo_folder, fixture, python, python_of, root,
+};
 use serde_json::{Value, json};
 
 /// Documents by name, each with its schema.
@@ -59,9 +61,10 @@ fn databases(folder: &Path) {
             let part = part.replace("path  = \"", &path);
             text += &format!("[[run]]\nname = \"{name}{i}\"{part}");
         }
-        let path = folder.join("again.toml");
-        std::fs::write(&path, text).unwrap();
-        crumple_ok(folder, &["build", "again.toml", "-o", "curves.h5", "-q"]);
+        // A manifest each: one that is changed is a study that was renamed.
+        let path = format!("{group}-{name}.toml");
+        std::fs::write(folder.join(&path), text).unwrap();
+        crumple_ok(folder, &["build", &path, "-o", "curves.h5", "-q"]);
     };
     rebuilt("lead-car-wall", "two-runs", "w", 2);
     rebuilt("lead-car-wall", "three-runs", "w", 3);
@@ -167,6 +170,92 @@ fn documents_are_those_of_the_schemas() {
     ];
     let found = errors(&wrong);
     assert!(found.values().all(|errors| !errors.is_empty()), "{found:?}");
+}
+
+/// The recipes of docs/databases.md run, one after the other in the demo's folder, and print what
+/// stands behind them.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn recipes_for_databases_run() {
+    let path = root().join("docs/databases.md");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let folder = demo_folder();
+    let (mut out, mut block, mut printed) = (String::new(), None, None);
+    let (mut script, mut recipes) = (String::new(), 0);
+    for line in text.split_inclusive('\n') {
+        match (block, line.trim_end()) {
+            (None, fence) if fence.starts_with("```") => block = Some(&fence[3..]),
+            (Some("python"), "```") => {
+                let mut python = python_of("CRUMPLE_PYTHON_TABLES");
+                let output =
+                    python.args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+                let error = String::from_utf8_lossy(&output.stderr);
+                assert!(output.status.success(), "{script}\n{error}");
+                printed = Some(String::from_utf8(output.stdout).unwrap());
+                (script, block, recipes) = (String::new(), None, recipes + 1);
+            }
+            (Some("text"), "```") => {
+                out += &printed.take().expect("a recipe stands before its output");
+                block = None;
+            }
+            (Some(_), "```") => block = None,
+            (Some("python"), _) => script += line,
+            (Some("sh"), command) => drop(crate::readme::run(command, folder.path())),
+            (Some("console"), line) => {
+                line.strip_prefix("$ ").map(|command| crate::readme::run(command, folder.path()));
+            }
+            (Some("text"), _) => continue,
+            _ => {}
+        }
+        out += line;
+    }
+    assert!(recipes >= 6, "{recipes} recipes");
+    if std::env::var_os("CRUMPLE_WRITE_DOCS").is_some() {
+        std::fs::write(&path, &out).unwrap();
+        return;
+    }
+    for (number, (said, expected)) in text.lines().zip(out.lines()).enumerate() {
+        assert_eq!(said, expected, "line {}: the recipe prints something else", number + 1);
+    }
+    assert!(text == out);
+}
+
+/// Both of xarray's engines find the dimensions of databases and histories by name.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn xarray_opens_databases_and_histories_without_phony_dimensions() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-pair");
+    let run = |file: &str| {
+        let path = fixture(&format!("fe/lead-car-pair/48kmh/{file}"));
+        path.to_str().unwrap().to_string()
+    };
+    for file in ["nodout", "rcforc"] {
+        let output = format!("{file}.h5");
+        crumple_ok(here, &["histories", &run(file), "-o", &output, "--units", "mm-t-s"]);
+    }
+    let look = "import sys, xarray as xr\n\
+        for engine in ('h5netcdf', 'netcdf4'):\n\
+        \x20   case = xr.open_dataset('curves.h5', group='lead-car-pair/48kmh', engine=engine)\n\
+        \x20   assert all(v.dims == ('time_s',) for v in case.variables.values()), case\n\
+        \x20   assert case.attrs['speed_kind'] == 'closing' and 'body_force_N' in case\n\
+        \x20   original = xr.open_dataset('curves.h5', group='lead-car-pair/48kmh/original', engine=engine)\n\
+        \x20   assert original.force_N.dims == ('time_s',)\n\
+        \x20   forces = xr.open_dataset('rcforc.h5', engine=engine)\n\
+        \x20   assert forces.x_force.dims == ('time', 'interface') and forces.x_force.units == 'N'\n\
+        \x20   assert list(forces.interface.attrs['sides']) == ['surfa', 'surfb']\n\
+        \x20   assert list(forces.interface.attrs['titles']) == 2 * ['car A against car B']\n\
+        \x20   assert isinstance(forces.attrs['title'], str) and forces.attrs['units'] == 'mm-t-s'\n\
+        \x20   nodes = xr.open_dataset('nodout.h5', engine=engine)\n\
+        \x20   assert nodes.x_acceleration.dims == ('time', 'node') and nodes.time.units == 's'\n\
+        \x20   assert nodes.x_acceleration.units == 'mm/s^2' and nodes.attrs['source'] == sys.argv[1]\n";
+    let output = python_of("CRUMPLE_PYTHON_TABLES")
+        .args(["-c", look, &run("nodout")])
+        .current_dir(here)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 /// Work that takes long says on a terminal what it is at, and nothing elsewhere.

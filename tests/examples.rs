@@ -100,7 +100,8 @@ fn feeding_pictures() {
             drawn == std::fs::read(there.join(&name)).unwrap(),
             "{name}: draw it again: cargo run --release --example feeding_pictures docs/feeding"
         );
-        assert!(drawn.len() < 15_000, "{name} has {} bytes", drawn.len());
+        // Half of it are the outlines of letters.
+        assert!(drawn.len() < 30_000, "{name} has {} bytes", drawn.len());
     }
 }
 

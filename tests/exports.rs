@@ -148,11 +148,12 @@ fn calculix_moves_a_mass_as_our_elastic_run() {
 fn rumoca_moves_a_mass_as_our_run() {
     let folder = demo_folder();
     let here = folder.path();
-    // By itself: the compiler reads all packages of a folder, and the demo has written this one, too.
-    fs::create_dir(here.join("package")).unwrap();
-    export(here, "lead50.json", "package/a.mo", &[]);
+    // The compiler reads all packages of a folder: another curve of the same name keeps to its file's.
+    fs::create_dir(here.join("packages")).unwrap();
+    export(here, "lead50.json", "packages/own.mo", &[]);
+    export(here, "lead50.json", "packages/contact.mo", &["--force", "contact"]);
     let own = own_run(here, "lead50.json", "memory");
-    let package = here.join("package/a.mo").display().to_string();
+    let package = here.join("packages/own.mo").display().to_string();
     let found = exports_python("exports_motion.py", &["modelica", &package, &own]);
     assert!(found["x"].as_f64().unwrap() < 1e-5, "{found}");
     assert!(found["v"].as_f64().unwrap() < 1e-4, "{found}");
@@ -182,9 +183,12 @@ fn octave_reads_the_matrices() {
     let folder = demo_folder();
     let here = folder.path();
     export(here, "lead50.json", "a.mat", &[]);
+    export(here, "lead50.json", "band.mat", &["--force", "contact", "--tail", "none"]);
     let program = "load('a.mat'); x = linspace(0, max_deflection_m, 200); \
         printf('%.17g ', interp1(fd_load(:,1), fd_load(:,2), x)); \
-        printf('\\n%.17g %.17g %.17g\\n', k_u, fd_unload(2,1), fd_unload(2,2)); disp(facts(1,:))";
+        printf('\\n%.17g %.17g %.17g\\n', k_u, fd_unload(2,1), fd_unload(2,2)); disp(facts(1,:)); \
+        load('band.mat'); printf('%.17g ', fd_low(2:end,2)); printf('\\n'); \
+        printf('%.17g ', fd_high(2:end,2)); printf('\\n%d\\n', isequal(fd_low(:,1), fd_load(:,1)))";
     let output =
         Command::new("octave-cli").args(["--quiet", "--eval", program]).current_dir(here).output();
     let output = output.expect("this test needs Octave: octave-cli is not on the path (octave)");
@@ -206,6 +210,134 @@ fn octave_reads_the_matrices() {
     assert_eq!(unloading[0], curve["body_unloading_stiffness_N_per_m"].as_f64().unwrap());
     assert_eq!(unloading[1], envelope.end_m());
     assert!(lines[2].starts_with("curve: lead-car-wall 50 km/h"));
+    assert_eq!(numbers(lines[3]), column("force_low_N"));
+    assert_eq!(numbers(lines[4]), column("force_high_N"));
+    assert_eq!(lines[5], "1");
+}
+
+/// Tables and matrices hold the band of the contact force; of the body force none is known, which is said.
+#[test]
+fn bands_stand_beside_their_curves() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let curve: Value =
+        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
+    let contact = ["--force", "contact"];
+    // The matrices by our own reader: their points are those of the curve.
+    export(here, "lead50.json", "band.mat", &[&contact[..], &["--tail", "none"]].concat());
+    for (name, key) in [("fd_low", "force_low_N"), ("fd_high", "force_high_N")] {
+        let options = ReadOptions {
+            units: UnitSystem::parse("SI").ok(),
+            curve: Some(name.into()),
+            ..ReadOptions::default()
+        };
+        let (edge, _) = read::read(&here.join("band.mat"), &options).unwrap();
+        assert_eq!((edge.deflection_m, edge.force_n), (column("deflection_m"), column(key)));
+    }
+    let envelope =
+        |key: &str| crumple::curve::Envelope::new(column("deflection_m"), column(key)).unwrap();
+    let (low, high) = (envelope("force_low_N"), envelope("force_high_N"));
+    export(
+        here,
+        "lead.model",
+        "band.csv",
+        &[&contact[..], &["--to", "table", "--speed", "50km/h,54km/h"]].concat(),
+    );
+    let table = fs::read_to_string(here.join("band.csv")).unwrap();
+    assert!(table.contains("\nspeed_m_per_s,d_m,force_N,force_low_N,force_high_N\n"));
+    assert!(table.contains("\n# band: force_low_N to force_high_N: empirical range for 90 %"));
+    let rows = table.lines().filter(|l| l.starts_with("1.38888889E+01"));
+    let mut compared = 0;
+    for row in rows {
+        let values: Vec<f64> = row.split(',').map(|v| v.parse().unwrap()).collect();
+        if values[1] < low.end_m() {
+            // A row is scaled to its curve's energy.
+            let close = |edge: f64, own: f64| (edge - own).abs() < 3e-3 * high.peak_force_n();
+            assert!(close(values[3], low.force_at(values[1])), "{row}");
+            assert!(close(values[4], high.force_at(values[1])), "{row}");
+        }
+        assert!(values[3] <= values[2] && values[2] <= values[4], "{row}");
+        compared += 1;
+    }
+    assert!(compared > 900, "{compared}");
+    // None is written, and said, of the body force, of softened curves and where the model has none.
+    let notes = |input: &str, more: &[&str]| -> String {
+        let arguments = [&["export", input, "--json"][..], more].concat();
+        let said: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
+        said["notes"].to_string()
+    };
+    let of_body =
+        "written without a band: only that of the contact force is known (--force contact)";
+    for to in ["csv", "mat"] {
+        assert!(notes("lead50.json", &["--to", to, "-o", "x"]).contains(of_body));
+        assert!(
+            !notes("lead50.json", &["--to", to, "-o", "x", "--force", "contact"]).contains("band")
+        );
+        let group = ["--group", "lead-car-wall", "--case", "36kmh", "--to", to, "-o", "x"];
+        assert!(!notes("curves.h5", &group).contains("band"), "a record has none");
+    }
+    assert!(
+        notes("lead.model", &["--to", "table", "-o", "x"]).contains(&format!("table: {of_body}"))
+    );
+    let soft = ["--force", "contact", "--soften", "--to", "mat", "-o", "x"];
+    assert!(
+        notes("lead50.json", &soft)
+            .contains("written without a band: it is not that of a softened")
+    );
+    // Without left-out ends there is none outside of the training speeds: those rows are no numbers.
+    let mut bare: Value = curve.clone();
+    for key in ["force_low_N", "force_high_N"] {
+        bare.as_object_mut().unwrap().remove(key);
+    }
+    fs::write(here.join("bare.json"), bare.to_string()).unwrap();
+    let bare = notes("bare.json", &["--to", "csv", "-o", "x", "--force", "contact"]);
+    assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
+}
+
+/// A Modelica package has the name of its file, so that two curves of one name keep apart in a folder.
+#[test]
+fn packages_have_the_names_of_their_files() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let package = |file: &str| -> String {
+        let text = fs::read_to_string(here.join(file)).unwrap();
+        let begins = text.lines().find(|l| l.starts_with("package ")).unwrap().to_string();
+        let name = begins.split(' ').nth(1).unwrap().to_string();
+        assert!(text.trim_end().ends_with(&format!("end {name};")), "{file}");
+        name
+    };
+    for (file, name) in [
+        ("one.mo", "one"),
+        ("lead-50 b.mo", "lead_50_b"),
+        ("50.mo", "curve_50"),
+        ("model.mo", "curve_model"),
+        ("nöse.mo", "n_se"),
+    ] {
+        export(here, "lead50.json", file, &[]);
+        assert_eq!(package(file), name);
+    }
+    export(here, "lead.model", "several", &["--to", "modelica", "--speed", "36km/h,50km/h"]);
+    assert_eq!(package("several/lead_car_wall_50kmh.mo"), "lead_car_wall_50kmh");
+}
+
+/// LS-DYNA resamples evenly: that it cannot keep an uneven curve is said.
+#[test]
+fn uneven_curves_for_lsdyna_are_noted() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let notes = |more: &[&str]| -> String {
+        let arguments =
+            [&["export"][..], more, &["--to", "lsdyna", "--json", "-o", "x.k"]].concat();
+        crumple_ok(here, &arguments)
+    };
+    let record = notes(&["curves.h5", "--group", "lead-car-wall", "--case", "48kmh"]);
+    assert!(
+        record.contains("its points are uneven, so LCINT is 20000, the most that is asked for"),
+        "{record}"
+    );
+    assert!(fs::read_to_string(here.join("x.k")).unwrap().contains("         0     20000\n"));
+    assert!(!notes(&["lead50.json"]).contains("LCINT"));
 }
 
 /// pyisomme reads the channels of a case, and those of a multi-body run.
@@ -270,8 +402,9 @@ fn h5py_reads_the_table_of_a_model() {
     fs::write(here.join("curves.json"), format!("[{}]", curves.join(","))).unwrap();
     export(here, "vehicle.model", "table.h5", &["--to", "table"]);
     export(here, "lead.model", "table.csv", &["--to", "table", "--speed", "36km/h,50km/h"]);
-    let arguments =
-        ["table.h5", "table.csv", "curves.json"].map(|f| here.join(f).display().to_string());
+    export(here, "vehicle.model", "band.h5", &["--to", "table", "--force", "contact"]);
+    let files = ["table.h5", "table.csv", "curves.json", "band.h5"];
+    let arguments = files.map(|f| here.join(f).display().to_string());
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let found = run_python(python(), "exports_table.py", &arguments);
     // At 50 km/h, the curve that predict gives.
@@ -289,6 +422,8 @@ fn h5py_reads_the_table_of_a_model() {
     assert!(worst < 1e-3, "energy of a speed's row to its maximal crush is off by {worst}");
     assert!(found["speeds"].as_u64().unwrap() >= 25);
     assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
+    assert_eq!(found["compared_bands"], 4, "{found}");
+    assert!(found["worst_band"].as_f64().unwrap() < 5e-3, "{found}");
 }
 
 /// What our own readers have of what we write: the same bits, or the format's nine digits.
@@ -300,12 +435,14 @@ fn our_readers_give_back_what_was_exported() {
     let curve: Value = serde_json::from_str(&text).unwrap();
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     let (d, f) = (column("deflection_m"), column("body_force_N"));
-    for (file, bound) in [("a.csv", 5e-9), ("a.k", 5e-9), ("a.txt", 5e-9), ("a.mat", 0.0)] {
+    for (file, bound) in
+        [("a.csv", 5e-9), ("a.k", 5e-9), ("a.txt", 5e-9), ("a.rad", 5e-9), ("a.mat", 0.0)]
+    {
         for tail in ["none", "bottom"] {
             export(here, "lead50.json", file, &["--tail", tail]);
             let units = UnitSystem::parse("SI").unwrap();
-            // A deck says its own.
-            let units = (file != "a.k").then_some(units);
+            // Decks say their own.
+            let units = (!["a.k", "a.rad"].contains(&file)).then_some(units);
             let options = ReadOptions { units, ..ReadOptions::default() };
             let (read, _) = read::read(&here.join(file), &options).unwrap();
             let close = |a: f64, b: f64| (a - b).abs() <= bound * b.abs();

@@ -12,21 +12,22 @@ use serde_json::Value;
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries};
 
 /// The curve of all these files: a flank, a fall, a plateau; in m and N.
-const POINTS: [(f64, f64); 5] = [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2.0e6)];
+pub const POINTS: [(f64, f64); 5] =
+    [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2.0e6)];
 
 /// Its energy is that of 24 t at this speed, in m/s.
-fn speed() -> f64 {
+pub fn speed() -> f64 {
     let work: f64 = POINTS.windows(2).map(|w| 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0)).sum();
     (2.0 * work / 24e3).sqrt()
 }
 
-fn given(units: Option<&str>) -> ReadOptions {
+pub fn given(units: Option<&str>) -> ReadOptions {
     let units = units.map(|units| UnitSystem::parse(units).unwrap());
     ReadOptions { units, ..ReadOptions::default() }
 }
 
 /// Reads a file of that name and content.
-fn read_bytes(
+pub fn read_bytes(
     name: &str,
     bytes: &[u8],
     options: &ReadOptions,
@@ -38,7 +39,7 @@ fn read_bytes(
     Ok((curve, reader.name))
 }
 
-fn is_points(curve: &ReadCurve, context: &str) {
+pub fn is_points(curve: &ReadCurve, context: &str) {
     let points: Vec<(f64, f64)> =
         curve.deflection_m.iter().copied().zip(curve.force_n.iter().copied()).collect();
     assert_eq!(points.len(), POINTS.len(), "{context}: {points:?}");
@@ -49,7 +50,7 @@ fn is_points(curve: &ReadCurve, context: &str) {
 }
 
 /// Columns of the curve in other units, `separator` between and `decimal` in numbers.
-fn rows(length: f64, force: f64, separator: &str, decimal: &str) -> String {
+pub fn rows(length: f64, force: f64, separator: &str, decimal: &str) -> String {
     let shown = |v: f64| format!("{v}").replace('.', decimal);
     POINTS
         .iter()
@@ -271,7 +272,7 @@ fn mat_files_of_both_byte_orders() {
 }
 
 /// A channel file.
-fn channel(code: &str, unit: &str, values: &[f64]) -> String {
+pub fn channel(code: &str, unit: &str, values: &[f64]) -> String {
     let values: String = values.iter().map(|v| format!("{v}\n")).collect();
     format!(
         "Test object number        :1\nName of the channel       :{code}\nChannel code              :{code}\nUnit                      :{unit}\nReference channel         :implicit\nTime of first sample      :-0.002\nSampling interval         :0.001\nNumber of samples         :{}\n{values}",
@@ -312,7 +313,7 @@ fn iso_mme_tests() {
     // Damage is named with its file and line.
     let t = |text: String, expected: &str| {
         fs::write(channels.join("T1.004"), text).unwrap();
-        let error = read(&path, &given(None)).unwrap_err().to_string();
+        let error = read(&path, &chosen).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     };
     let good = channel("12FRONT00000FOXP", "kN", &f);
@@ -322,7 +323,7 @@ fn iso_mme_tests() {
     );
     t(
         good.replace("implicit", "explicit"),
-        "T1.004: line 5: expected \"Reference channel :implicit\"",
+        "T1.004: line 5: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\"",
     );
     t(
         good.replace("samples         :5", "samples         :9"),
@@ -413,7 +414,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         &[
             "line 1: the deflection has no unit (\"d\")",
             "write it as d_m or d_mm",
-            "--units, such as mm-t-s or SI",
+            "give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
         ],
     );
     t(
@@ -498,7 +499,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         Some("SI"),
         &["columns 21-40: expected a number, found \"&param\""],
     );
-    t("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 points"]);
+    t("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 point:"]);
     t(
         "a.k",
         deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"),
@@ -614,6 +615,10 @@ fn memory_is_bounded_by_the_number_of_curves_and_points() {
     }
     t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: take out the one");
     t("a.cur", "CONTINUE\n", 20_000, "more than 10000 curves");
+    t("a.rad", "/FUNCT/1\n", 20_000, "more than 10000 curves");
+    t("a.mo", "package a\n", 20_000, "more than 10000 curves");
+    t("a.csv", "a;b c,d\te ", 2_000_000, "expected a column deflection");
+    t("a.txt", "1 2 3\n", 1_100_000, "more than 1000000 points");
     t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it");
     t("a.cur", "1 1\n", 1_100_000, "more than 1000000 points");
     t("a.cur", "a (m) ", 1_000_000, "expected a curve: lines of two numbers");
@@ -695,7 +700,7 @@ fn a_file_becomes_a_case_that_every_command_knows() {
     let t: Vec<f64> = serde_json::from_value(case["time_s"].clone()).unwrap();
     assert!((t[1] - 0.75e-3).abs() < 1e-12);
     let check = crumple_ok(here, &["db", "check", "c.h5", "--strict"]);
-    assert_eq!(check, "1 cases checked, 0 findings\n");
+    assert_eq!(check, "1 case checked, 0 findings\n");
 }
 
 #[test]
@@ -736,9 +741,9 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t_with(
         2,
         &["other.csv"],
-        "--speed is given 1 times for 2 files: give it once for each file, in their order",
+        "--speed is given 1 time for 2 files: give it once for each file, in their order",
     );
-    t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 files");
+    t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 file");
     t_with(2, &["--other-mass", "3t"], "a wall has no mass: remove --other-mass");
     t_with(1, &["--case", "a/b"], "\"a/b\" cannot be the name of a case: it may not contain");
     t_with(
@@ -960,7 +965,7 @@ fn exported_curves_come_back() {
         here,
         &[&["train", "curves.h5", "--model", "linear", "-o", "a.model"], &group[..]].concat(),
     );
-    let files = ["a.json", "a.csv", "a.k", "a.txt", "a.mat"];
+    let files = ["a.json", "a.csv", "a.k", "a.txt", "a.mat", "a.rad"];
     let outputs = files.iter().flat_map(|file| ["-o", file]);
     let predict = ["predict", "a.model", "--speed", "50km/h"].into_iter().chain(outputs);
     crumple_ok(here, &predict.collect::<Vec<_>>());
@@ -992,8 +997,8 @@ fn exported_curves_come_back() {
         );
     }
     // The same case by each way.
-    let files = ["a.csv", "a.k", "a.txt", "a.mat"];
-    let names = ["--case", "csv", "--case", "k", "--case", "txt", "--case", "mat"];
+    let files = ["a.csv", "a.k", "a.txt", "a.mat", "a.rad"];
+    let names = ["csv", "k", "txt", "mat", "rad"].map(|name| ["--case", name]).concat();
     crumple_ok(here, &[&["db", "add", "c.h5", "--group", "all"], &files[..], &names].concat());
     let crushes: Vec<f64> =
         cases(here, "all").iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).collect();
@@ -1054,6 +1059,23 @@ fn good() -> Vec<Vec<u8>> {
         [matrix("fd_load", 5, 2, &columns(), false), matrix("k_u", 1, 1, &[8e7], false)].concat(),
         channel("11FRONT00000FOXP", "kN", &[0.0, 1.0, 2.0, 3.0, 0.0]).into_bytes(),
         format!("t\nx (m)\ny (N)\nl\n{}CONTINUE\n", rows(1.0, 1.0, " ", ".")).into_bytes(),
+        format!("Test 12\n\nNo Weg [mm] Kraft [kN]\n{}", rows(1.0, 1.0, " ", ",")).into_bytes(),
+        format!("Test;ü\nt;Weg;Kraft\ns;mm;kN\n{}", rows(1.0, 1.0, ";", ",").replace('\n', "\n0;"))
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect(),
+        format!(
+            "/BEGIN\na\nb\n{:>20}{:>20}{:>20}\n/FUNCT/1\nt\n{}/END\n",
+            "Mg",
+            "mm",
+            "s",
+            fields(1.0, 1.0)
+        )
+        .into_bytes(),
+        b"// mass_kg: 24000\npackage a\n  constant Real d[4] = {\n 0, 1,\n 2, 3} \"m\";\n  constant Real f[4] = {0, 5, 4, 5};\nend a;\n".into(),
+        channel("11FRONT00000DSXP", "mm", &[0.0, 5.0, 10.0, 15.0, 12.0])
+            .replace(":implicit", ":explicit\nReference channel name :11FRONT00000TI00")
+            .into_bytes(),
     ]
 }
 

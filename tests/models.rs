@@ -64,6 +64,10 @@ fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Ca
         sources: vec![],
         notes: vec![],
         warnings: vec![],
+        built_utc: None,
+        origin: None,
+        tags: vec![],
+        user_notes: vec![],
     }
 }
 
@@ -622,7 +626,7 @@ fn parameters_through_the_commands() {
     assert_eq!(curve["provenance"]["parameters"]["angle_deg"], 1.0);
     let refused = |value: &str| {
         let output = crumple_in(here, &[&ask[..], &[value]].concat());
-        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+        (output.status.code(), crate::common::said(&output))
     };
     assert_eq!(refused("angle_deg").0, Some(2));
     let (code, message) = refused("height_m=1");

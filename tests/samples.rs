@@ -480,14 +480,14 @@ fn every_sample_is_read_or_refused() {
         let name = kind.file_name().unwrap().to_str().unwrap().to_string();
         for path in kind.read_dir().unwrap().map(|e| e.unwrap().path()) {
             let output = crumple_in(Path::new("."), &["inspect", "--json", path.to_str().unwrap()]);
-            let error = String::from_utf8(output.stderr).unwrap();
+            let error = crate::common::said(&output);
             let shown = path.display().to_string();
             let reason = match name.as_str() {
                 _ if shown.contains("not_binout") => "it has no section of a binout",
                 "ncforc" => "an LS-DYNA text file of a kind that is not read",
                 "d3plot" => {
                     assert!(path.is_dir());
-                    "this is a folder"
+                    "no folder in it holds solver files"
                 }
                 _ => {
                     assert_eq!(output.status.code(), Some(0), "{shown}: {error}");

@@ -6,7 +6,7 @@ use std::fs;
 use std::io;
 use std::sync::Mutex;
 
-use crate::common::{crumple_fails, crumple_ok};
+use crate::common::{crumple_fails, crumple_ok, python};
 use crumple::solver::source::Source;
 use crumple::solver::{Access, Selection, SolverFile, blocks, read_from};
 
@@ -296,4 +296,32 @@ fn blocks_and_maps_give_the_same() {
     assert_eq!(bytes("c.h5").len(), bytes("a.h5").len());
     let left: Vec<_> = fs::read_dir(here).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left.len(), 4, "{left:?}");
+}
+
+/// Its dimensions have names, each component's those of its own nodes.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn h5py_finds_the_dimensions_of_what_was_written_state_by_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = Written { nodes: 9_000, states: 20, ..Written::default() };
+    let path = folder.path().join("nodout");
+    fs::write(&path, written.text()).unwrap();
+    assert!(blocks(&path, None, &Selection::all()).unwrap().is_some(), "an even file");
+    crumple_ok(folder.path(), &["histories", "nodout", "-o", "a.h5", "--units", "mm-t-s"]);
+    let look = "import h5py\n\
+        file = h5py.File('a.h5')\n\
+        assert file['time'].attrs['units'] == 's' and h5py.h5ds.is_scale(file['time'].id)\n\
+        for name in file:\n\
+        \x20   data = file[name]\n\
+        \x20   if isinstance(data, h5py.Group) or data.ndim < 2: continue\n\
+        \x20   assert data.dims[0][0] == file['time'], name\n\
+        \x20   nodes = data.dims[1][0]\n\
+        \x20   assert nodes == file['node_2' if name.startswith('r') else 'node'], name\n\
+        \x20   ids = data.attrs['ids'] if 'ids' in data.attrs else file['ids'][name]\n\
+        \x20   assert (nodes[:] == ids[:]).all() and len(nodes) == data.shape[1], name\n\
+        assert file['x_velocity'].attrs['units'] == 'mm/s'\n\
+        print(file['x_velocity'].shape[1], file['rx_velocity'].shape[1])\n";
+    let output = python().args(["-c", look]).current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8(output.stdout).unwrap().trim(), "9000 4500");
 }

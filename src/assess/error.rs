@@ -6,6 +6,8 @@ use super::reference::MotionError;
 use crate::curve::EnvelopeError;
 use crate::database::DatabaseError;
 use crate::dataset::DatasetError;
+use crate::guess;
+use crate::manifest::Place;
 use crate::multibody::SimulationError;
 use crate::nsdm::NsdmError;
 use crate::rating::SignalError;
@@ -77,7 +79,7 @@ pub enum CompareError {
         known: String,
     },
     /// Too few cases would remain.
-    #[error("leaving out one of {cases} cases leaves too few: a comparison needs at least 3")]
+    #[error("leaving out one of {} leaves too few: a comparison needs at least 3", crate::plural::counted(*cases, "case"))]
     TooFew {
         /// How many cases there are.
         cases: usize,
@@ -104,7 +106,7 @@ pub enum CompareError {
     #[error(transparent)]
     Signal(#[from] SignalError),
     /// The train cannot be compared.
-    #[error(transparent)]
+    #[error("{0}")]
     Train(#[from] TrainError),
     /// The case cannot be left out.
     #[error(transparent)]
@@ -138,6 +140,14 @@ impl From<SimulationError> for CompareError {
 /// Why a train cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
+    /// It is about a key of the scenario.
+    #[error("{place}: {source}")]
+    InScenario {
+        /// Where in the scenario.
+        place: Place,
+        /// Why.
+        source: Box<TrainError>,
+    },
     /// A curve of the scenario does not come from a database.
     #[error(
         "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\""
@@ -147,7 +157,10 @@ pub enum TrainError {
         curve: String,
     },
     /// `[reference]` names a vehicle that the scenario does not have.
-    #[error("the scenario has no vehicle \"{name}\": its vehicles are {known}")]
+    #[error(
+        "the scenario has no vehicle \"{name}\": its vehicles are {known}{}",
+        guess::hint(name, known)
+    )]
     NoVehicle {
         /// The name.
         name: String,
@@ -155,7 +168,7 @@ pub enum TrainError {
         known: String,
     },
     /// FE's record is too short.
-    #[error("FE's record has {states} states up to {until_s} s: at least 3 are needed")]
+    #[error("FE's record has {} up to {until_s} s: at least 3 are needed", crate::plural::counted(*states, "state"))]
     TooShort {
         /// Number of its states.
         states: usize,
@@ -164,29 +177,22 @@ pub enum TrainError {
     },
     /// The multi-body run ends before what it is compared with.
     #[error(
-        "{path}: the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
+        "the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]"
     )]
     RunTooShort {
-        /// The scenario.
-        path: PathBuf,
         /// End of the run, in s.
         duration_s: f64,
         /// End of the comparison, in s.
         until_s: f64,
     },
     /// `[reference]` names no node of any vehicle.
-    #[error("{path}: [reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
-    NoNodes {
-        /// The scenario.
-        path: PathBuf,
-    },
+    #[error("[reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}")]
+    NoNodes,
     /// FE's vehicle begins at another speed than the scenario's.
     #[error(
-        "{path}: in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
+        "in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds"
     )]
     OtherSpeed {
-        /// The scenario.
-        path: PathBuf,
         /// Name of the vehicle.
         vehicle: String,
         /// Speed in FE's record, in m/s.
@@ -195,11 +201,8 @@ pub enum TrainError {
         m_per_s: f64,
     },
     /// The scenario names no FE run.
-    #[error("{path}: the scenario has no [reference]: add one that names FE's run of the train")]
-    NoReference {
-        /// The scenario.
-        path: PathBuf,
-    },
+    #[error("the scenario has no [reference]: add one that names FE's run of the train")]
+    NoReference,
     /// FE's record lacks a history, or part of it.
     #[error(
         "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]"
@@ -216,11 +219,22 @@ pub enum TrainError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The scenario cannot be run.
-    #[error(transparent)]
+    #[error("{0}")]
     Scenario(#[from] Box<ScenarioError>),
     /// The database cannot be read.
     #[error(transparent)]
     Database(#[from] DatabaseError),
+}
+
+impl TrainError {
+    /// Where in the scenario it is wrong.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::InScenario { place, .. } => Some(place),
+            Self::Scenario(error) => error.place(),
+            _ => None,
+        }
+    }
 }
 
 impl From<ScenarioError> for CompareError {

@@ -1,5 +1,6 @@
 //! The methods that are compared: FE's own curves, FDRM, NSDM, DDTCM and the best model.
 
+use crate::plural::counted;
 use std::time::Instant;
 
 use super::error::CompareError;
@@ -152,7 +153,7 @@ pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, Com
     let rule = model.max_crush_rule;
     let (curve, predict_s) = predicted(left_out, &model, Some(rule))?;
     let driving = curve.driving(left_out.rest.force_kind)?;
-    let made_from = format!("forest on {} speeds", left_out.rest.cases.len());
+    let made_from = format!("forest on {}", counted(left_out.rest.cases.len(), "speed"));
     method("ddtcm", made_from, left_out, &curve, driving, (fit_s, predict_s))
 }
 
@@ -168,7 +169,7 @@ pub(super) fn best(
     let fit_s = start.elapsed().as_secs_f64();
     let (curve, predict_s) = predicted(left_out, &model, None)?;
     let driving = curve.driving(ForceKind::Body)?;
-    let made_from = format!("{} on {} speeds", curve.model, left_out.rest.cases.len());
+    let made_from = format!("{} on {}", curve.model, counted(left_out.rest.cases.len(), "speed"));
     method("best", made_from, left_out, &curve, driving, (fit_s, predict_s))
 }
 

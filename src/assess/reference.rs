@@ -38,7 +38,7 @@ pub struct Reference {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// Too few states lie in the window of the comparison.
-    #[error("case \"{case}\": only {states} states lie in the window: at least 3 are needed")]
+    #[error("case \"{case}\": only {} in the window: at least 3 are needed", crate::plural::counted(*states, "state"))]
     TooShort {
         /// Name of the case.
         case: String,

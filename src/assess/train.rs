@@ -17,14 +17,15 @@ use crate::database::Database;
 use crate::dataset::TrainingSet;
 use crate::file;
 use crate::history::EntityId;
+use crate::manifest::KeyPath;
 use crate::multibody::simulate;
 use crate::scenario::{
-    self, CurveSource, DampingTable, EndName, InterfaceSpeed, LawName, ReferenceTable, Scenario,
-    Sources,
+    self, CheckedScenario, CurveSource, DampingTable, EndName, InterfaceSpeed, LawName,
+    ReferenceTable, Scenario, Sources,
 };
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
-use crate::solver::{self, Selection, WantedId};
+use crate::solver::{self, ReadError, Selection, WantedId};
 use crate::surrogate::Model;
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
@@ -158,13 +159,55 @@ struct Method<'a> {
 /// [`CompareError`] names the curve, vehicle or method.
 pub fn compare_train(
     path: &Path,
-    scenario: &Scenario,
+    scenario: &CheckedScenario<'_>,
     settings: &ComparisonSettings,
 ) -> Result<TrainComparison, CompareError> {
-    let reference =
-        scenario.reference.as_ref().ok_or_else(|| TrainError::NoReference { path: path.into() })?;
+    compared(path, scenario, settings).map_err(|error| match error {
+        CompareError::Train(source) => match key(&source, scenario) {
+            Some(key) => {
+                let place = scenario.place(path, &key);
+                TrainError::InScenario { place, source: source.into() }.into()
+            }
+            None => source.into(),
+        },
+        other => other,
+    })
+}
+
+/// The key of the scenario that an error is about.
+fn key(error: &TrainError, scenario: &Scenario) -> Option<KeyPath> {
+    let reference = |key: &str| KeyPath::of("reference").key(key);
+    let of_node = |id: i64| {
+        let mut nodes = scenario.reference.iter().flat_map(|r| &r.nodes);
+        let (name, _) = nodes.find(|(_, node)| **node == id)?;
+        Some(reference("nodes").key(name))
+    };
+    Some(match error {
+        TrainError::NotACase { curve } => KeyPath::of("curves").key(curve),
+        TrainError::NoVehicle { name, .. } => reference("nodes").key(name).itself(),
+        TrainError::OtherSpeed { vehicle, .. } => reference("nodes").key(vehicle),
+        TrainError::NoHistory { node, .. } => of_node(*node)?,
+        TrainError::TooShort { .. } => reference("until"),
+        TrainError::RunTooShort { .. } => KeyPath::of("run.duration"),
+        TrainError::NoNodes => reference("nodes"),
+        TrainError::NoReference => KeyPath::default(),
+        TrainError::Read(ReadError::NoSuchEntity { id, .. }) => of_node(id.id)?,
+        TrainError::Read(ReadError::NoSuchComponent { .. }) => reference("component"),
+        TrainError::Read(_) => reference("file"),
+        TrainError::InScenario { .. } | TrainError::Scenario(_) | TrainError::Database(_) => {
+            return None;
+        }
+    })
+}
+
+fn compared(
+    path: &Path,
+    scenario: &CheckedScenario<'_>,
+    settings: &ComparisonSettings,
+) -> Result<TrainComparison, CompareError> {
+    let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
     if reference.nodes.is_empty() {
-        return Err(TrainError::NoNodes { path: path.into() }.into());
+        return Err(TrainError::NoNodes.into());
     }
     let fe = &FeTrain::read(path, reference).map_err(CompareError::from)?;
     for (name, speeds) in &fe.velocities {
@@ -172,8 +215,8 @@ pub fn compare_train(
         if let (Some(train), Some(&fe_m_per_s)) = (train, speeds.first()) {
             let m_per_s = train.speed.0;
             if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
-                let (path, vehicle) = (path.into(), name.clone());
-                return Err(TrainError::OtherSpeed { path, vehicle, fe_m_per_s, m_per_s }.into());
+                let vehicle = name.clone();
+                return Err(TrainError::OtherSpeed { vehicle, fe_m_per_s, m_per_s }.into());
             }
         }
     }
@@ -335,7 +378,6 @@ fn row(
         let reference = &reference[..time_s.len()];
         let ours = interpolate(&run.time_s, &run.bodies[i].v_m_per_s, time_s).map_err(|_| {
             TrainError::RunTooShort {
-                path: path.into(),
                 duration_s: run.time_s.last().copied().unwrap_or(0.0),
                 until_s: time_s[time_s.len() - 1],
             }

@@ -5,6 +5,7 @@
 //! comparing structures of vehicles, and unfiltered beside it: above 100 Hz FE's body oscillates on its crush zone, which
 //! no curve over deflection can hold. FE's own curves in the same model stand beside them.
 
+use crate::plural::counted;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -206,8 +207,8 @@ fn left_out_cases<'a>(
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let found = speeds.len();
     if found < 3 {
-        let s = if found == 1 { "" } else { "s" };
-        return Err(format!("the group has {found} speed{s}: leaving one out needs at least 3"));
+        let speeds = counted(found, "speed");
+        return Err(format!("the group has {speeds}: leaving one out needs at least 3"));
     }
     let (mut left_out, mut notes) = (Vec::new(), Vec::new());
     for index in 0..set.cases.len() {

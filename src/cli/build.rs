@@ -1,28 +1,54 @@
 //! `crumple build`: from a study manifest to a curve database.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crumple::build::{self, BuildReport, RunOutcome};
+use crumple::build::{self, BuildReport, BuiltRun, RunOutcome};
+use crumple::database::CasePath;
+use crumple::plural::counted;
 use serde::Serialize;
 
 use super::db::CaseRow;
 use super::output;
-use super::{CommandResult, GlobalOptions, Outcome, progress};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 
 /// Read all runs of a study, extract their curves and write the database
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
+  crumple build                                   # study.toml of this folder, to curves.h5
   crumple build study.toml -o curves.h5
   crumple build other-study.toml -o curves.h5     # adds a group
 Only runs that changed since the last build are read again. A run that cannot be used is
 reported and left out (exit code 1); the others are built.")]
 pub struct Args {
-    /// Study manifest (TOML)
-    study: PathBuf,
-    /// Database to write or to update
+    /// Study manifest (TOML); study.toml if absent
+    study: Option<PathBuf>,
+    /// Database to write or to update; curves.h5 beside the study if absent
     #[arg(short, long)]
-    output: PathBuf,
+    output: Option<PathBuf>,
+}
+
+/// Name of a study that is not named, and of a database that is not.
+const STUDY: &str = "study.toml";
+const DATABASE: &str = "curves.h5";
+
+impl Args {
+    /// The study and the database.
+    fn files(&self) -> Result<(PathBuf, PathBuf), Failure> {
+        let study = match &self.study {
+            Some(study) => study.clone(),
+            None if Path::new(STUDY).is_file() => STUDY.into(),
+            None => {
+                return Err(Failure::Usage(format!(
+                    "there is no {STUDY} in this folder: name a study, or let crumple init write one"
+                )));
+            }
+        };
+        let output = self.output.clone().unwrap_or_else(|| study.with_file_name(DATABASE));
+        Ok((study, output))
+    }
 }
 
 #[derive(Serialize)]
@@ -31,6 +57,19 @@ struct Document {
     group: String,
     runs: Vec<RunReport>,
     removed: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    moved: Vec<Moved>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    earlier_groups: Vec<String>,
+}
+
+/// A case that has another name or group than before.
+#[derive(Serialize)]
+struct Moved {
+    from: String,
+    to: String,
+    #[serde(skip)]
+    paths: (CasePath, CasePath),
 }
 
 #[derive(Serialize)]
@@ -41,22 +80,29 @@ struct RunReport {
     error: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     case: Option<CaseRow>,
+    /// Group and name of the case where the database has others than the manifest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    renamed: Option<String>,
 }
 
 pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let (study, output) = args.files()?;
     let bar = progress::Bar::new(options, "reading runs");
     let done = AtomicUsize::new(0);
-    let report = build::build(&args.study, &args.output, |name| {
+    let report = build::build(&study, &output, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        bar.step(&format!("{done} runs read, last {name}"));
+        bar.step(&format!("{} read, last {name}", counted(done, "run")));
     });
     bar.end();
     let report = report?;
     let runs: Vec<RunReport> = report.runs.iter().map(|r| run_report(&report, r)).collect();
     let mut outcome = Outcome::Clean;
-    for run in &runs {
+    for (run, built) in runs.iter().zip(&report.runs) {
         if let Some(error) = &run.error {
             output::say(&format!("error: run {}: {error}", run.name));
+            if let RunOutcome::Failed { reason, .. } = &built.outcome {
+                output::say_excerpt(reason.place.as_deref());
+            }
             outcome = Outcome::Partly;
         }
         for warning in run.case.iter().flat_map(|c| &c.warnings) {
@@ -66,35 +112,85 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             }
         }
     }
-    if options.json {
-        output::print_json(&Document {
-            database: args.output.display().to_string(),
-            group: report.group,
-            runs,
-            removed: report.removed,
-        })?;
-    } else {
-        output::print(|out| {
-            let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-            let heading: Vec<&str> = ["run"].into_iter().chain(CaseRow::HEADING).collect();
-            output::table(out, &heading, &rows)?;
-            for run in &runs {
-                for note in run.case.iter().flat_map(|c| &c.notes) {
-                    writeln!(out, "note: {}: {note}", run.name)?;
-                }
-            }
-            for name in &report.removed {
-                writeln!(out, "note: {name}: no longer in the study, removed")?;
-            }
-            writeln!(out, "wrote {} (group {})", args.output.display(), report.group)
-        })?;
+    let database = output.display().to_string();
+    match options.json {
+        true => output::print_json(&Document::of(report, database, runs))?,
+        false => output::print(|out| print(out, &Document::of(report, database, runs)))?,
     }
     Ok(outcome)
 }
 
-fn run_report(report: &BuildReport, (name, outcome): &(String, RunOutcome)) -> RunReport {
-    let case = report.database.cases(&report.group).iter().find(|c| c.name == *name);
-    let (word, error) = match outcome {
+impl Document {
+    fn of(report: BuildReport, database: String, runs: Vec<RunReport>) -> Self {
+        let shown = |path: &CasePath| match path.group == report.group {
+            true => path.name.clone(),
+            false => path.to_string(),
+        };
+        let moved = |(from, to): &(CasePath, CasePath)| Moved {
+            from: from.to_string(),
+            to: to.to_string(),
+            paths: (from.clone(), to.clone()),
+        };
+        Self {
+            database,
+            runs,
+            removed: report.removed.iter().map(shown).collect(),
+            moved: report.moved.iter().map(moved).collect(),
+            earlier_groups: report.earlier,
+            group: report.group,
+        }
+    }
+}
+
+fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+    let Document { database, group, runs, removed, moved, earlier_groups } = document;
+    let heading: Vec<&str> = ["run"].into_iter().chain(CaseRow::HEADING).collect();
+    output::table(out, &heading, &runs.iter().map(row).collect::<Vec<_>>())?;
+    for run in runs {
+        for note in run.case.iter().flat_map(|c| &c.notes) {
+            writeln!(out, "note: {}: {note}", run.name)?;
+        }
+    }
+    for name in removed {
+        writeln!(out, "note: {name}: no longer in the study, removed")?;
+    }
+    for run in runs {
+        if let Some(renamed) = &run.renamed {
+            writeln!(out, "note: {}: is {renamed} in the database", run.name)?;
+        }
+    }
+    for line in moved_lines(moved) {
+        writeln!(out, "note: {line}")?;
+    }
+    for group in earlier_groups {
+        writeln!(
+            out,
+            "note: group {group} was built from this manifest when it said something else; it stays: crumple db rm removes it"
+        )?;
+    }
+    writeln!(out, "wrote {database} (group {group})")
+}
+
+/// Says what has moved: a whole group in one line.
+fn moved_lines(moved: &[Moved]) -> Vec<String> {
+    let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    let mut lines = Vec::new();
+    for Moved { paths: (from, to), .. } in moved {
+        match from.name == to.name {
+            true => *groups.entry((&from.group, &to.group)).or_default() += 1,
+            false => lines.push(format!("{from}: renamed since it was built, is {to} now")),
+        }
+    }
+    let group = |((from, to), count): (&(&str, &str), &usize)| {
+        let cases = output::counted(*count, "case");
+        format!("group {from}: renamed since it was built, {cases} moved to {to}")
+    };
+    lines.extend(groups.iter().map(group));
+    lines
+}
+
+fn run_report(report: &BuildReport, run: &BuiltRun) -> RunReport {
+    let (word, error) = match &run.outcome {
         RunOutcome::Built => ("built", None),
         RunOutcome::Kept => ("unchanged", None),
         RunOutcome::Failed { reason, earlier_kept } => {
@@ -102,7 +198,10 @@ fn run_report(report: &BuildReport, (name, outcome): &(String, RunOutcome)) -> R
             ("failed", Some(format!("{reason}{kept}")))
         }
     };
-    RunReport { name: name.clone(), outcome: word, error, case: case.map(CaseRow::of) }
+    let case = report.case(run).map(CaseRow::of);
+    let is_renamed = run.case.group != report.group || run.case.name != run.name;
+    let renamed = (is_renamed && case.is_some()).then(|| run.case.to_string());
+    RunReport { name: run.name.clone(), outcome: word, error, case, renamed }
 }
 
 fn row(run: &RunReport) -> Vec<String> {

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crumple::assess::validate::{train_chosen, validate};
-use crumple::build::{self, RunOutcome};
+use crumple::build::{self, BuiltRun, RunOutcome};
 use crumple::curve::Case;
 use crumple::database::Database;
 use crumple::file::{WriteError, write_at, write_whole};
 use crumple::formats::{self, ExportInput};
-use crumple::multibody::{Run, simulate};
+use crumple::multibody::Run;
+use crumple::report::{MethodSpeeds, ReportSettings, report};
 use crumple::scenario;
 use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::predict::predict_beyond;
@@ -50,6 +51,8 @@ static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set
 static SCENARIOS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/examples/trains");
 /// The one that the demo runs.
 const SCENARIO: &str = "scenario.toml";
+/// Those that the report shows.
+const REPORTED: [&str; 2] = [SCENARIO, "en15227-identical-units.toml"];
 
 /// Groups and the model files of their curves.
 const MODELS: [(&str, &str); 3] =
@@ -103,9 +106,11 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     flow.unpack()?;
     let database = flow.build()?;
     let validations = flow.validate(&database)?;
-    let model = flow.train(&database, &validations)?;
-    let curve = flow.predict(&model)?;
+    let models = flow.train(&database, &validations)?;
+    let model = models.iter().find(|model| model.group == GROUP).expect("it is one of the list");
+    let curve = flow.predict(model)?;
     let run = flow.simulate()?;
+    flow.report(&database, &models)?;
     let Flow { bar, files, .. } = flow;
     bar.end();
     let document = Document {
@@ -155,7 +160,7 @@ impl Flow<'_> {
         for group in FE_RUNS.dirs() {
             let manifest = self.folder.join("fe").join(group.path()).join("study.toml");
             let report = build::build(&manifest, &path, |run| self.bar.step(run))?;
-            for (_, outcome) in report.runs {
+            for BuiltRun { outcome, .. } in report.runs {
                 if let RunOutcome::Failed { reason, .. } = outcome {
                     return Err(reason.into());
                 }
@@ -180,9 +185,13 @@ impl Flow<'_> {
         Ok(validations)
     }
 
-    /// Trains the model of every group that its validation chose; the one of [`GROUP`] goes on.
-    fn train(&mut self, database: &Database, validations: &[Validation]) -> Result<Model, Failure> {
-        let mut first = None;
+    /// Trains the model of every group that its validation chose.
+    fn train(
+        &mut self,
+        database: &Database,
+        validations: &[Validation],
+    ) -> Result<Vec<Model>, Failure> {
+        let mut models = Vec::new();
         for (group, file) in MODELS {
             self.bar.step(&format!("training {file}"));
             let validation = validations.iter().find(|v| v.group == group);
@@ -190,9 +199,9 @@ impl Flow<'_> {
             let cases = database.cases(group);
             let model = train_chosen(group, cases, &ModelKind::all(SEED), validation)?;
             model.write(&self.path(file))?;
-            first = first.or(Some(model));
+            models.push(model);
         }
-        first.ok_or_else(|| Failure::Usage("no model".into()))
+        Ok(models)
     }
 
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
@@ -216,7 +225,27 @@ impl Flow<'_> {
         }
         let path = self.folder.join(SCENARIO);
         let prepared = scenario::load(&path)?;
-        Ok(simulate(&prepared.chain, &prepared.settings)?)
+        Ok(prepared.run()?)
+    }
+}
+
+impl Flow<'_> {
+    /// The page about all of it; the models spare a second validation.
+    fn report(&mut self, database: &Database, models: &[Model]) -> Result<(), Failure> {
+        let settings = ReportSettings {
+            title: Some("crumple demo".into()),
+            groups: Vec::new(),
+            speed_m_per_s: None,
+            methods: MethodSpeeds::Worst,
+            nsdm_seeds: 0,
+            seed: SEED,
+        };
+        let scenarios = REPORTED.map(|name| self.folder.join(name));
+        let path = self.path("report.html");
+        let curves = self.folder.join("curves.h5");
+        let (page, _) =
+            report(&curves, database, &scenarios, models, &settings, |step| self.bar.step(step))?;
+        Ok(write_whole(&path, page.as_bytes())?)
     }
 }
 

@@ -8,12 +8,12 @@ use crumple::surrogate::Query;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::PredictError;
 use crumple::unit::UnitSystem;
-use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
-use super::export_input::{Chosen, Input};
+use super::curve_file::CurveFile;
+use super::export_input::{Chosen, Curves, Input};
 use super::export_output::Destination;
-use super::output;
+use super::output::{self, ListedFormat};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
 
 /// Write curves, recorded cases or a model for another tool
@@ -25,6 +25,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
   crumple export curves.h5 --group lead-car-wall --to lsdyna -o lead-car-wall.k
   crumple export lead.model --to table -o lead-table.h5
   crumple export ddtcm.model --to onnx -o ddtcm.onnx
+  crumple export test12.csv --speed 50km/h --kind wall --mass 24t --to lsdyna -o test12.k
   crumple export --list
 
 Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model tells them,
@@ -34,7 +35,8 @@ unloading stiffness. --tail changes that.
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
 parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
 pub struct Args {
-    /// Predicted curve (JSON of crumple predict), model (of crumple train) or curve database
+    /// Predicted curve (JSON of crumple predict), model (of crumple train), curve database, or a measured
+    /// or legacy curve's file (crumple db add --list)
     #[arg(required_unless_present = "list")]
     input: Option<PathBuf>,
     /// List the formats
@@ -47,12 +49,17 @@ pub struct Args {
     which: Which,
     #[command(flatten)]
     target: Target,
+    /// Units of a measured or legacy curve's file where it does not say them
+    #[arg(long, value_parser = units)]
+    input_units: Option<UnitSystem>,
+    #[command(flatten, next_help_heading = "Measured and legacy curves")]
+    file: CurveFile,
 }
 
 /// Which curves of a model or database.
 #[derive(clap::Args)]
 struct Which {
-    /// Speeds of a model's curves, or of a database's cases, with units; repeated or after commas
+    /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or after commas
     #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
     /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
@@ -167,6 +174,10 @@ impl Target {
                 .and_then(|e| e.to_str())
                 .or(self.to.as_deref())
                 .map(Into::into),
+            stem: path
+                .filter(|path| !path.is_dir())
+                .and_then(Path::file_stem)
+                .map(|stem| stem.to_string_lossy().into_owned()),
             speeds_m_per_s: Vec::new(),
             query: Query::at(0.0),
         }
@@ -271,7 +282,10 @@ fn export(
         },
         group: group.as_deref(),
         cases: case,
+        file: &args.file,
+        input_units: args.input_units,
     };
+    input.check_said(&chosen)?;
     if format.takes_model() {
         args.target.check_for_model(format)?;
         chosen.check_for_model(format.name == "table")?;
@@ -294,50 +308,46 @@ fn export(
                 case.force_kind.name()
             )));
         }
-        return Ok((format.export_cases(&cases, &args.target.options(output))?, Vec::new()));
+        let mut exported = format.export_cases(&cases, &args.target.options(output))?;
+        if let (Input::File(_), Some(case)) = (input, cases.into_iter().next()) {
+            exported.notes.splice(0..0, case.notes);
+            return Ok((exported, case.warnings));
+        }
+        return Ok((exported, Vec::new()));
     }
-    let mut curves = input.curves(&chosen)?;
+    export_curves(args, format, (input, &chosen), output)
+}
+
+/// The same of a format that is made of curves.
+fn export_curves(
+    args: &Args,
+    format: &Format,
+    (input, chosen): (&Input, &Chosen<'_>),
+    output: Option<&Path>,
+) -> Result<(Exported, Vec<String>), Failure> {
+    let Curves { inputs: mut curves, notes, mut warnings } = input.curves(chosen)?;
     if let (Input::Curve(curve), true, None) =
         (input, format.holds_both_forces(), args.target.force)
     {
         // The file itself holds both.
         curves[0].curve = curve.of_force(ForceKind::Body)?;
     }
-    let mut warnings: Vec<String> = Vec::new();
     for warning in curves.iter().flat_map(|c| &c.curve.warnings).map(ToString::to_string) {
         if !warnings.contains(&warning) {
             warnings.push(warning);
         }
     }
-    Ok((args.target.export(format, &curves, output)?, warnings))
-}
-
-#[derive(Serialize)]
-struct List {
-    formats: Vec<Listed>,
-}
-
-#[derive(Serialize)]
-struct Listed {
-    name: &'static str,
-    extensions: &'static [&'static str],
-    description: &'static str,
+    let mut exported = args.target.export(format, &curves, output)?;
+    exported.notes.splice(0..0, notes);
+    Ok((exported, warnings))
 }
 
 fn list(options: GlobalOptions) -> CommandResult {
-    if options.json {
-        let listed = |f: &Format| Listed {
-            name: f.name,
-            extensions: f.extensions,
-            description: f.description,
-        };
-        output::print_json(&List { formats: FORMATS.iter().map(listed).collect() })?;
-    } else {
-        output::print(|out| {
-            FORMATS.iter().try_for_each(|f| {
-                writeln!(out, "{:<9} .{:<14} {}", f.name, f.extensions.join(" ."), f.description)
-            })
-        })?;
-    }
+    let listed = FORMATS.iter().map(|f| ListedFormat {
+        name: f.name,
+        extensions: f.extensions,
+        description: f.description,
+    });
+    output::formats(listed.collect(), options)?;
     Ok(Outcome::Clean)
 }

@@ -1,4 +1,4 @@
-//! What `crumple export` is given: a predicted curve, a model or a database, told apart by content.
+//! What `crumple export` is given: a predicted curve, a model, a database or another curve's file, told apart by content.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -8,18 +8,23 @@ use crumple::database::Database;
 use crumple::dataset::is_same_speed;
 use crumple::file;
 use crumple::formats::ExportInput;
+use crumple::formats::read::is_folder_of_tests;
 use crumple::formats::read::json::{self, CurveFileError};
+use crumple::import::{self, Item, Settings};
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
-use crumple::unit::km_per_h;
+use crumple::unit::{UnitSystem, km_per_h};
 
 use super::Failure;
+use super::curve_file::{self, CurveFile};
 
 /// The input of an export.
 pub enum Input {
     Curve(Box<PredictedCurve>),
     Model(Box<Model>),
     Database(PathBuf, Database),
+    /// A measured or legacy curve's.
+    File(PathBuf),
 }
 
 /// Which curves of it.
@@ -29,6 +34,17 @@ pub struct Chosen<'a> {
     pub query: Query,
     pub group: Option<&'a str>,
     pub cases: &'a [String],
+    /// What is said of a measured or legacy curve, and the units of its file.
+    pub file: &'a CurveFile,
+    pub input_units: Option<UnitSystem>,
+}
+
+/// Curves, and what the user should know of how they were read.
+#[derive(Default)]
+pub struct Curves {
+    pub inputs: Vec<ExportInput>,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
 }
 
 /// Bytes in which a model file says that it is one.
@@ -38,6 +54,9 @@ const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 impl Input {
     pub fn read(path: &Path) -> Result<Self, Failure> {
+        if is_folder_of_tests(path) {
+            return Ok(Self::File(path.into()));
+        }
         let mut head = Vec::new();
         let named = |source| CurveFileError::Io { path: path.into(), source };
         file::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head)).map_err(named)?;
@@ -45,9 +64,22 @@ impl Input {
             return Ok(Self::Database(path.into(), Database::read(path)?));
         }
         let text = String::from_utf8_lossy(&head);
-        match text.contains("\"crumple model\"") {
-            true => Ok(Self::Model(Box::new(Model::read(path)?))),
-            false => Ok(Self::Curve(Box::new(json::predicted(path)?))),
+        let is_json = text.trim_start_matches('\u{feff}').trim_start().starts_with('{');
+        match (text.contains("\"crumple model\""), is_json) {
+            (true, _) => Ok(Self::Model(Box::new(Model::read(path)?))),
+            (false, true) => Ok(Self::Curve(Box::new(json::predicted(path)?))),
+            (false, false) => Ok(Self::File(path.into())),
+        }
+    }
+
+    /// Refuses what is said of a curve's file where there is none.
+    pub fn check_said(&self, chosen: &Chosen<'_>) -> Result<(), Failure> {
+        let is_said = chosen.file.is_asked() || chosen.input_units.is_some();
+        match (self, is_said) {
+            (Self::File(_), _) | (_, false) => Ok(()),
+            (_, true) => Err(Failure::Usage(
+                "--kind, --other-mass, --unloading, --from, --curve, --deflection-column, --force-column, --time-column, --accept-energy and --input-units are for the file of a measured or legacy curve: curves of crumple predict, models and databases say these themselves".into(),
+            )),
         }
     }
 
@@ -55,7 +87,7 @@ impl Input {
     pub fn model(&self, format: &str) -> Result<&Model, Failure> {
         match self {
             Self::Model(model) => Ok(model),
-            Self::Curve(_) | Self::Database(..) => Err(Failure::Usage(format!(
+            Self::Curve(_) | Self::Database(..) | Self::File(_) => Err(Failure::Usage(format!(
                 "{format} takes a model: crumple train, then crumple export MODEL --to {format}"
             ))),
         }
@@ -65,6 +97,7 @@ impl Input {
     pub fn cases(&self, chosen: &Chosen<'_>, format: &str) -> Result<Vec<Case>, Failure> {
         match self {
             Self::Database(path, database) => chosen.of_database(path, database),
+            Self::File(path) => Ok(vec![chosen.of_file(path)?]),
             Self::Curve(_) | Self::Model(_) => Err(Failure::Usage(format!(
                 "{format} takes histories over time, which a predicted curve does not have: give a curve database, or write a run's with crumple simulate -o"
             ))),
@@ -72,21 +105,27 @@ impl Input {
     }
 
     /// The curves.
-    pub fn curves(&self, chosen: &Chosen<'_>) -> Result<Vec<ExportInput>, Failure> {
-        match self {
+    pub fn curves(&self, chosen: &Chosen<'_>) -> Result<Curves, Failure> {
+        let of_case = |case: &Case| -> Result<ExportInput, Failure> {
+            Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })
+        };
+        let inputs = match self {
             Self::Curve(curve) => {
                 chosen.refuse_all("a predicted curve")?;
-                Ok(vec![ExportInput { curve: (**curve).clone(), beyond: None }])
+                vec![ExportInput { curve: (**curve).clone(), beyond: None }]
             }
-            Self::Model(model) => chosen.of_model(model),
+            Self::Model(model) => chosen.of_model(model)?,
             Self::Database(path, database) => {
                 let cases = chosen.of_database(path, database)?;
-                let curve = |case: &Case| {
-                    Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })
-                };
-                cases.iter().map(curve).collect()
+                cases.iter().map(of_case).collect::<Result<_, _>>()?
             }
-        }
+            Self::File(path) => {
+                let case = chosen.of_file(path)?;
+                let inputs = vec![of_case(&case)?];
+                return Ok(Curves { inputs, notes: case.notes, warnings: case.warnings });
+            }
+        };
+        Ok(Curves { inputs, ..Curves::default() })
     }
 }
 
@@ -145,6 +184,33 @@ impl Chosen<'_> {
             Ok(ExportInput { curve, beyond: Some(beyond) })
         };
         self.speeds_m_per_s.iter().map(curve).collect()
+    }
+
+    /// The case that a measured or legacy curve's file makes.
+    fn of_file(&self, path: &Path) -> Result<Case, Failure> {
+        if self.speeds_m_per_s.len() > 1 || self.cases.len() > 1 {
+            let message = "a file holds the curve of one impact: say one --speed and one --case";
+            return Err(Failure::Usage(message.into()));
+        }
+        if self.query.rule.is_some() || self.query.extrapolate {
+            let message =
+                "--max-crush and --extrapolate are for a model: a curve has its own crush";
+            return Err(Failure::Usage(message.into()));
+        }
+        let item = Item {
+            path: path.into(),
+            case: self.cases.first().cloned(),
+            speed_m_per_s: self.speeds_m_per_s.first().copied(),
+        };
+        let stem = path.file_stem().map_or("curve".into(), |stem| stem.to_string_lossy());
+        let mut settings = Settings {
+            group: self.group.unwrap_or(&stem).into(),
+            mass_kg: self.query.mass_kg,
+            parameters: self.query.parameters.clone(),
+            ..self.file.settings()
+        };
+        settings.read.units = self.input_units;
+        import::case_of_file(&item, &settings).map_err(curve_file::failure)
     }
 
     fn of_database(&self, path: &Path, database: &Database) -> Result<Vec<Case>, Failure> {

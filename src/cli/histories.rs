@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 
 use crumple::file::write_whole;
 use crumple::history::{History, Side};
-use crumple::solver::{self, Access, Problem, Selection, SolverFile, WantedId};
+use crumple::history_hdf5::{Beside, convert, encode};
+use crumple::solver::{self, Access, Problem, Selection, SolverFile, WantedId, decks};
+use crumple::unit::UnitSystem;
 use serde::Serialize;
 
+use super::export::units;
 use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
@@ -17,7 +20,9 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
 #[command(after_help = "Examples:
   crumple histories run/nodout --id 900001 --component x_displacement
   crumple histories run/rcforc --id 3:surfa -o force.csv
-  crumple histories run/nodout -o nodout.h5")]
+  crumple histories run/nodout -o nodout.h5
+  crumple histories run/nodout -o nodout.h5 --units mm-t-s
+HDF5 has named dimensions, titles of nodes and walls (from the file or the deck beside it) and units.")]
 pub struct Args {
     /// File written by a solver
     file: PathBuf,
@@ -39,6 +44,9 @@ pub struct Args {
     /// Where to write: .csv, .h5 or .hdf5 (default: CSV on standard output)
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck beside it]
+    #[arg(long, value_parser = units)]
+    units: Option<UnitSystem>,
     /// Replace an HDF5 file that is no file of histories, such as a curve database
     #[arg(long)]
     force: bool,
@@ -54,23 +62,18 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         audit: false,
     };
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
-    if let Some(output) = output {
-        solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
-        if !args.force && crumple::history_hdf5::is_other_hdf5(output) {
-            return Err(Failure::Usage(format!(
-                "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
-                output.display()
-            )));
-        }
-    }
-    let target = output.map(Target::of).transpose()?;
+    let target = checked_target(args, output)?;
+    let deck = match target {
+        Some(Target::Hdf5) => decks::beside(&args.file).map(|(_, deck)| deck),
+        _ => None,
+    };
+    let beside = Beside { units: args.units, deck: deck.as_ref() };
     // JSON on standard output beside a file needs the values themselves.
     let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !options.json);
     let format = args.format.as_deref();
     let bar = Bar::new(options, "reading");
     let read = match straight {
-        Some(path) => crumple::history_hdf5::convert(&args.file, format, &selection, path)
-            .map_err(Failure::from),
+        Some(path) => convert(&args.file, format, &selection, &beside, path).map_err(Failure::from),
         None => solver::read(&args.file, format, &selection).map_err(Failure::from),
     };
     bar.end();
@@ -90,7 +93,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match output.zip(target).filter(|_| straight.is_none()) {
         Some((path, target)) => {
             let bar = Bar::new(options, "writing");
-            let written = write(path, target, &file);
+            let written = write(path, target, &file, &beside, &args.file);
             bar.end();
             written?;
         }
@@ -101,6 +104,26 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         output::print_json(&document(args, &file))?;
     }
     Ok(if file.problems.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+/// What is written, if anything is; refuses what would be written over.
+fn checked_target(args: &Args, output: Option<&Path>) -> Result<Option<Target>, Failure> {
+    if let Some(output) = output {
+        solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
+        if !args.force && crumple::history_hdf5::is_other_hdf5(output) {
+            return Err(Failure::Usage(format!(
+                "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
+                output.display()
+            )));
+        }
+    }
+    let target = output.map(Target::of).transpose()?;
+    if args.units.is_some() && !matches!(target, Some(Target::Hdf5)) {
+        return Err(Failure::Usage(
+            "--units is for HDF5 (-o FILE.h5): CSV holds the values as they are in the file".into(),
+        ));
+    }
+    Ok(target)
 }
 
 enum Target {
@@ -120,14 +143,20 @@ impl Target {
     }
 }
 
-fn write(path: &Path, target: Target, file: &SolverFile) -> Result<(), Failure> {
+fn write(
+    path: &Path,
+    target: Target,
+    file: &SolverFile,
+    beside: &Beside<'_>,
+    source: &Path,
+) -> Result<(), Failure> {
     let bytes = match target {
         Target::Csv => {
             let mut csv = Vec::new();
             write_csv(&mut csv, file)?;
             csv
         }
-        Target::Hdf5 => crumple::history_hdf5::encode(file)?,
+        Target::Hdf5 => encode(file, beside, Some(source))?,
     };
     Ok(write_whole(path, &bytes)?)
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::solver::decks::{self, Search};
+use crumple::solver::decks;
 use crumple::solver::lsdyna::deck::Deck;
 use crumple::solver::{
     self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData,
@@ -11,8 +11,9 @@ use crumple::solver::{
 use serde::Serialize;
 
 use super::deck_report::DeckReport;
+use super::inspect_runs::{Asked, asked};
 use super::output;
-use super::{CommandResult, GlobalOptions, Outcome};
+use super::{CommandResult, GlobalOptions, Outcome, inspect_runs};
 
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
@@ -21,11 +22,12 @@ use super::{CommandResult, GlobalOptions, Outcome};
 Examples:
   crumple inspect run/nodout
   crumple inspect run/main.k               # what a deck says of its run
+  crumple inspect runs                     # the files of every run below a folder
   crumple inspect run/nodout run/rcforc --json
   crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged"
 )]
 pub struct Args {
-    /// Files written by a solver
+    /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Kind of the files (nodout, rcforc, …), if their content does not tell
@@ -80,49 +82,101 @@ impl Read {
     }
 }
 
+/// What was read of it: files with their sections, and what could not be read.
+struct Inspected {
+    /// The run's folder, if it was found by its folder.
+    run: Option<PathBuf>,
+    read: Vec<(PathBuf, Read)>,
+    unread: Vec<ReadError>,
+}
+
 pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let mut read: Vec<(&PathBuf, Read)> = Vec::new();
     let mut outcome = Outcome::Clean;
-    let access = if args.map { Access::Map } else { Access::Plain };
-    let selection = Selection { access, ..Selection::nothing() };
-    for path in &args.files {
-        match solver::read_sections(path, args.format.as_deref(), &selection) {
-            Ok(mut sections) => {
-                let deck = deck_for(path, &sections);
-                for mut file in sections.drain(..) {
-                    let filled = deck
-                        .as_ref()
-                        .map(|(from, deck)| (from.clone(), decks::fill_titles(&mut file, deck)));
-                    let titles_from = filled.filter(|(_, count)| *count > 0);
-                    read.push((path, Read::Section { file: Box::new(file), titles_from }));
-                }
-            }
-            Err(ReadError::Deck { .. }) => {
-                read.push((path, Read::Deck(Box::new(decks::read(path)?))));
-            }
-            Err(error) if args.files.len() == 1 => return Err(error.into()),
-            Err(error) => {
+    let mut inspected = Vec::new();
+    for asked in asked(&args.files)? {
+        let one = inspect(asked, args);
+        match (&one.run, &one.unread[..]) {
+            (_, []) => {}
+            (None, [error]) if args.files.len() > 1 => {
                 output::say(&format!("error: {error}"));
                 outcome = Outcome::Partly;
             }
+            (None, _) => {
+                if let Some(error) = one.unread.into_iter().next() {
+                    return Err(error.into());
+                }
+                continue;
+            }
+            // A file of a run may only be named like a solver's.
+            (Some(_), errors) => errors.iter().for_each(|error| options.warn(&error.to_string())),
         }
+        inspected.push(one);
     }
-    if outcome == Outcome::Clean && read.iter().any(|(_, r)| !r.problems().is_empty()) {
+    let is_damaged = |one: &Inspected| {
+        one.run.is_some() && !one.unread.is_empty()
+            || one.read.iter().any(|(_, read)| !read.problems().is_empty())
+    };
+    if outcome == Outcome::Clean && inspected.iter().any(is_damaged) {
         outcome = Outcome::Warned;
     }
-    let files: Vec<Report> = read
-        .iter()
-        .map(|(path, read)| match read {
-            Read::Section { file, titles_from } => report(path, file, titles_from.as_ref()),
-            Read::Deck(deck) => deck_report(path, deck),
-        })
-        .collect();
     if options.json {
+        let files = inspected.iter().flat_map(reports).collect();
         output::print_json(&Document { files })?;
     } else {
-        output::print(|out| files.iter().try_for_each(|file| print(out, file)))?;
+        output::print(|out| {
+            inspected.iter().try_for_each(|one| match &one.run {
+                None => reports(one).iter().try_for_each(|file| print(out, file)),
+                Some(folder) => {
+                    let rows: Vec<Vec<String>> = reports(one).iter().map(row).collect();
+                    inspect_runs::print(out, folder, &rows)
+                }
+            })
+        })?;
     }
     Ok(outcome)
+}
+
+fn inspect(asked: Asked, args: &Args) -> Inspected {
+    let (run, files) = match asked {
+        Asked::File(path) => (None, vec![path]),
+        Asked::Run { folder, files } => (Some(folder), files),
+    };
+    let access = if args.map { Access::Map } else { Access::Plain };
+    let selection = Selection { access, ..Selection::nothing() };
+    let mut inspected = Inspected { run, read: Vec::new(), unread: Vec::new() };
+    for path in files {
+        match read(&path, args.format.as_deref(), &selection) {
+            Ok(read) => inspected.read.extend(read.into_iter().map(|read| (path.clone(), read))),
+            Err(error) => inspected.unread.push(error),
+        }
+    }
+    inspected
+}
+
+/// The sections of a file, or the deck that it is.
+fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Read>, ReadError> {
+    let sections = match solver::read_sections(path, format, selection) {
+        Ok(sections) => sections,
+        Err(ReadError::Deck { .. }) => return Ok(vec![Read::Deck(Box::new(decks::read(path)?))]),
+        Err(error) => return Err(error),
+    };
+    let deck = deck_for(path, &sections);
+    let with_titles = |mut file: SolverFile| {
+        let filled =
+            deck.as_ref().map(|(from, deck)| (from.clone(), decks::fill_titles(&mut file, deck)));
+        let titles_from = filled.filter(|(_, count)| *count > 0);
+        Read::Section { file: Box::new(file), titles_from }
+    };
+    Ok(sections.into_iter().map(with_titles).collect())
+}
+
+fn reports(inspected: &Inspected) -> Vec<Report<'_>> {
+    let read = inspected.read.iter();
+    read.map(|(path, read)| match read {
+        Read::Section { file, titles_from } => report(path, file, titles_from.as_ref()),
+        Read::Deck(deck) => deck_report(path, deck),
+    })
+    .collect()
 }
 
 /// The deck beside a file, if an entity of the file lacks a title.
@@ -131,11 +185,7 @@ fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
     if !sections.iter().any(lacks) {
         return None;
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match decks::find(folder) {
-        Search::One(path) => decks::read(&path).ok().map(|deck| (path, deck)),
-        Search::None | Search::Several(_) => None,
-    }
+    decks::beside(path)
 }
 
 fn deck_report<'a>(path: &Path, deck: &'a Deck) -> Report<'a> {
@@ -182,6 +232,22 @@ fn report<'a>(
 
 /// Entities printed in full; of longer lists the rest is counted.
 const SHOWN_ENTITIES: usize = 20;
+
+/// A section in one line, as [`inspect_runs::HEADING`] has it.
+fn row(file: &Report<'_>) -> Vec<String> {
+    let name = Path::new(&file.path).file_name();
+    let times = file.time.map_or(["-".into(), "-".into()], |time| time.map(|t| format!("{t:?}")));
+    let [first, last] = times;
+    vec![
+        name.map_or(String::new(), |name| name.to_string_lossy().into_owned()),
+        file.section.unwrap_or(file.format).into(),
+        file.states.to_string(),
+        first,
+        last,
+        file.entities.len().to_string(),
+        file.problems.len().to_string(),
+    ]
+}
 
 fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
     writeln!(out, "{}", file.path)?;

@@ -1,36 +1,44 @@
 //! The commands: one file each, with its arguments and a `run` that calls the library.
 
 mod arguments;
+mod braille;
 mod build;
 mod compare;
+mod curve_file;
 mod db;
-mod db_add;
 mod deck_report;
 mod demo;
 mod export;
 mod export_input;
 mod export_output;
+mod file_kind;
 mod histories;
+mod init;
 mod inspect;
+mod inspect_runs;
 mod output;
 mod plot;
 mod predict;
 mod progress;
 mod rate;
+mod report;
 mod run_channels;
 mod shell;
 mod simulate;
 mod sweep;
+mod terminal;
 mod train;
 mod validate;
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
-use clap::{Parser, Subcommand};
+use clap::{FromArgMatches, Parser, Subcommand};
+use crumple::failure::{self, ErrorDocument};
 use crumple::file::is_same;
 
 /// Everything went well.
@@ -51,22 +59,26 @@ struct Cli {
     command: Command,
 }
 
+/// Heading in the help.
+const GLOBAL: &str = "Global options";
+
 /// Options that every command takes.
 #[derive(clap::Args, Clone, Copy)]
 pub struct GlobalOptions {
     /// Print one JSON document on standard output instead of text
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = GLOBAL)]
     pub json: bool,
     /// Print no progress and no warnings
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = GLOBAL)]
     pub quiet: bool,
     /// Exit with code 3 if there was damage or a warning
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = GLOBAL)]
     pub strict: bool,
 }
 
 #[derive(Subcommand)]
 enum Command {
+    Init(init::Args),
     Inspect(inspect::Args),
     Histories(histories::Args),
     Build(build::Args),
@@ -78,7 +90,9 @@ enum Command {
     Sweep(sweep::Args),
     Compare(compare::Args),
     Rate(Box<rate::Args>),
-    Export(export::Args),
+    Export(Box<export::Args>),
+    Plot(Box<plot::Args>),
+    Report(report::Args),
     Demo(demo::Args),
     Completions(shell::Completions),
     Man(shell::Man),
@@ -157,11 +171,72 @@ fn survive_file_size_limit() {
 #[cfg(not(unix))]
 fn survive_file_size_limit() {}
 
+/// The command line; a wrong one, and what `--help` and `--version` ask for, ends the program here.
+fn arguments() -> Result<Cli, ExitCode> {
+    let arguments: Vec<OsString> = std::env::args_os().collect();
+    if arguments.len() < 2 {
+        output::say(&shell::short_help());
+        return Err(ExitCode::from(USAGE));
+    }
+    let wants_json =
+        arguments.iter().take_while(|word| *word != "--").any(|word| *word == "--json");
+    let matches = shell::command().try_get_matches_from(arguments);
+    matches.and_then(|matches| Cli::from_arg_matches(&matches)).map_err(|error| {
+        if wants_json && error.use_stderr() {
+            // Without the word before it, and without the usage and the way to the help behind it.
+            let text = error.render().to_string();
+            let said = text.split("\n\nUsage:").next().unwrap_or_default();
+            let said = said.split("\n\nFor more information").next().unwrap_or_default();
+            let said = said.trim().trim_start_matches("error: ");
+            print_document(&ErrorDocument::usage(&shell::one_line(said)));
+        } else {
+            // With standard error closed there is nobody to tell.
+            let _ = error.print();
+        }
+        ExitCode::from(if error.use_stderr() { USAGE } else { DONE })
+    })
+}
+
+/// The document of an error; without standard output its message.
+fn print_document(document: &ErrorDocument) {
+    if output::print_json(document).is_err() {
+        output::say(&format!("error: {}", document.error.message));
+    }
+}
+
 pub fn main() -> ExitCode {
     survive_file_size_limit();
-    let cli = Cli::parse();
+    let cli = match arguments() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     let options = cli.options;
-    let result = match cli.command {
+    ExitCode::from(match run(cli.command, options) {
+        Ok(Outcome::Clean) => DONE,
+        Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
+        Ok(Outcome::Warned) => DONE,
+        Ok(Outcome::Partly) => FAILED,
+        Err(Failure::Usage(message)) => {
+            match options.json {
+                true => print_document(&ErrorDocument::usage(&message)),
+                false => output::say(&format!("error: {message}")),
+            }
+            USAGE
+        }
+        Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
+        Err(Failure::Failed(error)) => {
+            match options.json {
+                true => print_document(&ErrorDocument::new(&*error)),
+                false => print_error(&*error),
+            }
+            FAILED
+        }
+    })
+}
+
+fn run(command: Command, options: GlobalOptions) -> CommandResult {
+    match command {
+        Command::Init(args) => init::run(&args, options),
         Command::Inspect(args) => inspect::run(&args, options),
         Command::Histories(args) => histories::run(&args, options),
         Command::Build(args) => build::run(&args, options),
@@ -174,38 +249,19 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args, options),
         Command::Rate(args) => rate::run(&args, options),
         Command::Export(args) => export::run(&args, options),
+        Command::Plot(args) => plot::run(&args, options),
+        Command::Report(args) => report::run(&args, options),
         Command::Demo(args) => demo::run(&args, options),
         Command::Completions(args) => shell::completions(&args, options),
         Command::Man(args) => shell::man(&args, options),
-    };
-    ExitCode::from(match result {
-        Ok(Outcome::Clean) => DONE,
-        Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
-        Ok(Outcome::Warned) => DONE,
-        Ok(Outcome::Partly) => FAILED,
-        Err(Failure::Usage(message)) => {
-            output::say(&format!("error: {message}"));
-            USAGE
-        }
-        Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
-        Err(Failure::Failed(error)) => {
-            print_chain(&*error);
-            FAILED
-        }
-    })
+    }
 }
 
-/// The error, then its causes; causes that the message already contains are left out.
-fn print_chain(error: &dyn Error) {
-    let mut shown = error.to_string();
-    output::say(&format!("error: {shown}"));
-    let mut source = error.source();
-    while let Some(cause) = source {
-        let text = cause.to_string();
-        if !shown.contains(&text) {
-            output::say(&format!("  because: {text}"));
-        }
-        shown = text;
-        source = cause.source();
+/// The error with the line of the file that it is about, then its causes.
+fn print_error(error: &(dyn Error + 'static)) {
+    output::say(&format!("error: {error}"));
+    output::say_excerpt(failure::place(error));
+    for cause in failure::causes(error) {
+        output::say(&format!("  because: {cause}"));
     }
 }

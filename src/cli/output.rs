@@ -8,7 +8,9 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 
 use serde::Serialize;
 
-use super::Failure;
+use crumple::manifest::Place;
+
+use super::{Failure, GlobalOptions, terminal};
 
 /// Writes text to standard output.
 pub fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -74,6 +76,14 @@ impl Write for Named<'_> {
 pub fn say(line: &str) {
     // With standard error closed or full there is nobody to tell.
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
+}
+
+/// Prints the line of a file that an error is about on standard error, with carets below.
+pub fn say_excerpt(place: Option<&Place>) {
+    let width = terminal::error_width().unwrap_or(usize::MAX);
+    if let Some(excerpt) = place.and_then(|place| place.excerpt(width)) {
+        say(&excerpt);
+    }
 }
 
 /// A text without control characters but line ends and tabs.
@@ -153,30 +163,129 @@ pub fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
 }
 
 /// Prints rows under a heading with columns as wide as their content; the first
-/// column is set left, the others right.
+/// column is set left, the others right. What is wider than the terminal is shown in blocks of
+/// columns, each with the first one, or with a line for each cell.
 pub fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
+    table_within(out, terminal::width().unwrap_or(usize::MAX), heading, rows)
+}
+
+fn table_within(
+    out: &mut dyn Write,
+    width: usize,
+    heading: &[&str],
+    rows: &[Vec<String>],
+) -> io::Result<()> {
     // A name with a line's end or a tab in it is one cell all the same.
     let shown = |cell: &str| plain(cell).replace(['\n', '\t'], REPLACED);
     let heading: Vec<String> = heading.iter().map(|h| shown(h)).collect();
     let rows: Vec<Vec<String>> =
         rows.iter().map(|row| row.iter().map(|cell| shown(cell)).collect()).collect();
-    let width = |k: usize| {
+    let width_of = |k: usize| {
         let cells = rows.iter().filter_map(|r| r.get(k)).map(|c| c.chars().count());
         cells.chain([heading[k].chars().count()]).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..heading.len()).map(width).collect();
-    for row in std::iter::once(&heading).chain(&rows) {
-        let mut line = String::new();
-        for (k, (cell, width)) in row.iter().zip(&widths).enumerate() {
-            if k == 0 {
-                line.push_str(&format!("{cell:<width$}"));
-            } else {
-                line.push_str(&format!("  {cell:>width$}"));
-            }
+    let widths: Vec<usize> = (0..heading.len()).map(width_of).collect();
+    let first = widths.first().copied().unwrap_or(0);
+    let widest = widths.iter().skip(1).copied().max().map_or(0, |other| other + GAP.len());
+    if first + widest > width {
+        return list(out, width, &heading, &rows);
+    }
+    let mut from = 1;
+    loop {
+        let mut to = from;
+        let mut taken = first;
+        while to < widths.len() && taken + GAP.len() + widths[to] <= width {
+            taken += GAP.len() + widths[to];
+            to += 1;
         }
-        writeln!(out, "{}", line.trim_end())?;
+        for row in std::iter::once(&heading).chain(&rows) {
+            let mut line = row.first().map_or(String::new(), |cell| format!("{cell:<first$}"));
+            for (cell, width) in row.iter().zip(&widths).take(to).skip(from) {
+                line.push_str(&format!("{GAP}{cell:>width$}"));
+            }
+            writeln!(out, "{}", line.trim_end())?;
+        }
+        if to >= widths.len() {
+            return Ok(());
+        }
+        writeln!(out)?;
+        from = to;
+    }
+}
+
+/// Between columns.
+const GAP: &str = "  ";
+
+/// A table as a list: each row by its first cell, below it a line for each other one; what is
+/// longer than a line goes on in the next.
+fn list(
+    out: &mut dyn Write,
+    width: usize,
+    heading: &[String],
+    rows: &[Vec<String>],
+) -> io::Result<()> {
+    for row in rows {
+        for (k, (name, cell)) in heading.iter().zip(row).enumerate() {
+            let text = if name.is_empty() { cell.clone() } else { format!("{name}: {cell}") };
+            let (indent, more) = if k == 0 { ("", "  ") } else { ("  ", "    ") };
+            let mut line = indent.to_string();
+            for word in text.split(' ') {
+                let length = line.chars().count();
+                if !line.trim().is_empty() && length + 1 + word.chars().count() > width {
+                    writeln!(out, "{line}")?;
+                    line = more.into();
+                }
+                if !line.trim().is_empty() {
+                    line.push(' ');
+                }
+                // A word may be longer than a line.
+                for c in word.chars() {
+                    if line.chars().count() >= width {
+                        writeln!(out, "{line}")?;
+                        line = more.into();
+                    }
+                    line.push(c);
+                }
+            }
+            writeln!(out, "{}", line.trim_end())?;
+        }
     }
     Ok(())
+}
+
+/// A format as a list of them says it.
+#[derive(Serialize)]
+pub struct ListedFormat {
+    pub name: &'static str,
+    pub extensions: &'static [&'static str],
+    pub description: &'static str,
+}
+
+/// Prints the formats that a command knows.
+pub fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Result<(), Failure> {
+    #[derive(Serialize)]
+    struct Document {
+        formats: Vec<ListedFormat>,
+    }
+    if options.json {
+        return print_json(&Document { formats });
+    }
+    let extensions = |format: &ListedFormat| format!(".{}", format.extensions.join(" ."));
+    let widest = |length: &dyn Fn(&ListedFormat) -> usize| formats.iter().map(length).max();
+    let name = widest(&|format| format.name.len()).unwrap_or(0);
+    let endings = widest(&|format| extensions(format).len()).unwrap_or(0);
+    print(|out| {
+        formats.iter().try_for_each(|format| {
+            let (own, description) = (extensions(format), format.description);
+            writeln!(out, "{:<name$}  {own:<endings$}  {description}", format.name)
+        })
+    })
+}
+
+/// A number of things: `1 case`, `2 cases`.
+pub fn counted(number: usize, what: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{plural}")
 }
 
 #[cfg(test)]
@@ -211,5 +320,29 @@ mod tests {
         table(&mut out, &["name", "v"], &[vec!["a\nb\u{1b}[A".into(), "1".into()]]).unwrap();
         let text = String::from_utf8(out).unwrap();
         assert_eq!(text, "name    v\na\u{fffd}b\u{fffd}[A  1\n");
+    }
+
+    #[test]
+    fn a_wide_table_fits_the_terminal() {
+        let table = |width: usize| {
+            let mut out = Vec::new();
+            let rows = [
+                vec!["a".into(), "10.5".into(), "7".into()],
+                vec!["bcd".into(), "1".into(), "8".into()],
+            ];
+            table_within(&mut out, width, &["run", "speed km/h", "mass"], &rows).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let whole = "run  speed km/h  mass\na          10.5     7\nbcd           1     8\n";
+        assert_eq!(table(usize::MAX), whole);
+        assert_eq!(table(21), whole);
+        let blocks = "run  speed km/h\na          10.5\nbcd           1\n\nrun  mass\na       7\nbcd     8\n";
+        assert_eq!(table(20), blocks);
+        assert_eq!(table(15), blocks);
+        let list = "run: a\n  speed km/h:\n    10.5\n  mass: 7\nrun: bcd\n  speed km/h:\n    1\n  mass: 8\n";
+        assert_eq!(table(14), list);
+        for width in 6..30 {
+            assert!(table(width).lines().all(|line| line.len() <= width), "{}", table(width));
+        }
     }
 }

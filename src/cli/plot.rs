@@ -1,41 +1,358 @@
-//! Curves in the terminal, drawn with Braille characters of 2 by 4 dots.
+//! `crumple plot`: pictures of databases, models, curves, runs and solver files.
 
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
-/// Characters across and down.
-const SIZE: (usize, usize) = (70, 13);
-/// Bits of a Braille character's dots, by row and column.
-const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+use crumple::assess::ComparisonSettings;
+use crumple::assess::train::compare_train;
+use crumple::assess::validate::Choice;
+use crumple::charts::{self, HistoryOptions, Motion, Quantity};
+use crumple::curve::ForceKind;
+use crumple::database::Database;
+use crumple::file::{self, write_all_whole};
+use crumple::formats::read::json;
+use crumple::plot::Chart;
+use crumple::scenario;
+use crumple::solver::{self, Access, Selection, WantedId};
+use crumple::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
+use crumple::unit::{UnitSystem, km_per_h};
+use serde::Serialize;
 
-/// Draws force (N, shown in MN) over deflection (m, increasing); the force axis includes 0.
-pub fn curve(out: &mut dyn Write, deflection_m: &[f64], force_n: &[f64]) -> io::Result<()> {
-    let end_m = deflection_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let low = force_n.iter().copied().fold(0.0, f64::min);
-    let high = force_n.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let (width, height) = (2 * SIZE.0, 4 * SIZE.1);
-    // Row of dots from the top.
-    let row = |force: f64| ((high - force) / (high - low) * (height - 1) as f64).round() as usize;
-    let column = |d: f64| (d / end_m * (width - 1) as f64).round().max(0.0) as usize;
-    let mut cells = vec![[0_u32; SIZE.0]; SIZE.1];
-    let mut dot = |x: usize, y: usize| cells[y / 4][x / 2] |= DOTS[y % 4][x % 2];
-    let points: Vec<(usize, usize)> =
-        deflection_m.iter().zip(force_n).map(|(&d, &f)| (column(d), row(f))).collect();
-    for pair in points.windows(2) {
-        let [(x0, y0), (x1, y1)] = [pair[0], pair[1]];
-        let steps = x0.abs_diff(x1).max(y0.abs_diff(y1)).max(1);
-        let between = |a: usize, b: usize, k: usize| {
-            (a as f64 + (b as f64 - a as f64) * k as f64 / steps as f64).round() as usize
-        };
-        (0..=steps).for_each(|k| dot(between(x0, x1, k), between(y0, y1, k)));
+use super::arguments::{self, one_of};
+use super::file_kind::FileKind;
+use super::output;
+use super::progress::Bar;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
+
+/// Draw curves, predictions, runs and histories as SVG or PNG
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple plot curves.h5 --group lead-car-wall -o curves.svg            # force over deflection by speed
+  crumple plot curves.h5 --group lead-car-wall --left-out 48km/h -o left-out.png
+  crumple plot lead.model --speed 50km/h -o lead50.svg                  # band, over its neighbours
+  crumple plot scenario.toml --quantity energy -o energy.svg            # runs the scenario
+  crumple plot result.csv --quantity crush -o crush.svg
+  crumple plot train-set.toml --train -o train.svg                      # FE's train and the methods
+  crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
+What the file is, its content tells. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
+pub struct Args {
+    /// Database, model, predicted curve, scenario, result (CSV) or solver file
+    file: PathBuf,
+    /// Picture to write: .svg or .png; may be repeated
+    #[arg(short, long, required = true)]
+    output: Vec<PathBuf>,
+    /// Of a database: the group (default: the only one)
+    #[arg(long)]
+    group: Option<String>,
+    /// Of a database: which force (default: the recipe's)
+    #[arg(long, value_parser = one_of(FORCES))]
+    force: Option<ForceKind>,
+    /// Of a database: leave this speed out, predict it from the others, and compare
+    #[arg(long, value_parser = arguments::speed, value_name = "SPEED", conflicts_with = "force")]
+    left_out: Option<f64>,
+    /// Of a model: speed of the curve
+    #[arg(long, value_parser = arguments::speed)]
+    speed: Option<f64>,
+    /// Of a scenario or result: what is drawn
+    #[arg(long, value_parser = one_of(QUANTITIES), default_value = "velocity")]
+    quantity: Quantity,
+    /// Of a scenario with FE's run as reference: compare the methods in the whole train
+    #[arg(long)]
+    train: bool,
+    /// Of a solver file: node, wall or interface; may be repeated
+    #[arg(long = "id")]
+    ids: Vec<WantedId>,
+    /// Of a solver file: component named as in binout, such as x_velocity; may be repeated
+    #[arg(long = "component")]
+    components: Vec<String>,
+    /// Of a solver file: section of a binout
+    #[arg(long)]
+    section: Option<String>,
+    /// Of a solver file: its kind (nodout, rcforc, …), if its content does not tell
+    #[arg(long)]
+    format: Option<String>,
+    /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units
+    #[arg(long, value_parser = units)]
+    units: Option<UnitSystem>,
+    /// Of a solver file: filtered lines beside the raw ones, by channel frequency class such as 60
+    #[arg(long, value_name = "CLASS", requires = "units", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    cfc: Option<u32>,
+    /// Title above the picture (default: what is drawn)
+    #[arg(long)]
+    title: Option<String>,
+    /// Width in pixels
+    #[arg(long, default_value_t = 780.0, value_parser = pixels)]
+    width: f64,
+    /// Height of the area between the axes in pixels
+    #[arg(long, default_value_t = 320.0, value_parser = pixels)]
+    height: f64,
+    /// Pixels of a PNG for each pixel of the width
+    #[arg(long, default_value_t = 2.0, value_parser = scale)]
+    scale: f64,
+}
+
+const FORCES: &[(&str, ForceKind, &str)] = &[
+    ("contact", ForceKind::Contact, "What the obstacle feels"),
+    ("body", ForceKind::Body, "What moves the body"),
+];
+
+const QUANTITIES: &[(&str, Quantity, &str)] = &[
+    ("velocity", Quantity::Velocity, "Speeds of the bodies over time"),
+    ("acceleration", Quantity::Acceleration, "Accelerations of the bodies over time"),
+    ("force", Quantity::Force, "Forces of the interfaces over time"),
+    ("crush", Quantity::Crush, "Forces of the interfaces over their deflection"),
+    ("energy", Quantity::Energy, "Kinetic, stored and dissipated energy over time"),
+];
+
+fn units(text: &str) -> Result<UnitSystem, String> {
+    UnitSystem::parse(text).map_err(|e| e.to_string())
+}
+
+fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|n| (low..=high).contains(n));
+    number.ok_or_else(|| format!("expected a number from {low} to {high}"))
+}
+
+fn pixels(text: &str) -> Result<f64, String> {
+    within(text, 80.0, 5000.0)
+}
+
+fn scale(text: &str) -> Result<f64, String> {
+    within(text, 0.5, 8.0)
+}
+
+/// Most bytes of a result that is drawn.
+const MOST_RESULT: u64 = 1 << 30;
+
+#[derive(Serialize)]
+struct Document {
+    title: String,
+    series: Vec<String>,
+    notes: Vec<String>,
+    files: Vec<PathBuf>,
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let pictures =
+        args.output.iter().map(|path| Picture::of(path)).collect::<Result<Vec<_>, _>>()?;
+    args.output.iter().try_for_each(|output| keep_input(&args.file, output))?;
+    let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
+    if to_stdout > 1 || to_stdout == 1 && options.json {
+        return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
     }
-    for (i, line) in cells.iter().enumerate() {
-        let label = match i {
-            0 => format!(" {:.3} MN", high / 1e6),
-            i if i + 1 == SIZE.1 => format!(" {:.3} MN", low / 1e6),
-            _ => String::new(),
-        };
-        let braille = line.iter().filter_map(|&bits| char::from_u32(0x2800 + bits));
-        writeln!(out, "{}{label}", braille.collect::<String>())?;
+    let mut chart = chart(args, options)?;
+    if let Some(title) = &args.title {
+        chart.title.clone_from(title);
     }
-    writeln!(out, "0 m{:>1$}", format!("{end_m:.3} m"), SIZE.0 - 3)
+    (chart.width, chart.height) = (args.width, args.height);
+    let drawing = chart.drawing();
+    let mut files = Vec::new();
+    for (path, picture) in args.output.iter().zip(&pictures) {
+        let bytes = match picture {
+            Picture::Svg => drawing.svg().into_bytes(),
+            Picture::Png => drawing.png(args.scale)?,
+        };
+        match is_stdout(path) {
+            true => output::print_data(|out| out.write_all(&bytes))?,
+            false => files.push((path.as_path(), bytes)),
+        }
+    }
+    let all: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (*path, &bytes[..])).collect();
+    write_all_whole(&all)?;
+    let document = Document {
+        series: names(&chart),
+        title: chart.title,
+        notes: chart.notes,
+        files: files.iter().map(|(path, _)| path.to_path_buf()).collect(),
+    };
+    if options.json {
+        output::print_json(&document)?;
+    } else if to_stdout == 0 {
+        output::print(|out| print(out, &document))?;
+    }
+    Ok(Outcome::Clean)
+}
+
+fn names(chart: &Chart) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for series in chart.panels.iter().flat_map(|panel| &panel.series) {
+        if !names.contains(&series.name) {
+            names.push(series.name.clone());
+        }
+    }
+    names
+}
+
+fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+    for file in &document.files {
+        writeln!(out, "wrote {}: {}", file.display(), document.title)?;
+    }
+    Ok(())
+}
+
+enum Picture {
+    Svg,
+    Png,
+}
+
+impl Picture {
+    fn of(path: &Path) -> Result<Self, Failure> {
+        if is_stdout(path) {
+            return Ok(Self::Svg);
+        }
+        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Failure::Usage(format!(
+                "-o {}: pictures are written as .svg or .png",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// The chart of whatever the file is.
+fn chart(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+    let kind = FileKind::of(&args.file)?;
+    args.refuse_unused(kind)?;
+    match kind {
+        FileKind::Database => of_database(args, options),
+        FileKind::Model => of_model(args),
+        FileKind::Curve => of_force(args, json::predicted(&args.file)?, &[]),
+        FileKind::Scenario if args.train => of_train(args, options),
+        FileKind::Scenario => {
+            let prepared = scenario::load(&args.file)?;
+            let run = prepared.run()?;
+            let mut warnings = prepared.warnings.clone();
+            warnings.extend(run.all_warnings());
+            warnings.iter().for_each(|warning| options.warn(warning));
+            of_motion(args, &Motion::of_run(&prepared.chain, &run, &prepared.order))
+        }
+        FileKind::Result => {
+            let text = file::read(&args.file, MOST_RESULT).map_err(|e| named(&args.file, e))?;
+            of_motion(args, &Motion::of_csv(&text).map_err(|e| named(&args.file, e))?)
+        }
+        FileKind::Solver => of_solver_file(args, options),
+    }
+}
+
+fn named(path: &Path, error: impl std::fmt::Display) -> Failure {
+    Failure::Failed(format!("{}: {error}", path.display()).into())
+}
+
+impl Args {
+    /// Refuses options that have no use for the kind of file.
+    fn refuse_unused(&self, kind: FileKind) -> Result<(), Failure> {
+        let is = |kinds: &[FileKind]| kinds.contains(&kind);
+        let of_solver = is(&[FileKind::Solver]);
+        for (given, allowed, what) in [
+            (self.group.is_some(), is(&[FileKind::Database]), "--group is for a database"),
+            (
+                self.force.is_some(),
+                is(&[FileKind::Database, FileKind::Model, FileKind::Curve]),
+                "--force is for a database, model or curve",
+            ),
+            (self.left_out.is_some(), is(&[FileKind::Database]), "--left-out is for a database"),
+            (self.speed.is_some(), is(&[FileKind::Model]), "--speed is for a model"),
+            (self.train, is(&[FileKind::Scenario]), "--train is for a scenario"),
+            (!self.ids.is_empty(), of_solver, "--id is for a solver file"),
+            (!self.components.is_empty(), of_solver, "--component is for a solver file"),
+            (self.section.is_some(), of_solver, "--section is for a solver file"),
+            (self.format.is_some(), of_solver, "--format is for a solver file"),
+            (self.units.is_some(), of_solver, "--units is for a solver file"),
+        ] {
+            if given && !allowed {
+                return Err(Failure::Usage(format!(
+                    "{what}: {} is {}",
+                    self.file.display(),
+                    kind.name()
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+    let database = Database::read(&args.file)?;
+    let (group, cases) = database.group_or_only(&args.file, args.group.as_deref())?;
+    let Some(speed) = args.left_out else {
+        let own = cases.first().map_or(ForceKind::Contact, |case| case.force_kind);
+        return Ok(charts::group_curves(group, cases, args.force.unwrap_or(own)));
+    };
+    let bar = Bar::new(options, "leaving the speed out");
+    let chart = charts::left_out_at(group, cases, speed, Choice::Auto { seed: 0, trees: None });
+    bar.end();
+    Ok(chart?)
+}
+
+/// A model's curve over its neighbours.
+fn of_model(args: &Args) -> Result<Chart, Failure> {
+    let model = Model::read(&args.file)?;
+    let Some(speed) = args.speed else { return Err(speed_of_model(&model)) };
+    of_force(args, predict(&model, &Query::at(speed))?, &model.cases)
+}
+
+/// A curve, or its part of one force.
+fn of_force(
+    args: &Args,
+    curve: PredictedCurve,
+    neighbours: &[ModelCase],
+) -> Result<Chart, Failure> {
+    let curve = match args.force {
+        Some(force) => curve.of_force(force)?,
+        None => curve,
+    };
+    Ok(charts::prediction(&curve, neighbours))
+}
+
+fn speed_of_model(model: &Model) -> Failure {
+    let (low, high) = model.range_m_per_s();
+    Failure::Usage(format!(
+        "name the speed of the model's curve with --speed ({} to {})",
+        km_per_h(low),
+        km_per_h(high)
+    ))
+}
+
+fn of_train(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+    let scenario = scenario::read(&args.file)?;
+    let settings = ComparisonSettings { nsdm_seeds: 0, ..ComparisonSettings::default() };
+    let bar = Bar::new(options, "comparing in the train");
+    let comparison = compare_train(&args.file, &scenario, &settings)?;
+    bar.end();
+    Ok(charts::train_speeds("Train: FE and the methods", &comparison))
+}
+
+fn of_motion(args: &Args, motion: &Motion) -> Result<Chart, Failure> {
+    let stem = args.file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let (quantity, ..) =
+        QUANTITIES.iter().find(|(_, q, _)| *q == args.quantity).expect("one of the list");
+    motion.chart(&format!("{stem}: {quantity}"), args.quantity).ok_or_else(|| {
+        Failure::Usage(format!(
+            "{} has no energies, which need the masses: give the scenario itself",
+            args.file.display()
+        ))
+    })
+}
+
+fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+    let selection = Selection {
+        ids: (!args.ids.is_empty()).then(|| args.ids.clone()),
+        components: (!args.components.is_empty()).then(|| args.components.clone()),
+        section: args.section.clone(),
+        access: Access::Plain,
+        audit: false,
+    };
+    let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
+    for problem in &file.problems {
+        options.warn(&format!("{}: {problem}", args.file.display()));
+    }
+    let title = match &file.title {
+        Some(title) => format!("{}: {title}", args.file.display()),
+        None => args.file.display().to_string(),
+    };
+    let histories: Vec<_> = file.histories.iter().collect();
+    let options = HistoryOptions { units: args.units, filter_class: args.cfc };
+    charts::histories(&title, &histories, options).map_err(|e| named(&args.file, e))
 }

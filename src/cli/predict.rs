@@ -1,7 +1,8 @@
 //! `crumple predict`: the curve at a new speed.
 
+use crumple::plural::counted;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crumple::curve::{ForceKind, Parameter};
 use crumple::file::write_all_whole;
@@ -11,6 +12,7 @@ use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::predict::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
 use crumple::unit::km_per_h;
+use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
 use super::output;
@@ -82,7 +84,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let input = [ExportInput { curve, beyond: Some(beyond) }];
     let curve = &input[0].curve;
     let files = files(args, &formats, &input, options)?;
-    let named = args.output.iter().zip(&files).map(|(path, bytes)| (&**path, &**bytes));
+    let named = files.iter().map(|file| (file.path, &*file.bytes));
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
     for warning in &curve.warnings {
@@ -91,7 +93,12 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some((_, bytes)) = printed.first() {
         output::print(|out| out.write_all(bytes))?;
     } else if options.json {
-        output::print_json(curve)?;
+        let exports = files.iter().map(|file| Export {
+            output: file.path.display().to_string(),
+            format: file.format,
+            notes: &file.notes,
+        });
+        output::print_json(&Document { curve, exports: exports.collect() })?;
     } else {
         output::print(|out| {
             print(out, curve)?;
@@ -101,19 +108,48 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }
 
-/// The bytes of every output: all are encoded before the first is written.
-fn files(
-    args: &Args,
+/// The curve, and what is to be said of its files.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    curve: &'a PredictedCurve,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    exports: Vec<Export<'a>>,
+}
+
+#[derive(Serialize)]
+struct Export<'a> {
+    output: String,
+    format: &'static str,
+    notes: &'a [String],
+}
+
+/// An output that is to be written.
+struct File<'a> {
+    path: &'a Path,
+    format: &'static str,
+    bytes: Vec<u8>,
+    notes: Vec<String>,
+}
+
+/// Every output: all are encoded before the first is written.
+fn files<'a>(
+    args: &'a Args,
     formats: &[&Format],
     input: &[ExportInput],
     options: GlobalOptions,
-) -> Result<Vec<Vec<u8>>, Failure> {
+) -> Result<Vec<File<'a>>, Failure> {
     let mut files = Vec::new();
     for (path, format) in args.output.iter().zip(formats) {
         let Exported { files: mut exported, notes, .. } =
             args.target.export(format, input, Some(path))?;
         match (exported.pop(), exported.is_empty()) {
-            (Some((_, bytes)), true) => files.push(bytes),
+            (Some((_, bytes)), true) => {
+                if !options.quiet && !options.json {
+                    notes.iter().for_each(|note| output::say(&format!("note: {note}")));
+                }
+                files.push(File { path, format: format.name, bytes, notes });
+            }
             _ => {
                 return Err(Failure::Usage(format!(
                     "-o {}: this gives several files: crumple export --to {} -o FOLDER",
@@ -122,9 +158,6 @@ fn files(
                 )));
             }
         }
-        if !options.quiet && !options.json {
-            notes.iter().for_each(|note| output::say(&format!("note: {note}")));
-        }
     }
     Ok(files)
 }
@@ -132,12 +165,11 @@ fn files(
 /// Where a band's curve lies, and what the band comes from.
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
-    let s = if band.curves == 1 { "" } else { "s" };
-    let speeds = match band.left_out {
-        LeftOutSpeeds::Inner => "curve{s} left out between others, for the width of the gap here",
-        LeftOutSpeeds::Ends => "end{s} of the range left out, growing with the distance",
+    let (one, how) = match band.left_out {
+        LeftOutSpeeds::Inner => ("curve", "left out between others, for the width of the gap here"),
+        LeftOutSpeeds::Ends => ("end", "of the range left out, growing with the distance"),
     };
-    format!("{place}, from {} {}", band.curves, speeds.replace("{s}", s))
+    format!("{place}, from {} {how}", counted(band.curves, one))
 }
 
 /// The unloading stiffness of each force, and the rebound.
@@ -215,5 +247,5 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         writeln!(out, "  warning              {warning}")?;
     }
     writeln!(out, "\nforce [MN] over deflection [m]")?;
-    super::plot::curve(out, &curve.deflection_m, &curve.force_n)
+    super::braille::curve(out, &curve.deflection_m, &curve.force_n)
 }

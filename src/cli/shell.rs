@@ -1,10 +1,14 @@
-//! `crumple completions` and `crumple man`: made from the command line's own definition.
+//! `crumple completions`, `crumple man` and the help: made from the command line's own definition.
 
-use clap::CommandFactory;
+use std::path::{Path, PathBuf};
+
+use clap::{Command, CommandFactory};
+use crumple::file::write_whole;
 use serde::Serialize;
 
 use super::output;
-use super::{Cli, CommandResult, GlobalOptions, Outcome};
+use super::terminal;
+use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome};
 
 /// Print a completion script for a shell
 #[derive(clap::Args)]
@@ -16,12 +20,69 @@ pub struct Completions {
     shell: clap_complete::Shell,
 }
 
-/// Print the manual page
+/// Print the manual page, or write those of all commands
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  crumple man > crumple.1
-  crumple man | man -l -")]
-pub struct Man {}
+  crumple man | man -l -
+  crumple man -o ~/.local/share/man/man1      # then: man crumple-build")]
+pub struct Man {
+    /// Folder for crumple.1 and a page of every command, such as crumple-build.1; made if it is
+    /// not there
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+/// The command line's definition, with the options that every command takes under one heading.
+pub fn command() -> Command {
+    let mut command = Cli::command();
+    // Makes the commands' own help and version options, which otherwise come too late.
+    command.build();
+    under_one_heading(command)
+}
+
+fn under_one_heading(command: Command) -> Command {
+    let global = |id: &str| ["help", "version"].contains(&id);
+    let command = command.mut_args(|arg| match global(arg.get_id().as_str()) {
+        true => arg.help_heading(GLOBAL).display_order(1000),
+        false => arg,
+    });
+    command.mut_subcommands(under_one_heading)
+}
+
+/// The usual order of work.
+const ORDER: [(&str, &str); 7] = [
+    ("inspect RUN/nodout", "what a solver's file holds"),
+    ("build study.toml -o curves.h5", "curves of all runs of a study"),
+    ("validate curves.h5 --group G", "which model predicts best"),
+    ("train curves.h5 --group G -o M", "fit it"),
+    ("predict M --speed 50km/h", "a curve that was never run"),
+    ("simulate scenario.toml", "a train, vehicle by vehicle"),
+    ("report curves.h5 -o report.html", "all of it on one page"),
+];
+
+/// What `crumple` says without arguments, for a terminal of at least 60 columns.
+pub fn short_help() -> String {
+    let about = Cli::command().get_about().map(ToString::to_string).unwrap_or_default();
+    let is_narrow = terminal::error_width().is_some_and(|width| width < 80);
+    let about = if is_narrow { about.replacen(" from ", "\nfrom ", 1) } else { about };
+    let mut text =
+        format!("{about}\n\nUsage: crumple COMMAND [OPTIONS]\n\nThe usual order of work:\n");
+    for (command, what) in ORDER {
+        text += &match is_narrow {
+            true => format!("  crumple {command}\n      {what}\n"),
+            false => format!("  crumple {command:<34}{what}\n"),
+        };
+    }
+    text + "\ncrumple demo shows all of it on bundled runs;\n\
+        crumple --help lists every command,\n\
+        crumple COMMAND --help its options."
+}
+
+/// A text of several lines as one.
+pub fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join("; ")
+}
 
 pub fn completions(args: &Completions, options: GlobalOptions) -> CommandResult {
     let mut script = Vec::new();
@@ -29,10 +90,54 @@ pub fn completions(args: &Completions, options: GlobalOptions) -> CommandResult 
     print(&script, options)
 }
 
-pub fn man(_: &Man, options: GlobalOptions) -> CommandResult {
+pub fn man(args: &Man, options: GlobalOptions) -> CommandResult {
+    if let Some(folder) = &args.output {
+        return write_pages(folder, options);
+    }
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
     print(&page, options)
+}
+
+#[derive(Serialize)]
+struct Pages {
+    written: Vec<PathBuf>,
+}
+
+/// Writes a page of every command and of each of its own commands.
+fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
+    std::fs::create_dir_all(folder).map_err(|source| {
+        let message = format!("cannot make {}: {source}", folder.display());
+        std::io::Error::new(source.kind(), message)
+    })?;
+    let mut command = Cli::command();
+    command.build();
+    let mut written = Vec::new();
+    pages(&command, "crumple", folder, &mut written)?;
+    match options.json {
+        true => output::print_json(&Pages { written })?,
+        false => output::print(|out| {
+            written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
+        })?,
+    }
+    Ok(Outcome::Clean)
+}
+
+fn pages(
+    command: &Command,
+    name: &str,
+    folder: &Path,
+    written: &mut Vec<PathBuf>,
+) -> Result<(), super::Failure> {
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command.clone()).render(&mut page)?;
+    let path = folder.join(format!("{name}.1"));
+    write_whole(&path, &page)?;
+    written.push(path);
+    for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
+        pages(sub, &format!("{name}-{}", sub.get_name()), folder, written)?;
+    }
+    Ok(())
 }
 
 #[derive(Serialize)]

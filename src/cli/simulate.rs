@@ -4,9 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crumple::file::write_whole;
-use crumple::multibody::{
-    BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2, SimulationError, simulate,
-};
+use crumple::multibody::{BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2};
 use crumple::scenario::{self, Prepared};
 use crumple::unit::km_per_h;
 use serde::Serialize;
@@ -87,21 +85,6 @@ struct InterfaceSummary {
     curve_speed_m_per_s: Option<f64>,
 }
 
-/// Why a run stopped, with the scenario's place.
-#[derive(Debug)]
-struct InScenario {
-    path: PathBuf,
-    source: SimulationError,
-}
-
-impl std::fmt::Display for InScenario {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.path.display(), self.source)
-    }
-}
-
-impl std::error::Error for InScenario {}
-
 pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = &args.output {
         keep_inputs(&args.scenario, output)?;
@@ -114,8 +97,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     let prepared = scenario::load(&args.scenario)?;
-    let run = simulate(&prepared.chain, &prepared.settings)
-        .map_err(|source| InScenario { path: args.scenario.clone(), source })?;
+    let run = prepared.run()?;
     let mut warnings = prepared.warnings.clone();
     warnings.extend(run.all_warnings());
     for warning in &warnings {

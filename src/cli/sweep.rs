@@ -1,5 +1,6 @@
 //! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
 
+use crumple::plural::counted;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -261,8 +262,9 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
             };
             writeln!(
                 out,
-                "{} items{resumed}, {} failed, {seconds:.1} s",
-                report.rows, report.failed
+                "{}{resumed}, {} failed, {seconds:.1} s",
+                counted(report.rows, "item"),
+                report.failed
             )?;
             match report.resumed == report.rows && report.rows > 0 {
                 true => writeln!(out, "{} is complete: nothing was left to run", output.display()),
@@ -324,14 +326,19 @@ fn dry_run(sweep: &Sweep, shard: Shard, global: GlobalOptions) -> CommandResult 
         return Ok(Outcome::Clean);
     }
     output::print(|out| {
-        writeln!(out, "{} items", preview.items)?;
+        writeln!(out, "{}", counted(preview.items, "item"))?;
         if shard != Shard::WHOLE {
             let (index, count) = (shard.index(), shard.count());
-            writeln!(out, "shard {index}/{count}: {} items from {} on", preview.rows, items.start)?;
+            writeln!(
+                out,
+                "shard {index}/{count}: {} from {} on",
+                counted(preview.rows, "item"),
+                items.start
+            )?;
         }
         for variable in &preview.variables {
             match variable.values {
-                Some(count) => writeln!(out, "{}: {count} values", variable.column)?,
+                Some(count) => writeln!(out, "{}: {}", variable.column, counted(count, "value"))?,
                 None => writeln!(out, "{}: drawn", variable.column)?,
             }
         }

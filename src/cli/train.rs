@@ -1,5 +1,6 @@
 //! `crumple train`: from a group of the database to a model file.
 
+use crumple::plural::counted;
 use std::iter;
 use std::path::{Path, PathBuf};
 
@@ -164,8 +165,8 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     if model.cases.len() < 3 {
         options.warn(&format!(
-            "the group has {} curves: with fewer than 3 no speed can be left out to see how good the model is",
-            model.cases.len()
+            "the group has {}: with fewer than 3 no speed can be left out to see how good the model is",
+            counted(model.cases.len(), "curve")
         ));
     }
     let warned = !truncated.is_empty() || model.cases.len() < 3;

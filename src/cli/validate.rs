@@ -1,5 +1,6 @@
 //! `crumple validate`: every model at every speed that is left out.
 
+use crumple::plural::counted;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -283,11 +284,10 @@ fn band_line(band: &Band) -> String {
         None => format!("one {of} cannot be checked against others"),
     };
     format!(
-        "band ±{} of the local force {place}; empirical range for {:.0} %, from {} {of}{}; {coverage}",
+        "band ±{} of the local force {place}; empirical range for {:.0} %, from {}; {coverage}",
         percent(band.pointwise_share),
         band.level * 100.0,
-        band.curves,
-        if band.curves == 1 { "" } else { "s" }
+        counted(band.curves, of)
     )
 }
 

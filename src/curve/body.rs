@@ -30,7 +30,20 @@ pub(crate) fn rebound_stiffness_n_per_m(
     (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }
 
-/// The body force `−m dv/dt` of the closing speed `v`, with the case's effective mass.
+/// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, with the case's
+/// effective mass, as [`body_motion`] filters it.
+pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
+    let time_s = case.sampled.time_s();
+    let mass = case.masses.effective_kg();
+    let accelerations = derivative(time_s, &case.closing_speed_m_per_s);
+    let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
+    let mut force_n = filtered(time_s, raw);
+    // The body does not yet feel the contact.
+    force_n[0] = 0.0;
+    force_n
+}
+
+/// The body force over deflection, and the speeds around it.
 ///
 /// It differs from the contact force by the mass that the crush zone stops before the body
 /// (an impact's first spike is the nose being stopped). Filtered with CFC 60 unless the
@@ -38,13 +51,8 @@ pub(crate) fn rebound_stiffness_n_per_m(
 pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     let sampled = &case.sampled;
     let speeds = &case.closing_speed_m_per_s;
-    let mass = case.masses.effective_kg();
-    let raw: Vec<f64> =
-        derivative(sampled.time_s(), speeds).into_iter().map(|a| -mass * a).collect();
-    let mut force_n = filtered(sampled.time_s(), raw);
+    let force_n = body_force_n(case);
     let end = loading_end(sampled);
-    // The body does not yet feel the contact.
-    force_n[0] = 0.0;
     let over_deflection = |values: Vec<f64>| {
         let curve =
             Curve::new(sampled.time_s().to_vec(), sampled.deflection_m().to_vec(), values).ok()?;

@@ -131,7 +131,7 @@ impl Spell {
 }
 
 /// A time for messages: `12.345 ms`.
-pub(super) fn milliseconds(time_s: f64) -> String {
+pub(crate) fn milliseconds(time_s: f64) -> String {
     format!("{} ms", (time_s * 1e6).round() / 1e3)
 }
 

@@ -67,11 +67,12 @@ pub(crate) struct Balance {
 /// Why a run cannot be what the manifest says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{found}: such an impact cannot be; {cause}. Correct the manifest, or take the run as it is with accept_energy = true"
+    "{found}: such an impact cannot be; {}. Correct the manifest, or take the run as it is with accept_energy = true",
+    cause.of_run()
 )]
 pub struct Impossible {
     found: String,
-    cause: String,
+    cause: Cause,
 }
 
 impl Impossible {
@@ -80,9 +81,70 @@ impl Impossible {
         &self.found
     }
 
-    /// The likely cause, in words that say what to look at.
-    pub fn cause(&self) -> &str {
-        &self.cause
+    /// The likely cause where the curve is that of a file without a study.
+    pub(crate) fn cause_in_file(&self) -> String {
+        self.cause.of_file()
+    }
+}
+
+/// What an energy or impulse that cannot be likely comes from.
+#[derive(Debug, Clone, PartialEq)]
+enum Cause {
+    /// Units as which it would fit.
+    FittingUnits(&'static str),
+    /// Units, but none of the usual ones.
+    OtherUnits,
+    /// The record's speed, as text with the run of that speed.
+    RecordedSpeed(String),
+    /// Speed, deck or files of another run, as text with its speed.
+    OtherRun(String),
+    /// A factor of two, with the mass that impulse and speeds ask for, as text.
+    Half(String),
+    /// A factor of four, likewise.
+    OneBody(String),
+    /// Nothing that its size tells, likewise.
+    Unknown(String),
+}
+
+impl Cause {
+    /// In words for somebody who built the run by a study.
+    fn of_run(&self) -> String {
+        match self {
+            Self::FittingUnits(units) => {
+                format!("likely the units: read as \"{units}\" it would fit")
+            }
+            Self::OtherUnits => {
+                "likely the units of the solver's files are others than the study says".into()
+            }
+            Self::RecordedSpeed(speed) => format!("likely the speed: the record's is {speed}"),
+            Self::OtherRun(run) => format!("likely speed, deck or files of the run {run}"),
+            Self::Half(mass) => format!(
+                "likely the mass{mass}, half a model taken for a whole one (half_model), or the force of one side only"
+            ),
+            Self::OneBody(mass) => format!(
+                "likely the speed of one body taken for the closing speed of two (half_model), or the mass{mass}"
+            ),
+            Self::Unknown(mass) => {
+                format!("look at units, speed and mass{mass}, and at node and force of the recipe")
+            }
+        }
+    }
+
+    /// In words for somebody who has the curve in a file.
+    fn of_file(&self) -> String {
+        match self {
+            Self::OtherUnits => "likely the units of its columns are others".into(),
+            Self::Half(mass) => format!(
+                "likely the mass{mass}, half a structure taken for a whole one, or the force of one of two sides"
+            ),
+            Self::OneBody(mass) => format!(
+                "likely the speed of one body taken for the closing speed of two (--kind), or the mass{mass}"
+            ),
+            Self::Unknown(mass) => format!(
+                "look at units, speed and mass{mass}; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body"
+            ),
+            Self::FittingUnits(_) | Self::RecordedSpeed(_) | Self::OtherRun(_) => self.of_run(),
+        }
     }
 }
 
@@ -163,34 +225,34 @@ impl Claim<'_> {
         }
     }
 
-    /// The likely cause, in words that say what to look at.
-    fn cause(&self, balance: Balance) -> String {
+    /// The likely cause.
+    fn cause(&self, balance: Balance) -> Cause {
         let used = self.speed.m_per_s;
         let work = balance.work.unwrap_or(1.0);
         let near = |a: f64, b: f64, factor: f64| a > 0.0 && (a / b).ln().abs() < factor.ln();
         let same = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
         if let Some(units) = self.fitting_units(balance) {
-            return format!("likely the units: read as \"{units}\" it would fit");
+            return Cause::FittingUnits(units);
         }
         let ratios = [balance.work, balance.impulse].into_iter().flatten();
         let beyond = ratios.clone().any(|r| !(0.05..=20.0).contains(&r));
         let tens = |r: f64| near(r, 10_f64.powi(3 * (r.log10() / 3.0).round() as i32), NEAR_TEN);
         if ratios.clone().filter(|r| !same(*r, 1.0)).all(tens) && beyond {
-            return "likely the units of the solver's files are others than the study says".into();
+            return Cause::OtherUnits;
         }
         let recorded = self.recorded_m_per_s.filter(|&r| !same(r, used));
         if let Some(recorded) = recorded
             && same(work, (recorded / used).powi(2))
         {
             let other = self.named_other(recorded);
-            return format!("likely the speed: the record's is {}{other}", km_per_h(recorded));
+            return Cause::RecordedSpeed(format!("{}{other}", km_per_h(recorded)));
         }
         let others =
             self.others.iter().find(|(_, v)| !same(*v, used) && same(work, (v / used).powi(2)));
         if self.recorded_m_per_s.is_none()
             && let Some((name, speed)) = others
         {
-            return format!("likely speed, deck or files of the run {name} ({})", km_per_h(*speed));
+            return Cause::OtherRun(format!("{name} ({})", km_per_h(*speed)));
         }
         let mass = balance
             .impulse
@@ -202,15 +264,9 @@ impl Claim<'_> {
             })
             .unwrap_or_default();
         match work {
-            w if near(w, 2.0, NEAR_TWO) || near(w, 0.5, NEAR_TWO) => format!(
-                "likely the mass{mass}, half a model taken for a whole one (half_model), or the force of one side only"
-            ),
-            w if near(w, 4.0, NEAR_TWO) || near(w, 0.25, NEAR_TWO) => format!(
-                "likely the speed of one body taken for the closing speed of two (half_model), or the mass{mass}"
-            ),
-            _ => {
-                format!("look at units, speed and mass{mass}, and at node and force of the recipe")
-            }
+            w if near(w, 2.0, NEAR_TWO) || near(w, 0.5, NEAR_TWO) => Cause::Half(mass),
+            w if near(w, 4.0, NEAR_TWO) || near(w, 0.25, NEAR_TWO) => Cause::OneBody(mass),
+            _ => Cause::Unknown(mass),
         }
     }
 

@@ -8,6 +8,7 @@
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
 
+use crate::plural::counted;
 use std::sync::Arc;
 
 use super::contact;
@@ -93,6 +94,19 @@ pub enum FromTableError {
     /// Its motion cannot be told.
     #[error("{0}")]
     Motion(#[from] MotionError),
+    /// The force of its record is next to nothing.
+    #[error(
+        "the largest force of the record is {largest_n} N, which is no contact: look at the column and the unit of the force"
+    )]
+    NoContact {
+        /// Largest force, in N.
+        largest_n: f64,
+    },
+    /// The deflection of its record does not grow.
+    #[error(
+        "the deflection does not grow after contact: look at its column, and whether it is compression"
+    )]
+    NoDeflection,
     /// Its record cannot be used.
     #[error("{0}")]
     Extract(ExtractError),
@@ -103,7 +117,7 @@ pub enum FromTableError {
 
 impl From<energy::Impossible> for FromTableError {
     fn from(impossible: energy::Impossible) -> Self {
-        Self::Impossible { found: impossible.found().into(), cause: impossible.cause().into() }
+        Self::Impossible { found: impossible.found().into(), cause: impossible.cause_in_file() }
     }
 }
 
@@ -111,6 +125,8 @@ impl From<ExtractError> for FromTableError {
     fn from(error: ExtractError) -> Self {
         match error {
             ExtractError::Impossible(impossible) => impossible.into(),
+            ExtractError::NoContact { largest_n, .. } => Self::NoContact { largest_n },
+            ExtractError::NoDeflection => Self::NoDeflection,
             other => Self::Extract(other),
         }
     }
@@ -186,8 +202,8 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableEr
         && branch.dropped > 0
     {
         notes.push(format!(
-            "loading branch: {} states removed because the deflection hardly advanced",
-            branch.dropped
+            "loading branch: {} removed because the deflection hardly advanced",
+            counted(branch.dropped, "state")
         ));
     }
     Ok(FromTable {
@@ -267,7 +283,7 @@ fn remarks(
     let (mut notes, mut warnings) = (Vec::new(), extracted.warnings.clone());
     if let Some(found) = other_speed(&extracted.closing_speed_m_per_s, impact.speed.m_per_s) {
         if !impact.accept_energy {
-            let cause = "the times are in another unit, or the speed is that of another run".into();
+            let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)".into();
             return Err(FromTableError::Impossible { found, cause });
         }
         warnings.push(format!("accept_energy: {found}"));

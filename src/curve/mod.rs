@@ -10,6 +10,7 @@ pub(crate) mod envelope;
 pub mod extract;
 pub mod from_table;
 pub mod loading;
+pub(crate) mod made_of;
 pub mod recipe;
 pub mod retrace;
 
@@ -185,6 +186,10 @@ impl Masses {
 pub struct SourceFile {
     /// As found from the manifest: `25kmh/nodout`.
     pub path: String,
+    /// Where that was when the case was built: from the root on, as given, links not followed;
+    /// `None` in databases before version 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub absolute_path: Option<String>,
     /// Size in bytes when it was read.
     pub size_bytes: u64,
     /// BLAKE3 hash of its bytes, in hexadecimal.
@@ -231,6 +236,18 @@ impl EnergyAudit {
     }
 }
 
+/// What a case was built from, by the names in the manifest at that time: a case that was renamed
+/// since, here or there, is known by it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Path of the study's manifest from the root on, as given.
+    pub manifest: String,
+    /// The study's group.
+    pub group: String,
+    /// Name of the run.
+    pub run: String,
+}
+
 /// One FE run as the database keeps it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
@@ -273,6 +290,15 @@ pub struct Case {
     pub notes: Vec<String>,
     /// What the user should look at before trusting the case.
     pub warnings: Vec<String>,
+    /// When it was built, in UTC as ISO 8601 has it (`2026-05-04T13:37:00Z`); `None` in databases
+    /// before version 3.
+    pub built_utc: Option<String>,
+    /// What it was built from; `None` if from a file, and in databases before version 3.
+    pub origin: Option<Origin>,
+    /// Words that users gave it, in alphabetical order, each once.
+    pub tags: Vec<String>,
+    /// What users noted of it, in their order.
+    pub user_notes: Vec<String>,
 }
 
 impl Case {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::history::Side;
+use crate::history::{EntityId, Side};
 
 /// How curves are extracted from the runs of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -47,6 +47,17 @@ pub struct DeflectionSource {
     pub component: DisplacementComponent,
 }
 
+impl std::fmt::Display for DeflectionSource {
+    /// `x_displacement of nodout 900001 less 900002`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} of {} {}", self.component.name(), self.file, self.node)?;
+        match self.minus_node {
+            Some(other) => write!(f, " less {other}"),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Direction of the deflection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -66,6 +77,24 @@ impl DisplacementComponent {
             Self::XDisplacement => "x_displacement",
             Self::YDisplacement => "y_displacement",
             Self::ZDisplacement => "z_displacement",
+        }
+    }
+
+    /// Along x, y and z.
+    pub(crate) const ALL: [Self; 3] =
+        [Self::XDisplacement, Self::YDisplacement, Self::ZDisplacement];
+
+    /// `x`, `y` or `z`.
+    pub(crate) fn axis(self) -> &'static str {
+        &self.name()[..1]
+    }
+
+    /// The component of a force along it.
+    pub(crate) fn force(self) -> &'static str {
+        match self {
+            Self::XDisplacement => "x_force",
+            Self::YDisplacement => "y_force",
+            Self::ZDisplacement => "z_force",
         }
     }
 
@@ -106,6 +135,24 @@ pub enum ForceSource {
         /// Component of that motion, such as `x_acceleration`.
         component: String,
     },
+}
+
+impl std::fmt::Display for ForceSource {
+    /// `x_force of rcforc 3:surfa`, or `mass times the rate of x_velocity of nodout 900001`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contact { file, id, side, component } => {
+                write!(f, "{component} of {file} {}", EntityId { id: *id, side: *side })
+            }
+            Self::Body { file, node, motion, component } => {
+                let rate = match motion {
+                    RecordedMotion::Acceleration => "",
+                    RecordedMotion::Velocity => "the rate of ",
+                };
+                write!(f, "mass times {rate}{component} of {file} {node}")
+            }
+        }
+    }
 }
 
 /// What the acceleration of a body is made from.
@@ -259,6 +306,14 @@ pub struct Sampling {
     pub states: usize,
     /// Time between two of them, in s.
     pub interval_s: f64,
+}
+
+impl std::fmt::Display for Sampling {
+    /// `400 states, one each 0.75 ms`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let SamplingTable { states, interval_ms } = (*self).into();
+        write!(f, "{states} states, one each {interval_ms} ms")
+    }
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]

@@ -60,6 +60,9 @@ const STEPS: f64 = 20_000.0;
 const MOST_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
+/// Nor than this share of the largest deflection: states closer than a millionth of it are none of a
+/// loading branch, and its last one shall be the table's.
+const FINEST: f64 = 5e-6;
 
 /// The motion of a table under an impact.
 ///
@@ -81,7 +84,8 @@ pub(super) fn retrace(
     }
     let v0 = impact.speed.m_per_s;
     let step_s = (interval_s / FINER).max(2.0 * d[end] / v0 / STEPS);
-    let mut march = March { motion: Motion::default(), step_s, mass: 2.0 * work[end] / (v0 * v0) };
+    let mass = 2.0 * work[end] / (v0 * v0);
+    let mut march = March { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
     march.motion.notes.push(
         "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
             .into(),
@@ -134,6 +138,8 @@ type Branch = (Vec<f64>, Vec<f64>, Vec<f64>);
 struct March {
     motion: Motion,
     step_s: f64,
+    /// Shortest step.
+    least_m: f64,
     /// The mass whose kinetic energy is the table's work: that of the impact if both agree.
     mass: f64,
 }
@@ -183,7 +189,7 @@ impl March {
                 let v = self.motion.closing_m_per_s[self.motion.time_s.len() - 1].abs();
                 let a = -direction * between(path.moving, s) / self.mass;
                 let step = v * self.step_s + 0.5 * a * self.step_s * self.step_s;
-                let step = step.max(SHORTEST * length);
+                let step = step.max(SHORTEST * length).max(self.least_m);
                 // The last steps share what is left, and a body that would stop goes to the end.
                 if s + 1.25 * step >= length || v + a * self.step_s <= 0.0 {
                     break;

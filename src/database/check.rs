@@ -6,8 +6,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::layout::{self, ATTRIBUTES, Content, FoundCase, FoundGroup, Opened};
+use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
 use super::{DatabaseError, listed};
+use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
 use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
@@ -59,6 +60,7 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
             match decoded.case(&group.name, name, case) {
                 Ok(found) => {
                     findings.case(&found)?;
+                    findings.body_force(&decoded, case, &found.case);
                     readable.push(found.case);
                 }
                 // Its datasets have said so already, with their indices.
@@ -86,11 +88,12 @@ struct Findings<'a> {
 }
 
 /// Names of the datasets of a case, the times of each curve first.
-const DATASETS: [&str; 7] = [
+const DATASETS: [&str; 8] = [
     "time_s",
     "deflection_m",
     "force_N",
     "closing_speed_m_per_s",
+    BODY_FORCE,
     "original/time_s",
     "original/deflection_m",
     "original/force_N",
@@ -127,6 +130,9 @@ impl Findings<'_> {
         let hashes = opened.hashes(case);
         let mut states = 0;
         for path in DATASETS {
+            if path == BODY_FORCE && opened.version == OLDEST {
+                continue;
+            }
             let values = match opened.values(case, path) {
                 Ok(values) => values,
                 Err(detail) => {
@@ -268,12 +274,7 @@ impl Findings<'_> {
             let message = "time_s goes beyond original/time_s".into();
             return self.add("sampled_differs", Some("time_s"), None, message);
         };
-        let scale = values.iter().chain(&expected).fold(0.0, |m: f64, v| m.max(v.abs()));
-        // One value 1e300 must not hide what is wrong of the others: the first is named.
-        let differs = |(a, b): (&f64, &f64)| {
-            (a - b).abs() > SAMPLED * a.abs().max(b.abs()).max(SAMPLED * scale)
-        };
-        if let Some(i) = values.iter().zip(&expected).position(differs) {
+        if let Some(i) = first_difference(values, &expected) {
             let message = format!(
                 "{name}[{i}] is {}, original/{name} has {} at this time",
                 values[i], expected[i]
@@ -281,6 +282,29 @@ impl Findings<'_> {
             self.add("sampled_differs", Some(name), Some(i), message);
         }
     }
+
+    /// The body force is that of the closing speed.
+    fn body_force(&mut self, opened: &Opened<'_>, group: &Group, case: &Case) {
+        // What cannot be read has been named already.
+        let Ok(values) = opened.values(group, BODY_FORCE) else { return };
+        let expected = body_force_n(case);
+        if let Some(i) = first_difference(&values, &expected) {
+            let message = format!(
+                "{BODY_FORCE}[{i}] is {}, the closing speed's is {}",
+                values[i], expected[i]
+            );
+            self.add("body_force_differs", Some(BODY_FORCE), Some(i), message);
+        }
+    }
+}
+
+/// Index of the first value that is not the expected one. One value 1e300 must not hide what is
+/// wrong of the others.
+fn first_difference(values: &[f64], expected: &[f64]) -> Option<usize> {
+    let scale = values.iter().chain(expected).fold(0.0, |m: f64, v| m.max(v.abs()));
+    let differs =
+        |(a, b): (&f64, &f64)| (a - b).abs() > SAMPLED * a.abs().max(b.abs()).max(SAMPLED * scale);
+    values.iter().zip(expected).position(differs)
 }
 
 /// Share by which a sampled value may differ from what its original gives.

@@ -5,16 +5,22 @@ use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
-use super::{Database, DatabaseError, damaged_curve};
+use super::{CasePath, Database, DatabaseError, damaged_curve};
+use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
 use crate::file;
-use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
+use crate::hdf5::dimensions::{DimensionError, Dimensions, Scale};
+use crate::hdf5::{
+    self, AttrValue, DatasetBuilder, File, FileBuilder, Group, OpenError, declared_bytes,
+};
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
 pub(crate) const FORMAT: &str = "crumple curve database";
-/// Layout version this program writes and reads.
-pub(crate) const VERSION: i64 = 2;
+/// Layout version this program writes.
+pub(crate) const VERSION: i64 = 3;
+/// The oldest it reads: that one has no body force, dates, origins, tags and dimension scales.
+pub(crate) const OLDEST: i64 = 2;
 
 /// Attributes of the root that are this layout's.
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
@@ -32,11 +38,14 @@ pub(crate) struct Content<'a> {
     /// In the order in which they are written and hashed.
     pub attributes: Vec<(&'static str, AttrValue)>,
     /// By their paths in the case.
-    pub datasets: Vec<(Cow<'static, str>, &'a [f64])>,
+    pub datasets: Vec<(Cow<'static, str>, Cow<'a, [f64]>)>,
 }
 
+/// The dataset of the force that moves the body, which follows from the closing speed.
+pub(crate) const BODY_FORCE: &str = "body_force_N";
+
 /// Every attribute that a case can have; what else it has is others'.
-pub(crate) const CASE_ATTRIBUTES: [&str; 22] = [
+pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
     "study",
     "speed_m_per_s",
     "speed_kind",
@@ -58,6 +67,10 @@ pub(crate) const CASE_ATTRIBUTES: [&str; 22] = [
     "sources",
     "notes",
     "warnings",
+    "built_utc",
+    "origin",
+    "tags",
+    "user_notes",
     HASHES,
 ];
 
@@ -66,7 +79,8 @@ impl<'a> Content<'a> {
         let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
         content.describe(case)?;
         content.curve("", &case.sampled);
-        content.dataset("closing_speed_m_per_s", &case.closing_speed_m_per_s);
+        content.dataset("closing_speed_m_per_s", Cow::Borrowed(&case.closing_speed_m_per_s));
+        content.dataset(BODY_FORCE, Cow::Owned(body_force_n(case)));
         content.curve("original/", &case.original);
         Ok(content)
     }
@@ -104,12 +118,25 @@ impl<'a> Content<'a> {
         self.attr("sources", json(serde_json::to_string(&case.sources))?);
         self.attr("notes", json(serde_json::to_string(&case.notes))?);
         self.attr("warnings", json(serde_json::to_string(&case.warnings))?);
+        // Absent where version 2 had nothing either, so that the hash of such a case stays.
+        if let Some(built) = &case.built_utc {
+            self.attr("built_utc", text(built));
+        }
+        if let Some(origin) = &case.origin {
+            self.attr("origin", json(serde_json::to_string(origin))?);
+        }
+        if !case.tags.is_empty() {
+            self.attr("tags", json(serde_json::to_string(&case.tags))?);
+        }
+        if !case.user_notes.is_empty() {
+            self.attr("user_notes", json(serde_json::to_string(&case.user_notes))?);
+        }
         Ok(())
     }
 
     fn curve(&mut self, folder: &str, curve: &'a Curve) {
-        let mut put = |name: &str, values| {
-            self.datasets.push((format!("{folder}{name}").into(), values));
+        let mut put = |name: &str, values: &'a [f64]| {
+            self.datasets.push((format!("{folder}{name}").into(), values.into()));
         };
         put("time_s", curve.time_s());
         put("deflection_m", curve.deflection_m());
@@ -120,7 +147,7 @@ impl<'a> Content<'a> {
         self.attributes.push((name, value));
     }
 
-    fn dataset(&mut self, name: &'static str, values: &'a [f64]) {
+    fn dataset(&mut self, name: &'static str, values: Cow<'a, [f64]>) {
         self.datasets.push((name.into(), values));
     }
 
@@ -148,6 +175,24 @@ impl<'a> Content<'a> {
     }
 }
 
+/// Attributes that say what the curves of a case are of.
+const OF_THE_RECORD: [&str; 6] =
+    ["speed_m_per_s", "speed_kind", "mass_kg", "other_mass_kg", "parameters", "force_kind"];
+
+impl Content<'_> {
+    /// BLAKE3 of the recorded curves and of what they are of.
+    pub(crate) fn record_hash(self) -> String {
+        let attributes = self.attributes.into_iter().filter(|(n, _)| OF_THE_RECORD.contains(n));
+        let datasets = self.datasets.into_iter().filter(|(path, _)| path != BODY_FORCE);
+        let record = Self { attributes: attributes.collect(), datasets: datasets.collect() };
+        let mut hash = blake3::Hasher::new();
+        for (path, of_values) in record.hashes() {
+            hash.update(path.as_bytes()).update(b"\0").update(of_values.as_bytes()).update(b"\0");
+        }
+        hash.finalize().to_hex().to_string()
+    }
+}
+
 pub(crate) fn hash_of(values: &[f64]) -> String {
     let mut hasher = blake3::Hasher::new();
     for value in values {
@@ -163,8 +208,8 @@ pub(crate) fn with_hashes<'a>(
     case: &'a Case,
 ) -> Result<Content<'a>, DatabaseError> {
     let mut content = Content::of(case)?;
-    let key = (case.group.clone(), case.name.clone());
-    let hashes = database.altered.get(&key).cloned().unwrap_or_else(|| content.hashes());
+    let altered = database.altered.get(&CasePath::of(case));
+    let hashes = altered.cloned().unwrap_or_else(|| content.hashes());
     let hashes = serde_json::to_string(&hashes);
     let hashes = hashes.map_err(|e| DatabaseError::Encode { detail: e.to_string() })?;
     content.attr("hashes", AttrValue::VarLenString(hashes));
@@ -186,9 +231,52 @@ pub(crate) fn case_names(cases: &[Case]) -> AttrValue {
     AttrValue::VarLenStringArray(cases.iter().map(|c| c.name.clone()).collect())
 }
 
+/// Attributes that the header of a dataset itself holds.
+const HEADER_ATTRIBUTES: usize = 8;
+/// Name of the scale of a curve's dimension.
+const TIME: &str = "time_s";
+
+/// Fills the datasets of a case, in the order of its content: of each curve the times, which are
+/// the scale of its dimension, then the other columns.
+pub(crate) struct Columns<'a> {
+    pub dimensions: &'a mut Dimensions,
+    pub time: Option<Scale>,
+}
+
+impl Columns<'_> {
+    pub(crate) fn fill(&mut self, dataset: &mut DatasetBuilder, path: &str, values: &[f64]) {
+        self.fill_beside(dataset, path, values, 0);
+    }
+
+    /// The same for a dataset that has so many attributes of others.
+    pub(crate) fn fill_beside(
+        &mut self,
+        dataset: &mut DatasetBuilder,
+        path: &str,
+        values: &[f64],
+        theirs: usize,
+    ) {
+        dataset.with_f64_data(values);
+        // A header with more is written in another way, in which nobody finds what comes later.
+        let has_room = theirs + 2 <= HEADER_ATTRIBUTES;
+        if path.rsplit('/').next() == Some(TIME) {
+            self.time = has_room.then(|| self.dimensions.scale(dataset, TIME));
+        } else if let Some(time) = self.time.filter(|_| has_room) {
+            self.dimensions.attach(dataset, &[time]);
+        }
+    }
+}
+
+impl From<DimensionError> for DatabaseError {
+    fn from(error: DimensionError) -> Self {
+        Self::Encode { detail: error.to_string() }
+    }
+}
+
 /// Encodes a database as the bytes of an HDF5 file.
 pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     let mut file = FileBuilder::new();
+    let mut dimensions = Dimensions::default();
     for (name, value) in root_attributes() {
         file.set_attr(name, value);
     }
@@ -202,24 +290,31 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
                 builder.set_attr(name, value);
             }
             let mut original = builder.create_group(ORIGINAL);
+            let mut columns = Columns { dimensions: &mut dimensions, time: None };
             for (path, values) in content.datasets {
-                match path.strip_prefix("original/") {
-                    Some(name) => original.create_dataset(name).with_f64_data(values),
-                    None => builder.create_dataset(&path).with_f64_data(values),
+                let dataset = match path.strip_prefix("original/") {
+                    Some(name) => original.create_dataset(name),
+                    None => builder.create_dataset(&path),
                 };
+                columns.fill(dataset, &path, &values);
             }
             builder.add_group(original.finish());
             group.add_group(builder.finish());
         }
         file.add_group(group.finish());
     }
-    file.finish().map_err(|e| DatabaseError::Encode { detail: e.to_string() })
+    let encoded = file.finish();
+    let mut bytes = encoded.map_err(|e| DatabaseError::Encode { detail: e.to_string() })?;
+    dimensions.finish(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// A database file that was opened.
 pub(crate) struct Opened<'a> {
     pub path: &'a Path,
     pub file: File,
+    /// Version of its layout.
+    pub version: i64,
     /// Bytes of values that datasets may still declare.
     left: Cell<u64>,
 }
@@ -270,11 +365,11 @@ impl<'a> Opened<'a> {
             return Err(DatabaseError::NotOurs { path: path.into() });
         }
         let found = attrs.get("layout_version").and_then(AttrValue::as_i64).unwrap_or(0);
-        if found != VERSION {
+        if !(OLDEST..=VERSION).contains(&found) {
             return Err(DatabaseError::Version { path: path.into(), found });
         }
         let left = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(file.file_size());
-        Ok(Self { path, file, left: Cell::new(left) })
+        Ok(Self { path, file, version: found, left: Cell::new(left) })
     }
 
     fn damaged(&self, place: &str, detail: String) -> DatabaseError {
@@ -351,6 +446,15 @@ impl<'a> Opened<'a> {
         serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
     }
 
+    /// The hashes that a case in this file has by its content.
+    pub(crate) fn hashes_of(&self, content: &Content<'_>) -> BTreeMap<String, String> {
+        let mut hashes = content.hashes();
+        if self.version == OLDEST {
+            hashes.remove(BODY_FORCE);
+        }
+        hashes
+    }
+
     /// Reads one case from its group.
     pub(crate) fn case(
         &self,
@@ -375,8 +479,8 @@ fn decode_opened(opened: &Opened<'_>) -> Result<Database, DatabaseError> {
         let mut cases = Vec::with_capacity(group.cases.len());
         for (name, case) in group.cases {
             let FoundCase { case, hashes, .. } = opened.case(&group.name, &name, &case)?;
-            if Content::of(&case)?.hashes() != hashes {
-                database.altered.insert((group.name.clone(), name), hashes);
+            if opened.hashes_of(&Content::of(&case)?) != hashes {
+                database.altered.insert(CasePath { group: group.name.clone(), name }, hashes);
             }
             cases.push(case);
         }
@@ -440,9 +544,21 @@ impl Attrs<'_> {
             .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or no text")))
     }
 
+    fn kind<T>(&self, name: &str, parse: fn(&str) -> Option<T>) -> Result<T, DatabaseError> {
+        let text = self.text(name)?;
+        parse(text).ok_or_else(|| self.place.damaged(format!("{name} \"{text}\" is not known")))
+    }
+
     fn json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<T, DatabaseError> {
         serde_json::from_str(self.text(name)?)
             .map_err(|e| self.place.damaged(format!("attribute {name}: {e}")))
+    }
+
+    fn optional_json<T>(&self, name: &str) -> Result<Option<T>, DatabaseError>
+    where
+        T: serde::de::DeserializeOwned,
+    {
+        self.map.contains_key(name).then(|| self.json(name)).transpose()
     }
 }
 
@@ -453,16 +569,8 @@ fn decode_case(
     place: &Location<'_>,
 ) -> Result<FoundCase, DatabaseError> {
     let attrs = Attrs { map: place.check(group.attrs())?, place };
-    let kind = match attrs.text("speed_kind")? {
-        "wall" => SpeedKind::Wall,
-        "closing" => SpeedKind::Closing,
-        other => return Err(place.damaged(format!("speed_kind \"{other}\" is not known"))),
-    };
-    let force_kind = match attrs.text("force_kind")? {
-        "contact" => ForceKind::Contact,
-        "body" => ForceKind::Body,
-        other => return Err(place.damaged(format!("force_kind \"{other}\" is not known"))),
-    };
+    let kind = attrs.kind("speed_kind", SpeedKind::parse)?;
+    let force_kind = attrs.kind("force_kind", ForceKind::parse)?;
     let sampled = decode_curve(group, place)?;
     let closing_speed_m_per_s = closing_speeds(group, sampled.time_s().len(), place)?;
     let original_place =
@@ -498,6 +606,13 @@ fn decode_case(
         sources,
         notes: attrs.json("notes")?,
         warnings: attrs.json("warnings")?,
+        built_utc: match attrs.map.contains_key("built_utc") {
+            true => Some(attrs.text("built_utc")?.into()),
+            false => None,
+        },
+        origin: attrs.optional_json("origin")?,
+        tags: attrs.optional_json("tags")?.unwrap_or_default(),
+        user_notes: attrs.optional_json("user_notes")?.unwrap_or_default(),
     };
     let hashes = attrs.json(HASHES)?;
     Ok(FoundCase { case, attributes: attrs.map, hashes })
@@ -603,6 +718,10 @@ mod tests {
             sources: Vec::new(),
             notes: Vec::new(),
             warnings: Vec::new(),
+            built_utc: None,
+            origin: None,
+            tags: Vec::new(),
+            user_notes: Vec::new(),
         }
     }
 

@@ -3,17 +3,40 @@
 //! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
 //! writes what it is made of. A file is always written whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
+//!
+//! ```
+//! use crumple::build::build;
+//! use crumple::database::Database;
+//! use std::path::Path;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("curves.h5");
+//! let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe/lead-car-wall/study.toml");
+//! build(&study, &path, |_run| {})?;
+//!
+//! let database = Database::read(&path)?;
+//! for case in database.cases("lead-car-wall") {
+//!     // The curve takes up the impact's energy.
+//!     assert!((case.audit.ratio() - 1.0).abs() < 0.06, "{}", case.name);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod check;
+mod edit;
 mod foreign;
 mod layout;
+pub(crate) mod names;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::curve::{Case, CurveError};
+use crate::curve::from_table::IMPORTED;
+use crate::curve::{Case, CurveError, Origin};
 use crate::file::{WriteError, write_whole};
+use crate::guess;
 
 /// The cases of one database file.
 ///
@@ -21,8 +44,32 @@ use crate::file::{WriteError, write_whole};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Database {
     groups: BTreeMap<String, Vec<Case>>,
-    /// Group and name of cases whose content is not what their hashes are of, with these.
-    altered: BTreeMap<(String, String), BTreeMap<String, String>>,
+    /// Cases whose content is not what their hashes are of, with these.
+    altered: BTreeMap<CasePath, BTreeMap<String, String>>,
+    /// Where cases are that the file has elsewhere: what others put beside them goes along.
+    moved: BTreeMap<CasePath, CasePath>,
+}
+
+/// A case by its names; no name has a `/`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CasePath {
+    /// Its group.
+    pub group: String,
+    /// Its name in the group.
+    pub name: String,
+}
+
+impl CasePath {
+    /// The names of a case.
+    pub fn of(case: &Case) -> Self {
+        Self { group: case.group.clone(), name: case.name.clone() }
+    }
+}
+
+impl fmt::Display for CasePath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.group, self.name)
+    }
 }
 
 /// Why a database cannot be read or written.
@@ -51,7 +98,11 @@ pub enum DatabaseError {
         path: PathBuf,
     },
     /// It has another layout.
-    #[error("{path}: its layout has version {found}, this program reads version {known}: build the database anew with crumple build", known = layout::VERSION)]
+    #[error(
+        "{path}: its layout has version {found}, this program reads versions {} to {}: build the database anew with crumple build",
+        layout::OLDEST,
+        layout::VERSION
+    )]
     Version {
         /// The file.
         path: PathBuf,
@@ -69,7 +120,7 @@ pub enum DatabaseError {
         detail: String,
     },
     /// There is no such group.
-    #[error("{path}: there is no group \"{group}\": it has {known}")]
+    #[error("{path}: there is no group \"{group}\": it has {known}{}", guess::hint(group, known))]
     NoGroup {
         /// The file.
         path: PathBuf,
@@ -79,7 +130,10 @@ pub enum DatabaseError {
         known: String,
     },
     /// There is no such case.
-    #[error("{path}: group \"{group}\" has no case \"{case}\": it has {known}")]
+    #[error(
+        "{path}: group \"{group}\" has no case \"{case}\": it has {known}{}",
+        guess::hint(case, known)
+    )]
     NoCase {
         /// The file.
         path: PathBuf,
@@ -93,7 +147,7 @@ pub enum DatabaseError {
     /// The name is taken by another study.
     /// Writing would lose what others have put into it.
     #[error(
-        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": if the study was renamed, build into a new database; else name this run or group differently"
+        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this run or group differently, or remove that case (crumple db rm)"
     )]
     OtherStudy {
         /// The group.
@@ -103,6 +157,9 @@ pub enum DatabaseError {
         /// The study that has the name.
         other: String,
     },
+    /// The name that a case is to have is another's.
+    #[error("group \"{group}\" has a case \"{name}\" already: choose another name", group = .0.group, name = .0.name)]
+    Taken(CasePath),
     /// A group has to be named.
     #[error("{path} has several groups: choose one with --group: {known}")]
     WhichGroup {
@@ -175,7 +232,7 @@ impl Database {
         if path.is_file() {
             let foreign = foreign::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
-                return foreign::write_keeping(self, path, &foreign);
+                return edit::write_keeping(self, path, &foreign);
             }
         }
         Ok(write_whole(path, &layout::encode(self)?)?)
@@ -183,7 +240,7 @@ impl Database {
 
     /// Whether a case is not what it was when it was written: its hashes are of something else.
     pub(crate) fn is_altered(&self, group: &str, case: &str) -> bool {
-        self.altered.contains_key(&(group.to_string(), case.to_string()))
+        self.altered.contains_key(&CasePath { group: group.into(), name: case.into() })
     }
 
     /// The group that was asked for, or the only one there is, with its cases in order of speed.
@@ -286,7 +343,7 @@ impl Database {
                     other,
                 });
             }
-            self.altered.remove(&(case.group.clone(), case.name.clone()));
+            self.altered.remove(&CasePath::of(&case));
             there[k] = case;
         }
         for group in places.keys() {
@@ -295,18 +352,118 @@ impl Database {
         Ok(())
     }
 
-    /// Removes the cases of a group for which `keep` is false; returns their names.
-    pub(crate) fn retain(&mut self, group: &str, keep: impl Fn(&Case) -> bool) -> Vec<String> {
-        let Some(cases) = self.groups.get_mut(group) else { return Vec::new() };
-        let removed: Vec<String> =
-            cases.iter().filter(|c| !keep(c)).map(|c| c.name.clone()).collect();
-        cases.retain(keep);
-        self.altered.retain(|(g, name), _| g != group || !removed.contains(name));
-        if cases.is_empty() {
-            self.groups.remove(group);
+    /// Removes cases.
+    pub(crate) fn remove(&mut self, paths: &HashSet<CasePath>) {
+        for cases in self.groups.values_mut() {
+            cases.retain(|case| !paths.contains(&CasePath::of(case)));
         }
-        removed
+        self.groups.retain(|_, cases| !cases.is_empty());
+        self.altered.retain(|path, _| !paths.contains(path));
+        self.moved.retain(|_, to| !paths.contains(to));
     }
+
+    /// Gives cases other names and groups, all at once.
+    ///
+    /// # Errors
+    /// [`DatabaseError::Taken`] if a place is that of a case that stays, or meant for two; nothing
+    /// is changed then.
+    pub(crate) fn relocate(
+        &mut self,
+        moves: &BTreeMap<CasePath, CasePath>,
+    ) -> Result<(), DatabaseError> {
+        let mut places = HashSet::new();
+        for case in self.groups.values().flatten() {
+            let path = CasePath::of(case);
+            let place = moves.get(&path).unwrap_or(&path);
+            if !places.insert(place.clone()) {
+                return Err(DatabaseError::Taken(place.clone()));
+            }
+        }
+        let mut cases: Vec<Case> =
+            std::mem::take(&mut self.groups).into_values().flatten().collect();
+        for case in &mut cases {
+            if let Some(to) = moves.get(&CasePath::of(case)) {
+                remember_origin(case);
+                (case.group, case.name) = (to.group.clone(), to.name.clone());
+            }
+        }
+        self.insert(cases);
+        let place = |path: CasePath| moves.get(&path).cloned().unwrap_or(path);
+        let altered = std::mem::take(&mut self.altered);
+        self.altered = altered.into_iter().map(|(path, hashes)| (place(path), hashes)).collect();
+        // A case that was moved before is in the file where it was first.
+        let before = std::mem::take(&mut self.moved);
+        let now: HashSet<CasePath> = before.values().cloned().collect();
+        self.moved = before.into_iter().map(|(from, to)| (from, place(to))).collect();
+        let first = moves.iter().filter(|(from, _)| !now.contains(from));
+        self.moved.extend(first.map(|(from, to)| (from.clone(), to.clone())));
+        Ok(())
+    }
+
+    fn insert(&mut self, cases: Vec<Case>) {
+        for case in cases {
+            self.groups.entry(case.group.clone()).or_default().push(case);
+        }
+        self.groups.values_mut().for_each(|cases| sort(cases));
+    }
+
+    /// Adds cases, or puts them in the place of those of the same names, whatever study these are
+    /// of; each with the hashes that it was written with if it is not what it was then.
+    pub(crate) fn replace_all(&mut self, cases: Vec<(Case, Option<BTreeMap<String, String>>)>) {
+        let paths: HashSet<CasePath> = cases.iter().map(|(case, _)| CasePath::of(case)).collect();
+        for cases in self.groups.values_mut() {
+            cases.retain(|case| !paths.contains(&CasePath::of(case)));
+        }
+        self.altered.retain(|path, _| !paths.contains(path));
+        let altered = cases.iter().filter_map(|(c, a)| Some((CasePath::of(c), a.clone()?)));
+        self.altered.extend(altered);
+        self.insert(cases.into_iter().map(|(case, _)| case).collect());
+    }
+
+    /// Changes cases in a way that leaves their names and order.
+    pub(crate) fn change(&mut self, change: impl FnMut(&mut Case)) {
+        self.groups.values_mut().flatten().for_each(change);
+    }
+
+    /// All cases, each with the hashes that it was written with if it is not what it was then.
+    pub(crate) fn into_cases(mut self) -> Vec<(Case, Option<BTreeMap<String, String>>)> {
+        let cases = self.groups.into_values().flatten();
+        cases
+            .map(|case| (self.altered.remove(&CasePath::of(&case)), case))
+            .map(|(a, c)| (c, a))
+            .collect()
+    }
+
+    /// All cases, by group, speed and name.
+    pub fn all(&self) -> impl Iterator<Item = &Case> {
+        self.groups.values().flatten()
+    }
+
+    /// Whether both hold the same cases, altered in the same way.
+    fn holds_what(&self, other: &Self) -> bool {
+        self.groups == other.groups && self.altered == other.altered
+    }
+}
+
+/// Lets a case of an earlier version, which does not tell what it was built from, remember its names
+/// before it gets others: a build of its study knows it by them.
+pub(crate) fn remember_origin(case: &mut Case) {
+    if case.origin.is_none() && case.study != IMPORTED {
+        let (group, run) = (case.group.clone(), case.name.clone());
+        case.origin = Some(Origin { manifest: String::new(), group, run });
+    }
+}
+
+/// BLAKE3 of the curves of a case and of what they are of: speed, masses, parameters and kinds, and
+/// not of names, notes or where it is from.
+pub(crate) fn record_hash(case: &Case) -> Result<String, DatabaseError> {
+    Ok(layout::Content::of(case)?.record_hash())
+}
+
+/// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
+pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, DatabaseError> {
+    let items = foreign::found(&layout::open(path)?)?;
+    Ok((!items.is_empty()).then(|| foreign::listed(&items)))
 }
 
 /// Puts the cases of a group into their order: by speed, then name.

@@ -31,6 +31,8 @@ pub struct ExportCurve {
     pub end: usize,
     /// Lower and upper edge of the band at the points of `loading`, in N.
     pub band: Option<(Vec<f64>, Vec<f64>)>,
+    /// Why a predicted curve has none.
+    pub no_band: Option<&'static str>,
     /// How the target goes on beyond the maximal crush.
     pub tail: Tail,
     follows_faster_runs: bool,
@@ -90,12 +92,19 @@ impl ExportCurve {
             let tail = with_tail.force_n()[end + 1..].iter().map(|f| (f + width).max(0.0));
             edge.iter().copied().chain(tail).collect()
         };
+        let no_band = match (band.is_some(), input.curve.force_low_n.is_some()) {
+            (true, _) => softening.map(|_| "it is not that of a softened curve"),
+            (false, true) => Some("only that of the contact force is known (--force contact)"),
+            (false, false) => Some("the model gives none here"),
+        };
         let band =
             band.filter(|_| softening.is_none()).map(|(low, high)| (widened(low), widened(high)));
+        let is_recorded = predicted.provenance.max_crush_rule.is_none();
         Ok(Self {
             loading: with_tail,
             end,
             band,
+            no_band: no_band.filter(|_| !is_recorded),
             tail,
             follows_faster_runs,
             softening,
@@ -131,6 +140,11 @@ impl ExportCurve {
             before / 1e6,
             after / 1e6
         ))
+    }
+
+    /// Why there is no band, in one line; nothing of a recorded curve, which needs none.
+    pub fn no_band_note(&self) -> Option<String> {
+        Some(format!("{}: written without a band: {}", self.headline(), self.no_band?))
     }
 
     /// Deflection at each point, in m.
@@ -261,12 +275,7 @@ impl ExportCurve {
 
     /// Group and speed as an identifier of letters, digits and underscores.
     pub fn identifier(&self) -> String {
-        let text: String =
-            self.file_stem().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-        match text.starts_with(|c: char| c.is_ascii_alphabetic()) {
-            true => text,
-            false => format!("curve_{text}"),
-        }
+        identifier(&self.file_stem())
     }
 
     /// What a curve is and what it may drive, as keys and values of a file's header; SI.
@@ -339,6 +348,16 @@ pub(super) fn file_stem(curve: &PredictedCurve) -> String {
     let speed = km_per_h(curve.speed_m_per_s).replace([' ', '/'], "");
     let group: String = curve.provenance.group.chars().map(plain).collect();
     format!("{group}-{speed}")
+}
+
+/// A name as an identifier of letters, digits and underscores that begins with a letter.
+pub(super) fn identifier(name: &str) -> String {
+    let text: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    match text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        true => text,
+        false => format!("curve_{text}"),
+    }
 }
 
 /// A name that is told apart from earlier ones of the same kind.

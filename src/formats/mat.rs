@@ -17,14 +17,19 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
         let named = |name: &str| if k == 0 { name.into() } else { format!("{name}_{}", k + 1) };
         let reach = curve.loading.end_m();
         // A guard point: tools that extrapolate go on without force before the contact.
-        let loading: Vec<(f64, f64)> = std::iter::once((-0.01 * reach, 0.0))
-            .chain(curve.deflection_m().iter().copied().zip(curve.force_n().iter().copied()))
-            .collect();
+        let guarded = |force_n: &[f64]| -> Vec<(f64, f64)> {
+            let points = curve.deflection_m().iter().copied().zip(force_n.iter().copied());
+            std::iter::once((-0.01 * reach, 0.0)).chain(points).collect()
+        };
         let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
         let k_u = curve.stiffness_n_per_m();
         let open_m = end_m - end_n / k_u;
-        matrix(&mut bytes, &named("fd_load"), &columns(&loading));
+        matrix(&mut bytes, &named("fd_load"), &columns(&guarded(curve.force_n())));
         matrix(&mut bytes, &named("fd_unload"), &columns(&[(open_m, 0.0), (end_m, end_n)]));
+        if let Some((low_n, high_n)) = &curve.band {
+            matrix(&mut bytes, &named("fd_low"), &columns(&guarded(low_n)));
+            matrix(&mut bytes, &named("fd_high"), &columns(&guarded(high_n)));
+        }
         for (name, value) in [
             ("k_u", k_u),
             ("max_deflection_m", end_m),

@@ -23,6 +23,7 @@ mod tail;
 mod text;
 mod thin;
 
+use crate::guess;
 use std::path::Path;
 
 use crate::curve::{Case, EnvelopeError, ForceKind};
@@ -176,6 +177,8 @@ pub struct Options {
     pub deck: bool,
     /// Extension of the file that will be written, where a target has several kinds of file.
     pub extension: Option<String>,
+    /// Name of the file that will be written, without its extension, if it is to be one.
+    pub stem: Option<String>,
     /// Speeds in m/s of a table over speeds; none for even steps over the training speeds.
     pub speeds_m_per_s: Vec<f64>,
     /// Mass, rule and parameters of a table; its speed is not used.
@@ -193,6 +196,7 @@ impl Default for Options {
             material: Material::default(),
             deck: false,
             extension: None,
+            stem: None,
             speeds_m_per_s: Vec::new(),
             query: Query::at(0.0),
         }
@@ -222,7 +226,7 @@ impl Exported {
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// No format has that name.
-    #[error("there is no export format \"{name}\": use one of {known}")]
+    #[error("there is no export format \"{name}\": use one of {known}{}", guess::hint(name, known))]
     NoSuchFormat {
         /// What was asked for.
         name: String,
@@ -335,6 +339,11 @@ impl Format {
         }
     }
 
+    /// Whether a band stands beside its curves.
+    pub fn holds_band(&self) -> bool {
+        ["csv", "mat"].contains(&self.name)
+    }
+
     /// Whether curves have numbers in it.
     pub fn has_ids(&self) -> bool {
         self.has_deck() || self.name == "adams"
@@ -402,11 +411,11 @@ impl Format {
             Writer::Each(write) => {
                 let curves = options.ready(inputs, self.tail)?;
                 let files = curves.iter().map(|c| write(c, options)).collect::<Result<_, _>>()?;
-                with_notes(joined(files), &curves)
+                self.with_notes(joined(files), &curves)
             }
             Writer::Together(write) => {
                 let curves = options.ready(inputs, self.tail)?;
-                with_notes(write(&curves, options)?, &curves)
+                self.with_notes(write(&curves, options)?, &curves)
             }
         };
         let mut exported = with_names_of_their_own(exported);
@@ -414,6 +423,15 @@ impl Format {
             exported.notes.push("the deck's one mass moves by the contact force, which one rigid mass does not follow (mass that the crush zone stops early is in it): its crush and rebound are not the run's; the body force is for that".into());
         }
         Ok(exported)
+    }
+
+    /// What has been done to the curves, and what is not written, behind the target's own notes.
+    fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
+        exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
+        if self.holds_band() {
+            exported.notes.extend(curves.iter().filter_map(ExportCurve::no_band_note));
+        }
+        exported
     }
 
     fn unfit(&self, needs: impl Into<String>) -> ExportError {
@@ -437,12 +455,6 @@ fn joined(all: Vec<Exported>) -> Exported {
         whole.warnings.extend(one.warnings);
     }
     whole
-}
-
-/// What has been done to the curves, behind the target's own notes.
-fn with_notes(mut exported: Exported, curves: &[ExportCurve]) -> Exported {
-    exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
-    exported
 }
 
 /// Curves of one speed would overwrite each other's files: the later ones are numbered.

@@ -6,6 +6,7 @@
 
 use std::fmt::Write;
 
+use super::export_curve::identifier;
 use super::text::{Lines, nine_digits, title};
 use super::thin::thinned;
 use super::{ExportCurve, ExportError, Exported, Options, Tail, TargetUnloading};
@@ -14,6 +15,10 @@ use super::{ExportCurve, ExportError, Exported, Options, Tail, TargetUnloading};
 const COMMENT_WIDTH: usize = 200;
 /// Most points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;
+/// Words that no package can have for a name (Modelica 3.6, 2.3.3), as far as files are called so.
+const KEYWORDS: &str = "algorithm and block class connect connector constant discrete each else end equation \
+    extends external false final flow for function if import initial inner input model \
+    operator outer output package record true type";
 /// Numbers per line of an array.
 const PER_LINE: usize = 6;
 
@@ -43,7 +48,11 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
             curve.own_restitution()
         ));
         let curve = curve.clone().through(loading, end);
-        exported.files.push((format!("{}.mo", curve.identifier()), package(&curve)));
+        let name = match (&options.stem, curves) {
+            (Some(stem), [_]) => package_name(stem),
+            _ => curve.identifier(),
+        };
+        exported.files.push((format!("{name}.mo"), package(&curve, &name)));
     }
     Ok(exported)
 }
@@ -92,10 +101,17 @@ fn array(name: &str, values: impl Iterator<Item = f64>, meaning: &str) -> String
     format!("  constant Real {name}[{}] = {{\n    {values}}} \"{meaning}\";\n", numbers.len())
 }
 
-fn package(curve: &ExportCurve) -> Vec<u8> {
+/// The package has the name of its file, as translators expect: so packages of one folder differ.
+fn package_name(stem: &str) -> String {
+    match KEYWORDS.split(' ').any(|word| word == stem) {
+        true => format!("curve_{stem}"),
+        false => identifier(stem),
+    }
+}
+
+fn package(curve: &ExportCurve, name: &str) -> Vec<u8> {
     let law = curve.law();
     let tables = law.tables();
-    let name = curve.identifier();
     let mut text = String::new();
     for (key, value) in curve.facts() {
         // Writing to a string cannot fail.

@@ -2,14 +2,17 @@
 //!
 //! Each speed's curve goes on beyond its maximal crush as a tail that is held, so that the table is a full rectangle.
 
-use super::tail::{Tail, with_tail};
+use super::tail::Tail;
 use super::text::{Lines, nine_digits};
-use super::{ExportError, Exported, Options};
+use super::{ExportCurve, ExportError, ExportInput, Exported, Options};
 use crate::curve::{Envelope, ForceKind};
 use crate::hdf5::{AttrValue, FileBuilder};
 use crate::surrogate::predict::predict_beyond;
 use crate::surrogate::{Model, Query};
+use crate::unit::km_per_h;
 
+/// Names of the band's edges.
+const EDGES: [&str; 2] = ["force_low_N", "force_high_N"];
 /// Value of the HDF5 root's `format`.
 const FORMAT: &str = "crumple force table";
 /// Speeds of a table if none are asked for.
@@ -24,9 +27,14 @@ struct Table {
     deflection_m: Vec<f64>,
     /// One row per speed.
     force_n: Vec<f64>,
+    /// Lower and upper edge of the band, likewise; NaN at a speed without one.
+    band: Option<[Vec<f64>; 2]>,
+    /// What the band is, in words.
+    band_meaning: Option<String>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,
     warnings: Vec<String>,
+    notes: Vec<String>,
 }
 
 pub fn write(model: &Model, options: &Options) -> Result<Exported, ExportError> {
@@ -41,7 +49,7 @@ pub fn write(model: &Model, options: &Options) -> Result<Exported, ExportError> 
     };
     let extension = if is_csv { "csv" } else { "h5" };
     let name = format!("table.{extension}");
-    Ok(Exported { files: vec![(name, bytes)], notes: Vec::new(), warnings: table.warnings })
+    Ok(Exported { files: vec![(name, bytes)], notes: table.notes, warnings: table.warnings })
 }
 
 impl Table {
@@ -63,38 +71,45 @@ impl Table {
             }
             asked => asked.unwrap_or(Tail::Hold),
         };
-        let (mut max_deflection_m, mut stiffness, mut curves) =
-            (Vec::new(), Vec::new(), Vec::new());
-        let mut warnings = Vec::new();
+        let (mut curves, mut warnings) = (Vec::new(), Vec::new());
         for &speed in &speed_m_per_s {
             let query = Query { speed_m_per_s: speed, ..options.query.clone() };
             let (curve, beyond) = predict_beyond(model, &query)?;
-            let alone = curve.of_force(options.force)?;
-            let beyond = match options.force {
-                ForceKind::Contact => &beyond.declared,
-                ForceKind::Body => &beyond.body,
-            };
-            let k_u = alone.unloading_stiffness_n_per_m;
-            curves.push(with_tail(&alone.envelope()?, Some(beyond), k_u, tail)?);
-            max_deflection_m.push(alone.max_deflection_m);
-            stiffness.push(k_u);
             warnings.extend(curve.warnings.iter().map(ToString::to_string));
+            let input = ExportInput { curve, beyond: Some(beyond) };
+            curves.push(ExportCurve::new(&input, options.force, tail, false)?);
         }
         warnings.sort();
         warnings.dedup();
-        let reach = curves.iter().map(Envelope::end_m).fold(0.0, f64::max);
+        let reach = curves.iter().map(|c| c.loading.end_m()).fold(0.0, f64::max);
         let share = |k: usize| (k as f64 / INTERVALS as f64).powf(1.5);
         let deflection_m: Vec<f64> = (0..=INTERVALS).map(|k| reach * share(k)).collect();
         let mut force_n = Vec::with_capacity(curves.len() * deflection_m.len());
-        for (curve, &end) in curves.iter().zip(&max_deflection_m) {
-            force_n.extend(row(curve, &deflection_m, end)?);
+        let mut band = [Vec::new(), Vec::new()];
+        for curve in &curves {
+            let (force, edges) = rows(curve, &deflection_m)?;
+            force_n.extend(force);
+            for (whole, edge) in band.iter_mut().zip(edges) {
+                whole.extend(edge);
+            }
         }
+        let meaning = curves.iter().find_map(|curve| {
+            let band = curve.predicted.provenance.band.filter(|_| curve.band.is_some())?;
+            let percent = band.level * 100.0;
+            Some(format!("{}: empirical range for {percent:.0} % of a force", EDGES.join(" to ")))
+        });
         Ok(Self {
             force_n,
+            band: meaning.is_some().then_some(band),
+            band_meaning: meaning,
+            max_deflection_m: curves.iter().map(ExportCurve::max_crush_m).collect(),
+            unloading_stiffness_n_per_m: curves
+                .iter()
+                .map(ExportCurve::stiffness_n_per_m)
+                .collect(),
+            notes: no_band_note(&curves).into_iter().collect(),
             speed_m_per_s,
             deflection_m,
-            max_deflection_m,
-            unloading_stiffness_n_per_m: stiffness,
             warnings,
         })
     }
@@ -102,19 +117,26 @@ impl Table {
     /// One line per speed and deflection.
     fn to_csv(&self, model: &Model, force: ForceKind) -> Vec<u8> {
         let mut lines = Lines::default();
-        for (key, value) in facts(model, force) {
+        for (key, value) in self.facts(model, force) {
             lines.add(format_args!("# {key}: {value}"));
         }
-        lines.add(format_args!("speed_m_per_s,d_m,force_N"));
-        for (row, speed) in self.force_n.chunks(self.deflection_m.len()).zip(&self.speed_m_per_s) {
-            for (d, f) in self.deflection_m.iter().zip(row) {
-                lines.add(format_args!(
-                    "{},{},{}",
-                    nine_digits(*speed),
-                    nine_digits(*d),
-                    nine_digits(*f)
-                ));
-            }
+        let edges =
+            if self.band.is_some() { format!(",{}", EDGES.join(",")) } else { String::new() };
+        lines.add(format_args!("speed_m_per_s,d_m,force_N{edges}"));
+        for (i, force) in self.force_n.iter().enumerate() {
+            let (row, column) = (i / self.deflection_m.len(), i % self.deflection_m.len());
+            let edges = match &self.band {
+                Some(band) => {
+                    band.iter().map(|edge| format!(",{}", nine_digits(edge[i]))).collect()
+                }
+                None => String::new(),
+            };
+            lines.add(format_args!(
+                "{},{},{}{edges}",
+                nine_digits(self.speed_m_per_s[row]),
+                nine_digits(self.deflection_m[column]),
+                nine_digits(*force)
+            ));
         }
         lines.into_bytes()
     }
@@ -122,11 +144,14 @@ impl Table {
     fn to_hdf5(&self, model: &Model, force: ForceKind) -> Result<Vec<u8>, ExportError> {
         let mut out = FileBuilder::new();
         out.set_attr("format", AttrValue::VarLenString(FORMAT.into()));
-        for (key, value) in facts(model, force) {
+        for (key, value) in self.facts(model, force) {
             out.set_attr(key, AttrValue::VarLenString(value));
         }
         let shape = [self.speed_m_per_s.len() as u64, self.deflection_m.len() as u64];
         out.create_dataset("force_N").with_f64_data(&self.force_n).with_shape(&shape);
+        for (name, edge) in EDGES.into_iter().zip(self.band.iter().flatten()) {
+            out.create_dataset(name).with_f64_data(edge).with_shape(&shape);
+        }
         for (name, values) in [
             ("speed_m_per_s", &self.speed_m_per_s),
             ("deflection_m", &self.deflection_m),
@@ -139,16 +164,53 @@ impl Table {
     }
 }
 
-/// The forces of a curve at these deflections, with its own energy to its maximal crush.
-fn row(curve: &Envelope, deflection_m: &[f64], end_m: f64) -> Result<Vec<f64>, ExportError> {
-    let mut force_n: Vec<f64> = deflection_m.iter().map(|&d| curve.force_at(d)).collect();
+/// The forces of a curve at these deflections, with its own energy to its maximal crush, and the edges of its
+/// band, which go with them.
+fn rows(
+    curve: &ExportCurve,
+    deflection_m: &[f64],
+) -> Result<(Vec<f64>, [Vec<f64>; 2]), ExportError> {
+    let at = |curve: &Envelope| deflection_m.iter().map(|&d| curve.force_at(d)).collect::<Vec<_>>();
+    let (end_m, force_n) = (curve.max_crush_m(), at(&curve.loading));
     let sampled = Envelope::new(deflection_m.to_vec(), force_n.clone())?;
-    let scale = curve.work_to(end_m) / sampled.work_to(end_m);
-    if scale.is_finite() {
-        let until = deflection_m.partition_point(|&d| d <= end_m);
-        force_n[..until].iter_mut().for_each(|f| *f *= scale);
+    let scale = curve.loading.work_to(end_m) / sampled.work_to(end_m);
+    let until = deflection_m.partition_point(|&d| d <= end_m);
+    let scaled = |mut force_n: Vec<f64>| {
+        if scale.is_finite() {
+            force_n[..until].iter_mut().for_each(|f| *f *= scale);
+        }
+        force_n
+    };
+    let edge = |edge_n: &[f64]| {
+        let edge = Envelope::new(curve.deflection_m().to_vec(), edge_n.to_vec())?;
+        Ok::<_, ExportError>(scaled(at(&edge)))
+    };
+    let edges = match &curve.band {
+        Some((low_n, high_n)) => [edge(low_n)?, edge(high_n)?],
+        None => [vec![f64::NAN; deflection_m.len()], vec![f64::NAN; deflection_m.len()]],
+    };
+    Ok((scaled(force_n), edges))
+}
+
+/// At which speeds the table has no band, in one line.
+fn no_band_note(curves: &[ExportCurve]) -> Option<String> {
+    let without: Vec<&ExportCurve> = curves.iter().filter(|c| c.band.is_none()).collect();
+    let why = without.first()?.no_band?;
+    let speeds = without.iter().map(|c| km_per_h(c.predicted.speed_m_per_s));
+    let at = match without.len() == curves.len() {
+        true => String::new(),
+        false => format!(" at {}", speeds.collect::<Vec<_>>().join(", ")),
+    };
+    Some(format!("table: written without a band{at}: {why}"))
+}
+
+impl Table {
+    /// What the table is, as keys and values.
+    fn facts(&self, model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
+        let mut facts = facts(model, force);
+        facts.extend(self.band_meaning.clone().map(|meaning| ("band", meaning)));
+        facts
     }
-    Ok(force_n)
 }
 
 fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {

@@ -1,5 +1,7 @@
 //! From a file to its case: read, said, made, and traced.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use super::said::Said;
@@ -7,6 +9,7 @@ use super::{ImportError, Item, Settings};
 use crate::curve::from_table::{FromTable, IMPORTED, Impact, Table, from_table};
 use crate::curve::recipe::{Filter, Sampling};
 use crate::curve::{Case, ForceKind, Parameter, SourceFile};
+use crate::database::names;
 use crate::formats::read::{self, ReadCurve};
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -62,6 +65,7 @@ fn assembled(
     }
     let sources = curve.files.iter().map(|file| SourceFile {
         path: file.path.display().to_string(),
+        absolute_path: absolute(&file.path),
         size_bytes: file.size_bytes,
         blake3: file.blake3.clone(),
         format: format.into(),
@@ -91,7 +95,16 @@ fn assembled(
         sources: sources.collect(),
         notes: notes.collect(),
         warnings: said.warnings.into_iter().chain(made.warnings).collect(),
+        built_utc: None,
+        origin: None,
+        tags: Vec::new(),
+        user_notes: Vec::new(),
     }
+}
+
+/// A path from the root on, as given: links are not followed.
+fn absolute(path: &Path) -> Option<String> {
+    Some(std::path::absolute(path).ok()?.display().to_string())
 }
 
 /// Everything beside the file that decides the case's numbers.
@@ -176,20 +189,11 @@ fn case_name(item: &Item) -> Result<String, ImportError> {
     })
 }
 
-/// Names stand in files, tables and HDF5 paths.
 fn check_name(item: &Item, what: &'static str, name: &str) -> Result<(), ImportError> {
-    let why = if name.trim().is_empty() || name == "." || name == ".." {
-        "it is none"
-    } else if name.contains(|c: char| c.is_control() || c == '/') {
-        "it may not contain \"/\" or control characters"
-    } else if name.len() > MAX_NAME {
-        "it has more than 200 bytes; give a shorter one (--case, --group)"
-    } else {
-        return Ok(());
-    };
-    let name = name.chars().take(MAX_NAME).collect();
-    Err(ImportError::Name { path: item.path.clone(), what, name, why })
+    names::check(name).map_err(|why| ImportError::Name {
+        path: item.path.clone(),
+        what,
+        name: names::shown(name),
+        why,
+    })
 }
-
-/// Longest name of a case or group, in bytes.
-const MAX_NAME: usize = 200;

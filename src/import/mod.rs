@@ -10,6 +10,7 @@ mod said;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::clock;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, Parameter};
 use crate::database::Database;
@@ -64,8 +65,10 @@ pub fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>
         false => Database::default(),
     };
     let mut cases: Vec<Case> = Vec::with_capacity(items.len());
+    let now = clock::now_utc();
     for item in items {
-        let case = case::of(item, settings, database.cases(&settings.group).first())?;
+        let mut case = case::of(item, settings, database.cases(&settings.group).first())?;
+        case.built_utc = Some(now.clone());
         if let Some(k) = cases.iter().position(|c| c.name == case.name) {
             let (first, second) = (items[k].path.clone(), item.path.clone());
             return Err(ImportError::SameName { first, second, name: case.name });
@@ -74,11 +77,28 @@ pub fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>
         if let Some(first) = cases.first() {
             check_kinds(item, &case, first)?;
         }
+        if let Some(before) = there(&database, &case) {
+            // What users said of it is of the one that takes its place, too.
+            (case.tags, case.user_notes) = (before.tags.clone(), before.user_notes.clone());
+        }
         cases.push(case);
     }
     database.put_all(cases.iter().cloned())?;
     database.write(path)?;
     Ok(cases)
+}
+
+/// The case that the curve of one file makes, without a database.
+///
+/// # Errors
+/// [`ImportError`] names the file and what to do.
+pub fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, ImportError> {
+    case::of(item, settings, None)
+}
+
+/// The case of the same names that the database has.
+fn there<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
+    database.cases(&case.group).iter().find(|c| c.name == case.name)
 }
 
 /// Whether the case may take its place in the database.
@@ -88,9 +108,8 @@ fn check_place(
     case: &Case,
     replace: bool,
 ) -> Result<(), ImportError> {
-    let there = database.cases(&case.group);
     let (path, group, name) = (item.path.clone(), case.group.clone(), case.name.clone());
-    match there.iter().find(|c| c.name == case.name) {
+    match there(database, case) {
         Some(other) if other.study != IMPORTED => {
             return Err(ImportError::OfStudy { path, group, name, study: other.study.clone() });
         }
@@ -98,7 +117,7 @@ fn check_place(
         _ => {}
     }
     // A case that is replaced binds nobody.
-    match there.iter().find(|c| c.name != case.name) {
+    match database.cases(&case.group).iter().find(|c| c.name != case.name) {
         Some(other) => check_kinds(item, case, other),
         None => Ok(()),
     }

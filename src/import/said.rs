@@ -136,10 +136,8 @@ impl Both<'_> {
             }
             (Some(force), _) | (None, Some(force)) => Ok(force),
             (None, None) => {
-                self.notes.push(
-                    "force: taken as the contact force; neither file nor --force say which it is"
-                        .into(),
-                );
+                self.notes
+                    .push("force: taken as the contact force, as nothing says which it is".into());
                 Ok(ForceKind::Contact)
             }
         }

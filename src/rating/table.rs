@@ -1,5 +1,6 @@
 //! Tables: a signal from a CSV file with a header line, whose first column is the time.
 
+use crate::guess;
 use std::io::Read;
 
 use crate::table::{CsvTable, NoNumber};
@@ -45,7 +46,7 @@ pub enum TableError {
         found: String,
     },
     /// No column has the wanted name.
-    #[error("there is no column \"{wanted}\": name one of {known}")]
+    #[error("there is no column \"{wanted}\": name one of {known}{}", guess::hint(wanted, known))]
     NoColumn {
         /// The wanted name.
         wanted: String,

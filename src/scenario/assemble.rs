@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::layout::{Layout, Role, Slot, layout};
+use super::place::{self, Origin};
 use super::spring::{NoSpring, SpringError, spring};
 use super::{CheckedScenario, CurveSource, LimitsTable, Prepared, ScenarioError, Sources, Used};
 use crate::multibody::{
-    Chain, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
+    Chain, ChainError, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
 };
 use crate::unit::SpeedKind;
 
@@ -87,8 +88,8 @@ pub(super) fn assemble_at(
         interfaces.push(interface);
         used.push(made.used);
     }
-    let chain = Chain::new(bodies, interfaces)
-        .map_err(|source| ScenarioError::Chain { path: path.into(), source })?;
+    let chain =
+        Chain::new(bodies, interfaces).map_err(|source| no_chain(path, scenario, source))?;
     let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0)
         .with_method(Method::from(scenario.run.method));
     let settings = scenario.run.step.map_or(settings, |step| settings.with_step(step.0));
@@ -111,7 +112,8 @@ pub(super) fn assemble_at(
         Some(limits) => limited(scenario, &order, limits),
         None => Vec::new(),
     };
-    Ok(Prepared { chain, settings, order, used, limits, limited, warnings })
+    let origin = Origin::new(path, scenario);
+    Ok(Prepared { chain, settings, order, used, limits, limited, warnings, origin })
 }
 
 /// The bodies of the vehicles that limits hold for; `order` lists those of all trains, each vehicle
@@ -153,8 +155,12 @@ pub(crate) fn adjust(
         .map(|slot| scenario.curves.get(slot.curve).and_then(|c| c.tension.as_ref()))
         .map(|tension| tension.map_or(0.0, |curve| own(curve)))
         .collect();
-    let failed = |source| ScenarioError::Chain { path: path.into(), source };
-    prepared.chain.adjust(&motions, &gaps, &slacks).map_err(failed)
+    let adjusted = prepared.chain.adjust(&motions, &gaps, &slacks);
+    adjusted.map_err(|source| no_chain(path, scenario, source))
+}
+
+fn no_chain(path: &Path, scenario: &CheckedScenario<'_>, source: ChainError) -> ScenarioError {
+    ScenarioError::Chain { place: scenario.place(path, &scenario.chain_key(&source)), source }
 }
 
 /// A law that has been made, and for what.
@@ -177,7 +183,8 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn failed(&self, source: AssemblyError) -> ScenarioError {
-        ScenarioError::Assembly { path: self.path.into(), source: source.into() }
+        let place = self.scenario.place(self.path, &place::assembly_key(&source));
+        ScenarioError::Assembly { place, source: source.into() }
     }
 
     fn no_spring(&self, curve: &str, source: SpringError) -> ScenarioError {
@@ -204,7 +211,10 @@ impl Builder<'_> {
         }
         let spring = spring(source, table, slot, speed).map_err(|e| match e {
             NoSpring::Spring(source) => self.no_spring(curve, source),
-            NoSpring::Predict(source) => ScenarioError::Predict { curve: curve.into(), source },
+            NoSpring::Predict(source) => {
+                let place = self.scenario.place(self.path, &place::predict_key(curve, &source));
+                ScenarioError::Predict { place, curve: curve.into(), source }
+            }
         })?;
         let expected = match slot.role {
             Role::Wall => Some(SpeedKind::Wall),

@@ -6,6 +6,8 @@ use std::ops::Deref;
 
 use super::layout::layout;
 use super::{CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
+use crate::guess;
+use crate::manifest::Document;
 use crate::unit::km_per_h;
 
 /// A scenario that has been checked; read its tables as those of the [`Scenario`] it was.
@@ -17,6 +19,8 @@ use crate::unit::km_per_h;
 pub struct CheckedScenario<'a> {
     tables: Cow<'a, Scenario>,
     meeting_m_per_s: f64,
+    /// Its text, if it is as its file has it.
+    document: Option<Document>,
 }
 
 impl Deref for CheckedScenario<'_> {
@@ -58,7 +62,10 @@ pub enum CheckError {
     #[error("[limits] trains is empty: name one, or remove it for all")]
     NoLimitedTrain,
     /// Limits for a train that is not there.
-    #[error("[limits] trains: there is no train \"{name}\": the scenario has {known}")]
+    #[error(
+        "[limits] trains: there is no train \"{name}\": the scenario has {known}{}",
+        guess::hint(name, known)
+    )]
     UnknownTrain {
         /// The train.
         name: String,
@@ -136,12 +143,17 @@ pub enum CheckError {
         of: &'static str,
     },
     /// A tension curve that is not there.
-    #[error("curve \"{curve}\": its tension curve \"{tension}\" is not in [curves]")]
+    #[error(
+        "curve \"{curve}\": its tension curve \"{tension}\" is not in [curves]: it has {known}{}",
+        guess::hint(tension, known)
+    )]
     UnknownTension {
         /// The curve.
         curve: String,
         /// Its tension curve.
         tension: String,
+        /// The curves there are.
+        known: String,
     },
     /// A tension curve with a tension curve or a damper.
     #[error(
@@ -172,7 +184,10 @@ pub enum CheckError {
         speed_m_per_s: f64,
     },
     /// A curve that is used and not there.
-    #[error("there is no curve \"{curve}\" in [curves]: it has {known}")]
+    #[error(
+        "there is no curve \"{curve}\" in [curves]: it has {known}{}",
+        guess::hint(curve, known)
+    )]
     UnknownCurve {
         /// The curve.
         curve: String,
@@ -198,8 +213,7 @@ impl Scenario {
         let checked = check_values(self)?;
         for slot in layout(&checked).slots {
             if !self.curves.contains_key(slot.curve) {
-                let known: Vec<&str> = self.curves.keys().map(String::as_str).collect();
-                let (curve, known) = (slot.curve.into(), known.join(", "));
+                let (curve, known) = (slot.curve.into(), curve_names(self));
                 return Err(CheckError::UnknownCurve { curve, known });
             }
         }
@@ -211,6 +225,16 @@ impl CheckedScenario<'_> {
     /// Speed at which the first train meets what is in front of it, in m/s; above 0.
     pub(crate) fn meeting_m_per_s(&self) -> f64 {
         self.meeting_m_per_s
+    }
+
+    /// Its text, if it is as its file has it.
+    pub(super) fn document(&self) -> Option<&Document> {
+        self.document.as_ref()
+    }
+
+    /// The same with the text that it was read from.
+    pub(super) fn with(self, document: Document) -> Self {
+        Self { document: Some(document), ..self }
     }
 
     /// The same with tables of its own.
@@ -349,7 +373,11 @@ fn check_values(scenario: &Scenario) -> Result<CheckedScenario<'_>, CheckError> 
     if meeting_m_per_s <= 0.0 {
         return Err(CheckError::NeverMeets { train: first.name.clone(), speed_m_per_s });
     }
-    Ok(CheckedScenario { tables: Cow::Borrowed(scenario), meeting_m_per_s })
+    Ok(CheckedScenario { tables: Cow::Borrowed(scenario), meeting_m_per_s, document: None })
+}
+
+fn curve_names(scenario: &Scenario) -> String {
+    scenario.curves.keys().map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
 fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), CheckError> {
@@ -369,7 +397,10 @@ fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), CheckE
 fn check_tension(name: &str, tension: &str, scenario: &Scenario) -> Result<(), CheckError> {
     let (curve, tension) = (name.to_string(), tension.to_string());
     match scenario.curves.get(&tension) {
-        None => Err(CheckError::UnknownTension { curve, tension }),
+        None => {
+            let known = curve_names(scenario);
+            Err(CheckError::UnknownTension { curve, tension, known })
+        }
         Some(other) if other.tension.is_some() || other.damping.is_some() => {
             Err(CheckError::TensionOfTension { curve, tension })
         }

@@ -56,8 +56,8 @@ pub(crate) fn assemble(
         if !prepared.chain.has_rates() {
             settings = settings.with_method(Method::FourthOrder);
         }
-        let run = simulate(&prepared.chain, &settings)
-            .map_err(|source| ScenarioError::Local { path: path.into(), source })?;
+        let failed = |source| ScenarioError::Local { place: prepared.place_of(&source), source };
+        let run = simulate(&prepared.chain, &settings).map_err(failed)?;
         let mut largest = (0.0, 0);
         for k in (0..own.len()).filter(|&k| own[k]) {
             let Some(closing) = closing_speed(&prepared.chain, &run, k) else {

@@ -1,14 +1,43 @@
 //! Scenario (TOML): trains, wall and curves, resolved into a multi-body chain.
+//!
+//! ```
+//! use crumple::multibody::simulate;
+//! use std::path::Path;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("scenario.toml");
+//! # let nose = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nose.csv");
+//! # let text = format!(r#"
+//! # [run]
+//! # duration = "300ms"
+//! # output_interval = "0.75ms"
+//! # [curves]
+//! # nose = {{ file = '{}' }}
+//! # [[train]]
+//! # name = "A"
+//! # speed = "36km/h"
+//! # vehicles = [{{ name = "A1", mass = "24t" }}]
+//! # [wall]
+//! # [contact]
+//! # curve = "nose"
+//! # "#, nose.display());
+//! # std::fs::write(&path, text)?;
+//! let prepared = crumple::scenario::load(&path)?;
+//! let run = simulate(&prepared.chain, &prepared.settings)?;
+//! assert!(run.interfaces[0].max_deflection_m > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod assemble;
 mod check;
 mod layout;
 mod local;
+mod place;
 mod sources;
 mod spring;
 mod tables;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use assemble::AssemblyError;
 pub(crate) use assemble::adjust;
@@ -21,10 +50,11 @@ pub use tables::*;
 
 use crate::database::DatabaseError;
 use crate::formats::read::{ReadCurveError, json};
-use crate::manifest::{self, ManifestError};
-use crate::multibody::{Chain, ChainError, RunSettings, SimulationError};
+use crate::manifest::{self, Document, ManifestError, Place};
+use crate::multibody::{Chain, ChainError, Run, RunSettings, SimulationError, simulate};
 use crate::surrogate::ModelError;
 use crate::surrogate::predict::PredictError;
+use place::Origin;
 
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
@@ -43,6 +73,19 @@ pub struct Prepared {
     pub limited: Vec<usize>,
     /// Warnings of the curves used.
     pub warnings: Vec<String>,
+    /// Where it comes from.
+    origin: Origin,
+}
+
+impl Prepared {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Run`] with the place of the key that decides it.
+    pub fn run(&self) -> Result<Run, ScenarioError> {
+        simulate(&self.chain, &self.settings)
+            .map_err(|source| ScenarioError::Run { place: self.place_of(&source), source })
+    }
 }
 
 /// What an interface uses.
@@ -60,68 +103,110 @@ pub struct Used {
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// It is no TOML, or has other keys.
-    #[error(transparent)]
+    #[error("{0}")]
     Manifest(#[from] ManifestError),
     /// It is wrong as a whole.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Check {
-        /// The scenario.
-        path: PathBuf,
+        /// Where in the scenario.
+        place: Place,
         /// What is wrong.
         source: Box<CheckError>,
     },
     /// A curve's source is wrong.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Source {
-        /// The scenario.
-        path: PathBuf,
+        /// Where in the scenario.
+        place: Place,
         /// Which curve, and what is wrong.
         source: SourceError,
     },
     /// A curve cannot stand where the scenario puts it.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Assembly {
-        /// The scenario.
-        path: PathBuf,
+        /// Where in the scenario.
+        place: Place,
         /// Which curve, and why not.
         source: Box<AssemblyError>,
     },
-    /// A model file cannot be used.
-    #[error(transparent)]
-    Model(#[from] ModelError),
+    /// A file that a curve names cannot be used.
+    #[error("{place}: curve \"{curve}\": {source}")]
+    File {
+        /// Where the scenario names it.
+        place: Place,
+        /// Name of the curve.
+        curve: String,
+        /// Why.
+        source: Box<SourceFileError>,
+    },
     /// A model gives no curve.
-    #[error("curve \"{curve}\": {source}")]
+    #[error("{place}: curve \"{curve}\": {source}")]
     Predict {
+        /// Where in the scenario.
+        place: Place,
         /// Name of the curve.
         curve: String,
         /// Why.
         source: PredictError,
     },
-    /// A database cannot be used.
-    #[error(transparent)]
-    Database(#[from] DatabaseError),
-    /// A predicted curve cannot be used.
-    #[error(transparent)]
-    CurveFile(#[from] json::CurveFileError),
-    /// A table of a curve cannot be used.
-    #[error(transparent)]
-    Csv(#[from] ReadCurveError),
     /// Its bodies make no chain.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Chain {
-        /// The scenario.
-        path: PathBuf,
+        /// Where in the scenario.
+        place: Place,
         /// Why.
         source: ChainError,
     },
     /// The run that looks for the speeds of the interfaces failed.
-    #[error("{path}: while the interfaces' speeds were sought: {source}")]
+    #[error("{place}: while the interfaces' speeds were sought: {source}")]
     Local {
-        /// The scenario.
-        path: PathBuf,
+        /// Where in the scenario.
+        place: Place,
         /// Why.
         source: SimulationError,
     },
+    /// The run failed.
+    #[error("{place}: {source}")]
+    Run {
+        /// Where in the scenario.
+        place: Place,
+        /// Why.
+        source: SimulationError,
+    },
+}
+
+impl ScenarioError {
+    /// Where in the scenario it is wrong.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Manifest(error) => error.place(),
+            Self::Check { place, .. }
+            | Self::Source { place, .. }
+            | Self::Assembly { place, .. }
+            | Self::File { place, .. }
+            | Self::Predict { place, .. }
+            | Self::Chain { place, .. }
+            | Self::Local { place, .. }
+            | Self::Run { place, .. } => Some(place),
+        }
+    }
+}
+
+/// Why a file that a curve names cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceFileError {
+    /// A model file.
+    #[error("{0}")]
+    Model(#[from] ModelError),
+    /// A database.
+    #[error("{0}")]
+    Database(#[from] DatabaseError),
+    /// A predicted curve.
+    #[error("{0}")]
+    Predicted(#[from] json::CurveFileError),
+    /// A table of a curve.
+    #[error("{0}")]
+    Table(#[from] ReadCurveError),
 }
 
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
@@ -130,10 +215,15 @@ pub enum ScenarioError {
 /// [`ScenarioError`] names the key.
 pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
     let scenario: Scenario = manifest::parse(path, text)?;
-    Ok(check(path, &scenario)?.into_owned())
+    let document = Document::new(path, text);
+    let checked = scenario.check().map_err(|source| {
+        let place = document.place(&scenario.check_key(&source));
+        ScenarioError::Check { place, source: source.into() }
+    })?;
+    Ok(checked.with(document).into_owned())
 }
 
-/// Checks a scenario as [`Scenario::check`] does, with its path in the message.
+/// Checks a scenario that is not as its file has it, with the file's path in the message.
 ///
 /// # Errors
 /// [`ScenarioError::Check`] names the key.
@@ -141,9 +231,10 @@ pub(crate) fn check<'a>(
     path: &Path,
     scenario: &'a Scenario,
 ) -> Result<CheckedScenario<'a>, ScenarioError> {
-    scenario
-        .check()
-        .map_err(|source| ScenarioError::Check { path: path.into(), source: source.into() })
+    scenario.check().map_err(|source| ScenarioError::Check {
+        place: Place::of_file(path),
+        source: source.into(),
+    })
 }
 
 /// Reads and checks a scenario; curves are not read.

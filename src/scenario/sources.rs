@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{CurveTable, Scenario, ScenarioError, StageTable};
+use super::place;
+use super::{CheckedScenario, CurveTable, Scenario, ScenarioError, SourceFileError, StageTable};
 use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError};
-use crate::database::Database;
+use crate::database::{Database, DatabaseError};
 use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
 
@@ -63,10 +64,19 @@ impl Sources {
     ///
     /// # Errors
     /// [`ScenarioError`] names the curve or file.
-    pub(crate) fn read(path: &Path, scenario: &Scenario) -> Result<Self, ScenarioError> {
+    pub(crate) fn read(path: &Path, scenario: &CheckedScenario<'_>) -> Result<Self, ScenarioError> {
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
-            let source = CurveSource::read(path, name, table)?;
+            let source = CurveSource::read(path, name, table).map_err(|wrong| match wrong {
+                NoSource::Table(source) => {
+                    let place = scenario.place(path, &scenario.source_key(&source));
+                    ScenarioError::Source { place, source }
+                }
+                NoSource::File(key, source) => {
+                    let place = scenario.place(path, &place::curve(name).key(key));
+                    ScenarioError::File { place, curve: name.clone(), source: source.into() }
+                }
+            })?;
             curves.insert(name.clone(), source);
         }
         Ok(Self { curves })
@@ -114,14 +124,22 @@ pub enum SourceError {
     },
 }
 
+/// Why a curve has no source: its table, or the file that it names with a key.
+enum NoSource {
+    Table(SourceError),
+    File(&'static str, SourceFileError),
+}
+
 /// Why stages in series make no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StageError {
     /// A stage is shorter than what joins it to the next.
     #[error("stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm")]
     Short {
-        /// Name of the stage, or its number, counted from 1.
+        /// Name of the stage, or its number.
         stage: String,
+        /// Its number, counted from 1.
+        number: usize,
         /// Its stroke, in m.
         stroke_m: f64,
     },
@@ -132,20 +150,24 @@ pub enum StageError {
 
 impl CurveSource {
     /// Reads what the table of curve `name` in the scenario at `path` asks for.
-    fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, ScenarioError> {
+    fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, NoSource> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let curve = || name.to_string();
-        let wrong = |source| ScenarioError::Source { path: path.into(), source };
+        let wrong = NoSource::Table;
         match (&table.model, &table.file, &table.database, &table.stages) {
             (Some(model), None, None, None) => {
-                Ok(Self::Model(Box::new(Model::read(&folder.join(model))?)))
+                let read = Model::read(&folder.join(model));
+                Ok(Self::Model(Box::new(read.map_err(|e| NoSource::File("model", e.into()))?)))
             }
             (None, Some(file), None, None) => {
                 let file = folder.join(file);
                 if file.extension().is_some_and(|e| e == "json") {
-                    return Ok(Self::Predicted(Box::new(json::predicted(&file)?)));
+                    let read =
+                        json::predicted(&file).map_err(|e| NoSource::File("file", e.into()))?;
+                    return Ok(Self::Predicted(Box::new(read)));
                 }
-                let mut held = csv::driving(&file)?;
+                let read = csv::driving(&file);
+                let mut held = read.map_err(|e| NoSource::File("file", e.into()))?;
                 let stated = table.force.or(held.force);
                 if held.force.is_some() && stated != held.force {
                     return Err(wrong(SourceError::OtherForce { curve: curve(), file }));
@@ -158,7 +180,13 @@ impl CurveSource {
                 let (group, case) =
                     case.ok_or_else(|| wrong(SourceError::NoCase { curve: curve() }))?;
                 let database = folder.join(database);
-                Ok(Self::Case(Box::new(Database::read_case(&database, Some(group), case)?)))
+                let read = Database::read_case(&database, Some(group), case);
+                let read = read.map_err(|e| {
+                    let is_name =
+                        matches!(e, DatabaseError::NoGroup { .. } | DatabaseError::NoCase { .. });
+                    NoSource::File(if is_name { "case" } else { "database" }, e.into())
+                })?;
+                Ok(Self::Case(Box::new(read)))
             }
             (None, None, None, Some(stages)) => staged(stages)
                 .map(Self::Stages)
@@ -178,7 +206,7 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, StageError> {
         let stroke_m = stage.stroke.0;
         if stroke_m <= 2.0 * STEP_M {
             let stage = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
-            return Err(StageError::Short { stage, stroke_m });
+            return Err(StageError::Short { stage, number: i + 1, stroke_m });
         }
         match f.last() {
             None => {

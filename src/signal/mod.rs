@@ -2,10 +2,12 @@
 
 pub(crate) mod cfc;
 mod derivative;
+mod integral;
 mod l1;
 pub(crate) mod peaks;
 pub(crate) mod resample;
 
 pub use cfc::CfcError;
 pub use derivative::derivative;
+pub(crate) use integral::integral;
 pub use l1::l1_ratio;

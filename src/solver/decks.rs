@@ -96,6 +96,15 @@ pub fn find(folder: &Path) -> Search {
     }
 }
 
+/// The only deck beside the file at `path`, or the one that includes the others, if it can be read.
+pub fn beside(path: &Path) -> Option<(PathBuf, Deck)> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match find(folder) {
+        Search::One(path) => read(&path).ok().map(|deck| (path, deck)),
+        Search::None | Search::Several(_) => None,
+    }
+}
+
 fn has_ending(path: &Path) -> bool {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
@@ -117,14 +126,18 @@ fn is_deck(path: &Path) -> bool {
 
 /// Fills titles that a file does not give itself from the deck; how many.
 pub fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
+    fill_entity_titles(&file.section, &mut file.entities, deck)
+}
+
+/// The same for the entities of a section.
+pub(crate) fn fill_entity_titles(section: &str, entities: &mut [Entity], deck: &Deck) -> usize {
     let named = |list: &[Named]| -> Vec<(i64, Option<String>)> {
         list.iter().map(|n| (n.id, n.title.clone())).collect()
     };
     let interfaces = |list: &[Interface]| -> Vec<(i64, Option<String>)> {
         list.iter().filter_map(|n| Some((n.id?, n.title.clone()))).collect()
     };
-    let section = file.section.split('/').next().unwrap_or_default();
-    let titles = match section {
+    let titles = match section.split('/').next().unwrap_or_default() {
         "nodout" => named(&deck.history_nodes),
         "matsum" => named(&deck.parts),
         "rcforc" | "sleout" => interfaces(&deck.contacts),
@@ -134,7 +147,7 @@ pub fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
     let titles: HashMap<i64, String> =
         titles.into_iter().rev().filter_map(|(id, title)| Some((id, title?))).collect();
     let mut filled = 0;
-    for Entity { id, title } in file.entities.iter_mut().filter(|e| e.title.is_none()) {
+    for Entity { id, title } in entities.iter_mut().filter(|e| e.title.is_none()) {
         if let Some(found) = titles.get(&id.id) {
             *title = Some(found.clone());
             filled += 1;

@@ -124,11 +124,16 @@ pub(super) fn files_in(folder: &Path) -> String {
     let mut named: Vec<String> = entries
         .take(LOOKED_AT)
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| name.ends_with(T01) || FORMATS.iter().any(|f| name.starts_with(f.name)))
+        .filter(|name| is_named_like_output(name))
         .collect();
     named.sort();
     named.truncate(3);
     if named.is_empty() { String::new() } else { format!(", such as {}", named.join(" or ")) }
+}
+
+/// Whether a file is named as a solver names one that can be read.
+pub(super) fn is_named_like_output(name: &str) -> bool {
+    name.ends_with(T01) || FORMATS.iter().any(|f| name.starts_with(f.name))
 }
 
 /// How OpenRadioss names its time history: the run's name and this.

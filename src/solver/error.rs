@@ -1,5 +1,6 @@
 //! Why a file gives no histories, or not those that were asked for.
 
+use crate::guess;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +64,10 @@ pub enum ReadError {
         known: String,
     },
     /// The file has no such section.
-    #[error("{path}: it has no section \"{section}\": it has {known}")]
+    #[error(
+        "{path}: it has no section \"{section}\": it has {known}{}",
+        guess::hint(section, known)
+    )]
     NoSuchSection {
         /// The file.
         path: PathBuf,
@@ -73,7 +77,7 @@ pub enum ReadError {
         known: String,
     },
     /// No reader has such a name.
-    #[error("there is no format \"{name}\": the readers take {known}")]
+    #[error("there is no format \"{name}\": the readers take {known}{}", guess::hint(name, known))]
     NoSuchFormat {
         /// The name that was given.
         name: String,
@@ -105,7 +109,10 @@ pub enum ReadError {
         with_data: String,
     },
     /// The file has no such component.
-    #[error("{path}: {format} has no component \"{component}\": it has {known}")]
+    #[error(
+        "{path}: {format} has no component \"{component}\": it has {known}{}",
+        guess::hint(component, known)
+    )]
     NoSuchComponent {
         /// The file.
         path: PathBuf,
@@ -119,7 +126,7 @@ pub enum ReadError {
 }
 
 /// What an id of this format counts, for messages.
-fn entity_word(format: &str) -> &'static str {
+pub(crate) fn entity_word(format: &str) -> &'static str {
     match format {
         "nodout" => "node",
         "rwforc" | "rwforc/forces" => "rigid wall",
@@ -204,10 +211,14 @@ fn near_ids(file: &SolverFile, id: i64) -> String {
             None => e.id.to_string(),
         })
         .collect();
+    let ids: Vec<String> = entities.iter().map(|e| e.id.to_string()).collect();
+    let ids = ids.iter().map(String::as_str).filter(|known| *known != id.to_string());
+    let guess = guess::nearest(&id.to_string(), ids);
+    let guess = guess.map_or(String::new(), |guess| format!("; did you mean {guess}?"));
     let rest = file.entities.len().saturating_sub(SHOWN);
     if rest > 0 {
-        format!("the nearest of its ids are {} and {rest} more", shown.join(", "))
+        format!("the nearest of its ids are {} and {rest} more{guess}", shown.join(", "))
     } else {
-        format!("it has {}", shown.join(", "))
+        format!("it has {}{guess}", shown.join(", "))
     }
 }

@@ -46,14 +46,17 @@ fn continuation(path: &Path, number: usize) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// Whether a file continues another.
+pub(super) fn is_continuation(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().contains('%'))
+}
+
 /// Continuations looked for behind one that is missing.
 const LOOKED_AHEAD: usize = 20;
 
 /// The first continuation that is missing although later ones are there, of any of the files.
 pub(crate) fn missing_continuation(path: &Path) -> Option<String> {
     let first = |path: &Path| (1..).find(|&n| !continuation(path, n).is_file()).unwrap_or(1);
-    let is_continuation =
-        |part: &Path| part.file_name().is_some_and(|name| name.to_string_lossy().contains('%'));
     family(path).iter().filter(|part| !is_continuation(part)).find_map(|part| {
         let missing = first(part);
         let later = missing + 1..=missing + LOOKED_AHEAD;

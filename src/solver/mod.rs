@@ -3,6 +3,24 @@
 //! A reader takes a [`Source`] and a [`Selection`], returns a [`SolverFile`], and treats
 //! damage as part of the result ([`Problem`]): complete states are returned, what is
 //! missing is named. It never prints, panics, or holds more than was selected.
+//!
+//! ```
+//! use crumple::solver::{Selection, read};
+//! use std::path::Path;
+//!
+//! let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe/lead-car-wall/36kmh/nodout");
+//! let selection = Selection {
+//!     ids: Some(vec!["900001".parse()?]),
+//!     components: Some(vec!["x_velocity".into()]),
+//!     ..Selection::all()
+//! };
+//! let file = read(&path, None, &selection)?;
+//! assert_eq!((file.histories.len(), file.time.len()), (1, 400));
+//! // In the solver's units: mm/s.
+//! assert_eq!(file.histories[0].values[0], -10_000.0);
+//! assert!(file.problems.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod decks;
 mod detect;
@@ -13,6 +31,7 @@ pub mod lsdyna;
 mod openradioss;
 mod problem;
 mod restart;
+pub mod runs;
 mod selection;
 mod solver_file;
 pub mod source;
@@ -24,6 +43,7 @@ use std::path::{Path, PathBuf};
 use detect::{check_format, detect, files_in};
 pub use error::ReadError;
 use error::check_selection;
+pub(crate) use error::entity_word;
 pub use family::family;
 use family::missing_continuation;
 pub(crate) use format::format_names;

@@ -6,6 +6,7 @@ use super::manifest::{Head, Manifest, RunEntry, StudyKind};
 use crate::curve::Parameter;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::recipe::{ForceSource, Recipe};
+use crate::manifest::KeyPath;
 
 /// What does not fit in a study manifest.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -114,74 +115,90 @@ pub enum InvalidStudy {
     },
 }
 
-pub(super) fn check(manifest: &Manifest) -> Result<(), InvalidStudy> {
+/// What does not fit, and the key that tells so.
+type Wrong = (InvalidStudy, KeyPath);
+
+pub(super) fn check(manifest: &Manifest) -> Result<(), Wrong> {
     let Head { name, group, kind, half_model, .. } = &manifest.study;
-    check_name("study.name", name, true)?;
+    let of_name = || KeyPath::of("study.name");
+    check_name("study.name", name, true).map_err(|wrong| (wrong, of_name()))?;
     // A build removes the cases of its study that it does not know.
     if name == IMPORTED {
-        return Err(InvalidStudy::NameOfImported);
+        return Err((InvalidStudy::NameOfImported, of_name()));
     }
-    check_name("study.group", group, false)?;
+    check_name("study.group", group, false).map_err(|wrong| (wrong, KeyPath::of("study.group")))?;
     let minus_node = manifest.recipe.deflection.minus_node.is_some();
+    let half = || KeyPath::of("study.half_model");
     match (kind, half_model, minus_node) {
-        (StudyKind::Pair, false, false) => return Err(InvalidStudy::PairOfOne),
-        (StudyKind::Pair, true, true) => return Err(InvalidStudy::DoublyWhole),
-        (StudyKind::Wall, true, _) => return Err(InvalidStudy::HalfWall),
+        (StudyKind::Pair, false, false) => {
+            return Err((InvalidStudy::PairOfOne, KeyPath::of("study.kind")));
+        }
+        (StudyKind::Pair, true, true) => return Err((InvalidStudy::DoublyWhole, half())),
+        (StudyKind::Wall, true, _) => return Err((InvalidStudy::HalfWall, half())),
         _ => {}
     }
     if manifest.run.is_empty() {
-        return Err(InvalidStudy::NoRun);
+        return Err((InvalidStudy::NoRun, KeyPath::of("run")));
     }
     check_contact(&manifest.recipe)?;
     let mut names = HashSet::new();
-    for run in &manifest.run {
-        check_run(run, *kind)?;
+    for (k, run) in manifest.run.iter().enumerate() {
+        let of_run = KeyPath::of("run").item(k);
+        check_run(run, *kind, &of_run)?;
         let name = run.case_name();
         if !names.insert(name.clone()) {
-            return Err(InvalidStudy::SameName { name });
+            return Err((InvalidStudy::SameName { name }, name_key(run, &of_run)));
         }
     }
     Ok(())
 }
 
-fn check_contact(recipe: &Recipe) -> Result<(), InvalidStudy> {
-    match (&recipe.contact, &recipe.force) {
-        (Some(ForceSource::Body { .. }), _) => Err(InvalidStudy::ContactOfBody),
-        (Some(_), ForceSource::Contact { .. }) => Err(InvalidStudy::ContactBesideContact),
-        _ => Ok(()),
-    }
+fn check_contact(recipe: &Recipe) -> Result<(), Wrong> {
+    let wrong = match (&recipe.contact, &recipe.force) {
+        (Some(ForceSource::Body { .. }), _) => InvalidStudy::ContactOfBody,
+        (Some(_), ForceSource::Contact { .. }) => InvalidStudy::ContactBesideContact,
+        _ => return Ok(()),
+    };
+    Err((wrong, KeyPath::of("recipe.contact")))
 }
 
-fn check_run(entry: &RunEntry, kind: StudyKind) -> Result<(), InvalidStudy> {
-    check_parameters(entry)?;
+/// The key that gives a run's case its name.
+fn name_key(entry: &RunEntry, of_run: &KeyPath) -> KeyPath {
+    of_run.clone().key(if entry.name.is_some() { "name" } else { "path" })
+}
+
+fn check_run(entry: &RunEntry, kind: StudyKind, of_run: &KeyPath) -> Result<(), Wrong> {
+    check_parameters(entry, of_run)?;
     let run = || entry.path.clone();
+    let key = |name| of_run.clone().key(name);
     if entry.contact_time.is_some() && entry.gap.is_some() {
-        return Err(InvalidStudy::TwoContacts { run: run() });
+        return Err((InvalidStudy::TwoContacts { run: run() }, key("gap").itself()));
     }
     if entry.path.trim().is_empty() {
-        return Err(InvalidStudy::EmptyPath);
+        return Err((InvalidStudy::EmptyPath, key("path")));
     }
     if kind == StudyKind::Wall && entry.other_mass.is_some() {
-        return Err(InvalidStudy::OtherMassOfWall { run: run() });
+        return Err((InvalidStudy::OtherMassOfWall { run: run() }, key("other_mass").itself()));
     }
     check_name("run.name", &entry.case_name(), false)
-        .map_err(|_| InvalidStudy::NoCaseName { run: run() })
+        .map_err(|_| (InvalidStudy::NoCaseName { run: run() }, name_key(entry, of_run)))
 }
 
 /// Names that the models use themselves.
 const TAKEN: [&str; 4] = ["speed_m_per_s", "deflection_m", "mass_kg", "other_mass_kg"];
 
-fn check_parameters(entry: &RunEntry) -> Result<(), InvalidStudy> {
+fn check_parameters(entry: &RunEntry, of_run: &KeyPath) -> Result<(), Wrong> {
     for (name, value) in &entry.parameters {
         let (run, key) = (entry.path.clone(), name.clone());
+        let at = of_run.clone().key("parameters").key(name);
         if name.trim().is_empty() || name.contains(|c: char| c.is_control() || c == '=') {
-            return Err(InvalidStudy::ParameterName { run, name: key });
+            return Err((InvalidStudy::ParameterName { run, name: key }, at.itself()));
         }
         if TAKEN.contains(&name.as_str()) {
-            return Err(InvalidStudy::ParameterTaken { run, name: key });
+            return Err((InvalidStudy::ParameterTaken { run, name: key }, at.itself()));
         }
         if matches!(value, Parameter::Number(v) if !v.is_finite()) {
-            return Err(InvalidStudy::ParameterNotFinite { run, name: key });
+            return Err((InvalidStudy::ParameterNotFinite { run, name: key }, at));
         }
     }
     Ok(())

@@ -5,23 +5,34 @@ use std::path::PathBuf;
 
 use super::check::InvalidStudy;
 use crate::curve::extract::ExtractError;
-use crate::manifest::ManifestError;
+use crate::guess;
+use crate::manifest::{ManifestError, Place};
 use crate::solver::ReadError;
 
 /// Why a study cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The file cannot be read, or is no manifest.
-    #[error(transparent)]
+    #[error("{0}")]
     Manifest(#[from] ManifestError),
     /// It contradicts itself.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Invalid {
-        /// The manifest.
-        path: PathBuf,
+        /// Where in the manifest.
+        place: Place,
         /// What does not fit.
-        source: InvalidStudy,
+        source: Box<InvalidStudy>,
     },
+}
+
+impl StudyError {
+    /// Where in the manifest it is wrong.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Manifest(error) => error.place(),
+            Self::Invalid { place, .. } => Some(place),
+        }
+    }
 }
 
 /// Why one run gives no case.
@@ -34,7 +45,10 @@ pub enum RunError {
         path: PathBuf,
     },
     /// A file that the recipe names is not there.
-    #[error("the run's folder {folder} has no file \"{file}\": it has {found}")]
+    #[error(
+        "the run's folder {folder} has no file \"{file}\": it has {found}{}",
+        guess::hint(file, found)
+    )]
     NoFile {
         /// The run's folder.
         folder: PathBuf,

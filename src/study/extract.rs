@@ -1,13 +1,13 @@
 //! Extraction of a run's case: units, histories, curve, and what is to be said of them.
 
-use super::RunError;
 use super::files::shown_name;
 use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
 use super::twin::compare_twin;
+use super::{RunError, absolute};
 use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
 use crate::curve::recipe::ForceSource;
-use crate::curve::{Case, SourceFile};
+use crate::curve::{Case, Origin, SourceFile};
 use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
@@ -146,6 +146,14 @@ impl LocatedRun<'_> {
             sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
             notes: remarks.notes,
             warnings: remarks.warnings,
+            built_utc: None,
+            origin: Some(Origin {
+                manifest: self.study.path(),
+                group: head.group.clone(),
+                run: self.entry.case_name(),
+            }),
+            tags: Vec::new(),
+            user_notes: Vec::new(),
         }
     }
 
@@ -177,6 +185,7 @@ impl LocatedRun<'_> {
                 .unwrap_or(&located.path)
                 .display()
                 .to_string(),
+            absolute_path: Some(absolute(&located.path)),
             size_bytes: located.size_bytes,
             blake3: located.blake3.clone(),
             format: "keyword".into(),
@@ -197,6 +206,7 @@ impl LocatedRun<'_> {
                     .file_name()
                     .map_or(String::new(), |n| n.to_string_lossy().into_owned())
             ),
+            absolute_path: Some(absolute(&located.path)),
             size_bytes: located.size_bytes,
             blake3: located.blake3.clone(),
             format: file.format.into(),

@@ -62,6 +62,8 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError
         }
     }
     let (path, section, twin) = match (text.is_file(), binout) {
+        // A solver that was asked for the binary file alone may leave the header of the text.
+        (true, Some((path, section))) if is_without_states(&text) => (path, Some(section), None),
         (true, twin) => (text, None, twin),
         (false, Some((path, section))) => (path, Some(section), None),
         (false, None) => {
@@ -76,34 +78,45 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError
     Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
 }
 
+/// A text file with at most this many bytes may be a header without states.
+const LONGEST_HEADER_BYTES: u64 = 1 << 20;
+
+/// Whether a text file holds a header only.
+pub(crate) fn is_without_states(text: &Path) -> bool {
+    let is_short = text.metadata().is_ok_and(|meta| meta.len() <= LONGEST_HEADER_BYTES);
+    let names_only = Selection { audit: false, ..Selection::nothing() };
+    is_short
+        && solver::read_sections(text, None, &names_only)
+            .is_ok_and(|sections| sections.iter().all(|section| section.time.is_empty()))
+}
+
 /// A file with the size and hash of all its parts.
 pub(super) fn hashed_family(
     name: &str,
     path: PathBuf,
     parts: &[PathBuf],
 ) -> Result<Located, RunError> {
+    let (size_bytes, blake3) = content_hash(parts)?;
+    Ok(Located { file: name.into(), size_bytes, blake3, path, section: None, twin: None })
+}
+
+/// Size and BLAKE3 of files one behind the other.
+pub(crate) fn content_hash(parts: &[PathBuf]) -> Result<(u64, String), RunError> {
     let mut hasher = blake3::Hasher::new();
     for part in parts {
         let io = |source| RunError::Io { path: part.clone(), source };
         let file = file::open(part).map_err(io)?;
         hasher.update_reader(file).map_err(io)?;
     }
-    Ok(Located {
-        file: name.into(),
-        size_bytes: hasher.count(),
-        blake3: hasher.finalize().to_hex().to_string(),
-        path,
-        section: None,
-        twin: None,
-    })
+    Ok((hasher.count(), hasher.finalize().to_hex().to_string()))
 }
 
-pub(super) fn shown_name(path: &Path) -> String {
+pub(crate) fn shown_name(path: &Path) -> String {
     path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Whether a binout's section holds what the text file of that name holds.
-fn is_section_of(section: &str, name: &str) -> bool {
+pub(crate) fn is_section_of(section: &str, name: &str) -> bool {
     section == name || section.strip_prefix(name).is_some_and(|rest| rest == "/forces")
 }
 

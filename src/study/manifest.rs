@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::curve::Parameter;
 use crate::curve::recipe::Recipe;
@@ -48,13 +48,23 @@ pub struct Head {
 }
 
 /// What hits what.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyKind {
     /// A body against a rigid wall; speeds are wall speeds.
     Wall,
     /// Two bodies; speeds are closing speeds.
     Pair,
+}
+
+impl StudyKind {
+    /// As a manifest has it: `wall` or `pair`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wall => "wall",
+            Self::Pair => "pair",
+        }
+    }
 }
 
 /// One FE run.

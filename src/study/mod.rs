@@ -6,36 +6,40 @@
 mod check;
 mod error;
 mod extract;
-mod files;
+pub(crate) mod files;
 mod locate;
 mod manifest;
+mod place;
 mod read;
-mod twin;
+pub(crate) mod twin;
 
 use std::path::{Path, PathBuf};
 
 use crate::curve::Masses;
 use crate::curve::extract::{Stated, StatedContact};
-use crate::manifest as toml_file;
+use crate::manifest::{self as toml_file, Document};
 use crate::unit::SpeedKind;
 pub use check::InvalidStudy;
 pub use error::{RunError, StudyError};
+pub(crate) use locate::LocatedRun;
 pub use manifest::{Head, Manifest, NoSign, RunEntry, Sign, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]
 pub struct Study {
     manifest: Manifest,
+    path: PathBuf,
     folder: PathBuf,
+    /// The manifest's text, for the places of what is wrong with a run.
+    document: Document,
 }
 
 /// Loads and checks a study manifest.
 ///
 /// # Errors
-/// [`StudyError`] with line and columns for what TOML or a single value breaks, and without
-/// for what only the whole shows.
+/// [`StudyError`] with its place in the manifest.
 pub(crate) fn load(path: &Path) -> Result<Study, StudyError> {
-    checked(path, toml_file::load(path)?)
+    parse(path, &toml_file::read_text(path)?)
 }
 
 /// Parses and checks the text of a study manifest; `path` is for messages.
@@ -43,13 +47,14 @@ pub(crate) fn load(path: &Path) -> Result<Study, StudyError> {
 /// # Errors
 /// [`StudyError`] if the text is no manifest, or what it says makes no sense.
 pub fn parse(path: &Path, text: &str) -> Result<Study, StudyError> {
-    checked(path, toml_file::parse(path, text)?)
-}
-
-fn checked(path: &Path, manifest: Manifest) -> Result<Study, StudyError> {
-    check::check(&manifest).map_err(|source| StudyError::Invalid { path: path.into(), source })?;
+    let manifest = toml_file::parse(path, text)?;
+    let document = Document::new(path, text);
+    check::check(&manifest).map_err(|(source, key)| {
+        let place = document.place(&key);
+        StudyError::Invalid { place, source: source.into() }
+    })?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    Ok(Study { manifest, folder })
+    Ok(Study { manifest, path: path.into(), folder, document })
 }
 
 impl Study {
@@ -61,6 +66,11 @@ impl Study {
     /// Group of the curve database that its cases go to.
     pub(crate) fn group(&self) -> &str {
         &self.manifest.study.group
+    }
+
+    /// Its manifest from the root on, as given.
+    pub(crate) fn path(&self) -> String {
+        absolute(&self.path)
     }
 
     /// Its runs, in the order of the manifest.
@@ -99,4 +109,9 @@ impl Study {
         };
         Masses { body_kg, other_kg }
     }
+}
+
+/// A path from the root on, as given: links are not followed.
+fn absolute(path: &Path) -> String {
+    std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string()
 }

@@ -48,7 +48,8 @@ fn is_same(read: &SolverFile, twin: &SolverFile) -> bool {
     is_alike(&read.time, &twin.time) && read.histories.iter().all(has)
 }
 
-fn is_alike(a: &[f64], b: &[f64]) -> bool {
+/// Whether two columns are the same up to the digits of text files.
+pub(crate) fn is_alike(a: &[f64], b: &[f64]) -> bool {
     let finite = a.iter().filter(|v| v.is_finite());
     let largest = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
     // A number that is not there must not be there in the other either.

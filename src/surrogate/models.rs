@@ -1,5 +1,6 @@
 //! The models that can be trained: one line each in [`MODELS`].
 
+use crate::guess;
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -143,7 +144,10 @@ impl<'de> Deserialize<'de> for ModelKind {
         let Some(kind) = Self::named(&model, 0) else {
             let known: Vec<&str> = MODELS.iter().map(|entry| entry.name).collect();
             let known = known.join(", ");
-            return Err(D::Error::custom(format!("no model \"{model}\": expected one of {known}")));
+            return Err(D::Error::custom(format!(
+                "no model \"{model}\": expected one of {known}{}",
+                guess::hint(&model, &known)
+            )));
         };
         match (kind.forest.is_some(), forest) {
             (true, None) => {

@@ -2,6 +2,7 @@
 
 use crate::curve::EnvelopeError;
 use crate::dataset::DatasetError;
+use crate::guess;
 
 /// Bounds of an energy correction: beyond them level or crush is wrong, not the scale.
 pub(super) const CORRECTION: (f64, f64) = (0.8, 1.25);
@@ -48,7 +49,10 @@ pub enum PredictError {
     #[error(transparent)]
     Parameters(Box<DatasetError>),
     /// The query gives a parameter that the model does not have.
-    #[error("the model has no parameter \"{name}\": its parameters are {known}")]
+    #[error(
+        "the model has no parameter \"{name}\": its parameters are {known}{}",
+        guess::hint(name, known)
+    )]
     UnknownParameter {
         /// Its name.
         name: String,

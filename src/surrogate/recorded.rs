@@ -6,7 +6,7 @@ use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound};
 use super::{PredictError, Warning};
 use crate::curve::driving::NoDrivingCurve;
-use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 
 /// The name that stands where a predicted curve has its model's.
@@ -21,9 +21,16 @@ impl PredictedCurve {
     /// [`PredictError::Damaged`] if the case's states make no loading branch.
     pub fn of_case(case: &Case) -> Result<Self, PredictError> {
         let no_curve = |e: NoDrivingCurve| PredictError::Damaged(format!("{}: {e}", case.name));
-        let declared = DrivingCurve::of_case(case, case.force_kind).map_err(no_curve)?;
+        let of_case = |force: ForceKind| {
+            let mut curve = DrivingCurve::of_case(case, force)?;
+            if case.moves_by_its_force() {
+                curve.loading = corners(curve.loading)?;
+            }
+            Ok(curve)
+        };
+        let declared = of_case(case.force_kind).map_err(no_curve)?;
         let body = match case.force_kind {
-            ForceKind::Contact => DrivingCurve::of_case(case, ForceKind::Body).ok(),
+            ForceKind::Contact => of_case(ForceKind::Body).ok(),
             ForceKind::Body => None,
         };
         let deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
@@ -73,6 +80,35 @@ impl PredictedCurve {
     }
 }
 
+/// Points on a line between others, within this share of the largest force, are those of states and
+/// not of the table that a motion was made of.
+const ON_LINE: f64 = 1e-9;
+/// A curve that has fewer corners keeps all its points, since tools want some.
+const FEWEST: usize = 4;
+
+/// The same function through its corners alone.
+fn corners(curve: Envelope) -> Result<Envelope, EnvelopeError> {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    let margin_n = ON_LINE * curve.peak_force_n();
+    let (mut kept, mut from) = (vec![0], 0);
+    // Slopes of the lines from the last corner that pass all points behind it.
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for i in 1..d.len() {
+        let slope = |from: usize, margin_n: f64| (f[i] + margin_n - f[from]) / (d[i] - d[from]);
+        if !(low..=high).contains(&slope(from, 0.0)) {
+            from = i - 1;
+            kept.push(from);
+            (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        (low, high) = (low.max(slope(from, -margin_n)), high.min(slope(from, margin_n)));
+    }
+    kept.push(d.len() - 1);
+    if kept.len() < FEWEST {
+        return Ok(curve);
+    }
+    Envelope::new(kept.iter().map(|&i| d[i]).collect(), kept.iter().map(|&i| f[i]).collect())
+}
+
 /// Where a case comes from; the works are those of its declared force and of the body's, in J.
 fn provenance(case: &Case, work_j: f64, body_work_j: Option<f64>) -> Provenance {
     let kinetic_energy_j = case.masses.kinetic_energy_j(case.speed);
@@ -110,4 +146,29 @@ fn union(a: &Envelope, b: Option<&Envelope>) -> Vec<f64> {
     all.sort_by(f64::total_cmp);
     all.dedup_by(|next, kept| *next - *kept <= 1e-9 * end);
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// States between the points of a table are left out, whatever they are; the function stays.
+    #[test]
+    fn a_table_comes_out_by_its_corners() {
+        let table = [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2e6)];
+        let (d, f): (Vec<f64>, Vec<f64>) = table.into_iter().unzip();
+        let table = Envelope::new(d.clone(), f.clone()).unwrap();
+        let mut all: Vec<f64> = (0..=1000).map(|i| f64::from(i) / 1000.0).collect();
+        all.extend(&d);
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        let forces = all.iter().map(|&d| table.force_at(d)).collect();
+        let found = corners(Envelope::new(all.clone(), forces).unwrap()).unwrap();
+        assert_eq!((found.deflection_m(), found.force_n()), (&d[..], &f[..]));
+        // A curved one keeps its points, and so does a line.
+        let curved = Envelope::new(all.clone(), all.iter().map(|d| d * d * 1e6).collect()).unwrap();
+        assert_eq!(corners(curved.clone()).unwrap(), curved);
+        let line = Envelope::new(all.clone(), all.iter().map(|d| d * 1e6).collect()).unwrap();
+        assert_eq!(corners(line.clone()).unwrap(), line);
+    }
 }

@@ -1,5 +1,6 @@
 //! Warnings of a prediction: the same codes in text and JSON.
 
+use crate::plural::counted;
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -165,8 +166,8 @@ impl Warning {
         Self {
             code: WarningCode::TooFewCurves,
             message: format!(
-                "the model rests on {curves} training curve{}: with fewer than 3 no speed can be left out to see how good it is",
-                if curves == 1 { "" } else { "s" }
+                "the model rests on {}: with fewer than 3 no speed can be left out to see how good it is",
+                counted(curves, "training curve")
             ),
         }
     }

@@ -21,6 +21,7 @@
 
 mod journal;
 mod merge;
+mod place;
 mod row;
 mod run;
 mod shard_file;
@@ -36,7 +37,7 @@ use serde::Serialize;
 
 use crate::file::{self, LockError, WriteError};
 use crate::hdf5::TableError;
-use crate::manifest::{self, ManifestError};
+use crate::manifest::{self, Document, KeyPath, ManifestError, Place};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
@@ -83,26 +84,38 @@ impl Shard {
     }
 }
 
+impl SweepError {
+    /// Where in the scenario or plan it is wrong.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Manifest(error) => error.place(),
+            Self::Scenario(error) => error.place(),
+            Self::NoPlan { place } | Self::Plan { place, .. } => Some(place),
+            _ => None,
+        }
+    }
+}
+
 /// Why a sweep was not run, not written or not merged.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// A TOML file is wrong.
-    #[error(transparent)]
+    #[error("{0}")]
     Manifest(#[from] ManifestError),
     /// The scenario is wrong, or a file it names.
-    #[error(transparent)]
+    #[error("{0}")]
     Scenario(#[from] ScenarioError),
     /// Neither scenario nor plan say what is varied.
-    #[error("{path}: there is no [sweep]: add one, or give it in another file with --plan")]
+    #[error("{place}: there is no [sweep]: add one, or give it in another file with --plan")]
     NoPlan {
-        /// The scenario, or the file of `--plan`.
-        path: PathBuf,
+        /// The beginning of the scenario.
+        place: Place,
     },
     /// The plan does not go with the scenario.
-    #[error("{path}: {source}")]
+    #[error("{place}: {source}")]
     Plan {
-        /// The file with the plan.
-        path: PathBuf,
+        /// Where in the file with the plan.
+        place: Place,
         /// Why.
         source: Box<BindError>,
     },
@@ -272,15 +285,22 @@ impl Sweep {
         let text = manifest::read_text(path)?;
         let scenario = scenario::parse(path, &text)?;
         let plan_path = plan.unwrap_or(path);
+        let plan_text = match plan {
+            Some(file) => &manifest::read_text(file)?,
+            None => &text,
+        };
         let of_file = match plan {
-            Some(file) => Some(manifest::load::<PlanFile>(file)?.sweep),
+            Some(file) => Some(manifest::parse::<PlanFile>(file, plan_text)?.sweep),
             None => None,
         };
-        let invalid =
-            |source: BindError| SweepError::Plan { path: plan_path.into(), source: source.into() };
+        let document = Document::new(plan_path, plan_text);
         let plan = of_file
             .or_else(|| scenario.sweep.clone())
-            .ok_or_else(|| SweepError::NoPlan { path: plan_path.into() })?;
+            .ok_or_else(|| SweepError::NoPlan { place: document.place(&KeyPath::default()) })?;
+        let invalid = |source: BindError| SweepError::Plan {
+            place: document.place(&place::key(&plan, &source)),
+            source: source.into(),
+        };
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
         let results = results(&plan).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;

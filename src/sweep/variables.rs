@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::guess;
 use crate::plan::{Design, Plan, PlanError, Spread, Vary, VaryError, Vehicles, What};
 use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
@@ -55,7 +56,7 @@ pub enum BindError {
         source: VariableError,
     },
     /// The variables do not go together.
-    #[error(transparent)]
+    #[error("{0}")]
     Plan(#[from] PlanError),
     /// A result is named twice, or none is.
     #[error("sweep.results: name each result once, and at least one")]
@@ -87,7 +88,7 @@ pub enum VariableError {
     #[error("give curve = \"…\" or interface = \"contact\"")]
     NoGapNamed,
     /// A name that the scenario does not have.
-    #[error("there is no {what} \"{name}\": the scenario has {known}")]
+    #[error("there is no {what} \"{name}\": the scenario has {known}{}", guess::hint(name, known))]
     Unknown {
         /// `train`, `vehicle` or `curve`.
         what: &'static str,
@@ -95,6 +96,8 @@ pub enum VariableError {
         name: String,
         /// The names there are.
         known: String,
+        /// Whether it stands in a list of names.
+        listed: bool,
     },
     /// A key of another kind of variable.
     #[error("{key} does not go with what = \"{}\"", .what.name())]
@@ -211,7 +214,7 @@ impl Binder<'_> {
                 let name = vary.train.as_deref().ok_or(VariableError::NoTrain)?;
                 let known = trains.iter().map(|t| t.name.as_str());
                 let at = known.clone().position(|t| t == name);
-                let at = at.ok_or_else(|| unknown("train", name, known))?;
+                let at = at.ok_or_else(|| unknown("train", name, known, false))?;
                 self.one("speed_m_per_s", "speed_factor", name, Target::Speed(at))
             }
             What::Mass => self.masses(),
@@ -233,7 +236,7 @@ impl Binder<'_> {
                 let curve = self.curve()?;
                 for value in vary.values.iter().flatten() {
                     check_name(&value.0)?;
-                    self.known_curve(&value.0)?;
+                    self.known_curve(&value.0, true)?;
                 }
                 self.one("curve", "curve", curve, Target::Curve(curve.into()))
             }
@@ -300,7 +303,9 @@ impl Binder<'_> {
         };
         let find = |name: &str| {
             let found = vehicles().find(|(_, n)| *n == name).map(|(place, _)| place);
-            found.ok_or_else(|| unknown("vehicle", name, vehicles().map(|(_, n)| n)))
+            found.ok_or_else(|| {
+                unknown("vehicle", name, vehicles().map(|(_, n)| n), self.vary.vehicles.is_some())
+            })
         };
         let named: Vec<(&str, (usize, usize))> = match (&self.vary.vehicle, &self.vary.vehicles) {
             (Some(name), None) => vec![(name, find(name)?)],
@@ -358,16 +363,19 @@ impl Binder<'_> {
         Ok(curve)
     }
 
-    fn known_curve(&self, curve: &str) -> Result<(), VariableError> {
+    fn known_curve(&self, curve: &str, listed: bool) -> Result<(), VariableError> {
         match self.scenario.curves.contains_key(curve) {
             true => Ok(()),
-            false => Err(unknown("curve", curve, self.scenario.curves.keys().map(String::as_str))),
+            false => {
+                let known = self.scenario.curves.keys().map(String::as_str);
+                Err(unknown("curve", curve, known, listed))
+            }
         }
     }
 
     /// A curve that is there, and that some item uses.
     fn check_curve(&self, curve: &str) -> Result<(), VariableError> {
-        self.known_curve(curve)?;
+        self.known_curve(curve, false)?;
         let replaces = |v: &Vary| {
             v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
         };
@@ -385,9 +393,10 @@ fn unknown<'a>(
     what: &'static str,
     name: &str,
     known: impl Iterator<Item = &'a str>,
+    listed: bool,
 ) -> VariableError {
     let known: Vec<&str> = known.collect();
-    VariableError::Unknown { what, name: name.into(), known: known.join(", ") }
+    VariableError::Unknown { what, name: name.into(), known: known.join(", "), listed }
 }
 
 /// Names stand in the columns of the result.

@@ -4,6 +4,8 @@
 //! A test that needs more than a Rust toolchain bears `#[ignore = "needs …"]`. What it asks for here
 //! panics where it is absent, so that no such test can pass without having tested anything.
 
+pub mod crash;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -50,10 +52,14 @@ pub fn is_thorough() -> bool {
     std::env::var_os("CRUMPLE_THOROUGH").is_some()
 }
 
+/// The date of everything that is built here, so that what is built twice is the same.
+const DATE: &str = "1767225600";
+
 /// Runs the program in `folder`.
 pub fn crumple_in(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_crumple"))
         .args(arguments)
+        .env("SOURCE_DATE_EPOCH", DATE)
         .current_dir(folder)
         .output()
         .unwrap()
@@ -67,13 +73,21 @@ pub fn crumple_ok(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs the program in `folder`, which must exit with `code`; returns its standard error.
+/// Runs the program in `folder`, which must exit with `code`; returns what it said of it.
 pub fn crumple_fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
     let output = crumple_in(folder, arguments);
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    let error = said(&output);
     assert_eq!(output.status.code(), Some(code), "crumple {arguments:?} said:\n{error}");
     assert!(!error.contains("panicked"), "{error}");
     error
+}
+
+/// What a failing command said: on standard error, and with --json as a document on standard output.
+pub fn said(output: &Output) -> String {
+    let document: Option<Value> = serde_json::from_slice(&output.stdout).ok();
+    let message =
+        document.as_ref().and_then(|d| d["error"]["message"].as_str()).unwrap_or_default();
+    format!("{}{message}", String::from_utf8_lossy(&output.stderr))
 }
 
 /// The Python with the client packages, which `tests/run` installs.
@@ -122,6 +136,32 @@ pub fn build_fixture(folder: &Path, group: &str) -> PathBuf {
     });
     std::fs::write(&database, bytes).unwrap();
     database
+}
+
+/// A copy of a bundled study that may be changed.
+pub fn study_in(folder: &Path, group: &str) -> PathBuf {
+    let source = fixture(&format!("fe/{group}/study.toml"));
+    let parent = source.parent().unwrap().display().to_string();
+    let text = std::fs::read_to_string(&source).unwrap();
+    // The name of the case stays that of the folder.
+    let mut own = String::new();
+    for line in text.lines() {
+        match line.strip_prefix("path  = \"").and_then(|rest| rest.strip_suffix('"')) {
+            Some(run) => own += &format!("path  = \"{parent}/{run}\"\nname  = \"{run}\"\n"),
+            None => own += &format!("{line}\n"),
+        }
+    }
+    let path = folder.join(format!("{group}.toml"));
+    std::fs::write(&path, own).unwrap();
+    path
+}
+
+/// Changes a database by `edit`, as any HDF5 program may.
+pub fn edited(path: &Path, edit: impl FnOnce(&hdf5_pure::File)) {
+    let file = hdf5_pure::File::open_rw(path).unwrap();
+    edit(&file);
+    file.commit().unwrap();
+    file.close().unwrap();
 }
 
 /// What `crumple demo` printed and wrote, kept in memory, so that every test has its own copy.

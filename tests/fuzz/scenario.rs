@@ -8,6 +8,6 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
     if let Err(error) = scenario::parse(Path::new("scenario.toml"), text) {
-        assert!(error.to_string().starts_with("scenario.toml: "));
+        assert!(error.to_string().starts_with("scenario.toml:"));
     }
 });

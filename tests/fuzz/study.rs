@@ -8,6 +8,6 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
     if let Err(error) = study::parse(Path::new("study.toml"), text) {
-        assert!(error.to_string().starts_with("study.toml: "));
+        assert!(error.to_string().starts_with("study.toml:"));
     }
 });

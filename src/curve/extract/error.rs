@@ -8,7 +8,7 @@ use crate::signal::cfc;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExtractError {
     /// A history has fewer than two states.
-    #[error("{what} holds {states} states: at least 2 are needed")]
+    #[error("{what} holds {}: at least 2 are needed", crate::plural::counted(*states, "state"))]
     TooShort {
         /// Which file it comes from.
         origin: Origin,

@@ -18,6 +18,7 @@ mod start;
 
 use super::recipe::Filter;
 use super::{Curve, EnergyAudit, energy, loading};
+use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::Speed;
 pub use error::{ExtractError, Origin};
@@ -149,8 +150,8 @@ fn audited(curve: &Curve, balance: energy::Balance) -> Remarks {
         && branch.dropped > 0
     {
         remarks.note(format!(
-            "loading branch: {} samples removed because the deflection did not advance",
-            branch.dropped
+            "loading branch: {} removed because the deflection did not advance",
+            counted(branch.dropped, "sample")
         ));
     }
     remarks

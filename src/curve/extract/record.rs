@@ -6,6 +6,7 @@ use super::remarks::Remarks;
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
 use crate::history::History;
+use crate::plural::counted;
 use crate::signal::derivative;
 use crate::signal::resample::interpolate;
 use crate::unit::UnitSystem;
@@ -104,7 +105,8 @@ impl Record {
         self.deflection_m.truncate(kept);
         self.rate_m_per_s.truncate(kept);
         self.force_n.truncate(kept);
-        Ok(format!("truncate: {removed} states after {} removed", milliseconds(until_s)))
+        let removed = counted(removed, "state");
+        Ok(format!("truncate: {removed} after {} removed", milliseconds(until_s)))
     }
 
     /// That a time lies outside the record.
@@ -168,8 +170,8 @@ impl Signal {
         }
         let skipped = history.time.len() - time_s.len();
         if skipped > 0 {
-            remarks
-                .note(format!("{what}: {skipped} states left out because time did not increase"));
+            let skipped = counted(skipped, "state");
+            remarks.note(format!("{what}: {skipped} left out because time did not increase"));
         }
         if time_s.len() < 2 {
             return Err(ExtractError::TooShort { origin, what, states: time_s.len() });

@@ -86,6 +86,7 @@ pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Expo
             Material::S06 => general(&mut lines, curve, units, ids),
         }
         notes.extend(note(curve, options.material));
+        notes.extend(resampling_note(curve));
         if options.deck {
             deck::write(&mut lines, curve, units, options.material, ids.material);
         }
@@ -106,6 +107,18 @@ fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
         Material::Mat121 => vec![curve.restitution_note("LS-DYNA's MAT_121", own)],
         Material::S06 => vec![curve.restitution_note("LS-DYNA's S06", own)],
     }
+}
+
+/// What is lost of an uneven curve, which LS-DYNA resamples evenly.
+fn resampling_note(curve: &ExportCurve) -> Option<String> {
+    let points = points(curve);
+    (resampling(&points) == MOST_RESAMPLED).then(|| {
+        format!(
+            "{}: its points are uneven, so LCINT is {MOST_RESAMPLED}, the most that is asked for: LS-DYNA resamples it evenly every {:.3} mm, and what lies closer together is evened out",
+            curve.headline(),
+            curve.loading.end_m() / (MOST_RESAMPLED - 1) as f64 * 1e3
+        )
+    })
 }
 
 fn describe(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {

@@ -1,6 +1,8 @@
 //! Columns as a file holds them, and the curve made of them: one sign, one direction, without
 //! the points that other tools need.
 
+use std::cmp::Ordering;
+
 use super::MIN_POINTS;
 use super::curve::{Facts, ReadCurve, ReadFile};
 use super::error::{ContentError, Place};
@@ -24,6 +26,12 @@ pub(super) fn check_curves(curves: usize) -> Result<(), ContentError> {
 const NOTHING: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.
 const SAME_DISTANCE: f64 = 1e-6;
+
+/// Points of one deflection are set apart by this share of the largest: next to nothing in energy, and less steep than
+/// would ask runs for tiny steps.
+const HAIR: f64 = 1e-4;
+/// Jumps of the force that a note names.
+const STEPS: usize = 3;
 
 /// Columns in SI, in the order and with the signs of the file.
 #[derive(Clone, Debug)]
@@ -170,6 +178,7 @@ impl Points {
         self.remove_guards(notes);
         self.remove_repeated(notes);
         self.remove_tail(crush_m, notes);
+        self.set_steps_apart(notes);
         let points = self.list.len();
         if points < MIN_POINTS {
             let of = " without those of guard and repetition";
@@ -294,6 +303,41 @@ impl Points {
         }
     }
 
+    /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still goes on.
+    /// Up to the largest deflection the later ones go forward; where the force has its peak at the largest
+    /// deflection, those behind the peak are unloading and go back, as all behind it do.
+    fn set_steps_apart(&mut self, notes: &mut Vec<String>) {
+        let largest_m = self.list.iter().map(|p| p.d).fold(0.0, f64::max);
+        let end = self.list.iter().position(|p| p.d == largest_m).unwrap_or(0);
+        let mut steps = Vec::new();
+        let (mut apart, mut first) = (Vec::with_capacity(self.list.len()), 0);
+        while first < self.list.len() {
+            let d = self.list[first].d;
+            let count = self.list[first..].iter().take_while(|p| p.d == d).count();
+            let next = self.list.get(first + count);
+            let mut step = outline(&self.list[first..first + count]);
+            if step.len() > 1 {
+                steps.push((d, step[0].clone(), step[step.len() - 1].f));
+                // Behind the last point there is room, but none below zero.
+                let behind = if first > end { d } else { largest_m };
+                let room = next.map_or(behind, |next| (next.d - d).abs());
+                let hair = (HAIR * largest_m).min(0.5 * room) / (step.len() - 1) as f64;
+                let peak = match first.cmp(&end) {
+                    Ordering::Less => step.len() - 1,
+                    Ordering::Equal => peak(&step),
+                    Ordering::Greater => 0,
+                };
+                for (k, point) in step.iter_mut().enumerate() {
+                    point.d += hair * (peak.min(k) as f64 - k.saturating_sub(peak) as f64);
+                }
+            }
+            apart.append(&mut step);
+            first += count;
+        }
+        self.list = apart;
+        notes.extend(steps_note(&steps));
+    }
+
     /// Up to the largest deflection it must increase, behind it decrease.
     fn check_order(&self) -> Result<(), ContentError> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
@@ -314,6 +358,41 @@ impl Points {
         }
         Ok(())
     }
+}
+
+/// Of points at one deflection, the first, the last and the extremes between.
+fn outline(points: &[Point]) -> Vec<Point> {
+    let last = points.len() - 1;
+    let by_force = |a: &usize, b: &usize| points[*a].f.total_cmp(&points[*b].f);
+    let low = (0..=last).min_by(by_force).unwrap_or(0);
+    let high = (0..=last).max_by(by_force).unwrap_or(0);
+    let mut kept = vec![0, low.min(high), low.max(high), last];
+    kept.dedup();
+    kept.into_iter().map(|k| points[k].clone()).collect()
+}
+
+/// Where the force of points at one deflection is largest.
+fn peak(points: &[Point]) -> usize {
+    (1..points.len()).fold(0, |best, k| if points[k].f > points[best].f { k } else { best })
+}
+
+/// What was done where the deflection stands still: the first steps, and how many more.
+fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
+    let shown = steps.iter().take(STEPS).map(|(d, first, to_n)| {
+        let shown_m = (d * 1e6).round() / 1e6;
+        format!("from {} to {to_n} N at {shown_m} m ({})", first.f, first.place)
+    });
+    let shown: Vec<String> = shown.collect();
+    let more = match steps.len().saturating_sub(STEPS) {
+        0 => String::new(),
+        more => format!(" and at {more} more"),
+    };
+    (!steps.is_empty()).then(|| {
+        format!(
+            "points: the force jumps {}{more}: the points there are set apart by {HAIR} of the largest deflection, at most half the way to the next",
+            shown.join(", ")
+        )
+    })
 }
 
 #[cfg(test)]
@@ -367,6 +446,56 @@ mod tests {
         }
     }
 
+    /// Jumps of the force at one deflection stay, next to each other; the energy hardly changes.
+    #[test]
+    fn points_of_one_deflection_are_set_apart() {
+        fn t(points: &[(f64, f64)], expected: &[(f64, f64)], note: &str) {
+            let mut columns = Columns::at(Places::Lines((1..=points.len() as u64).collect()));
+            (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
+            let curve = columns.curve().unwrap();
+            let found = curve.deflection_m.iter().zip(&curve.force_n);
+            for ((d, f), (de, fe)) in found.zip(expected) {
+                assert!((d - de).abs() < 1e-12 && f == fe, "{points:?}: {curve:?}");
+            }
+            assert_eq!(curve.force_n.len(), expected.len(), "{curve:?}");
+            assert!(curve.notes.iter().any(|n| n.contains(note)), "{note}: {:?}", curve.notes);
+        }
+        let h = 4e-4;
+        let drop = [(0.0, 0.0), (1.0, 5.0), (1.0, 2.0), (2.0, 3.0), (4.0, 3.0)];
+        let apart = [(0.0, 0.0), (1.0, 5.0), (1.0 + h, 2.0), (2.0, 3.0), (4.0, 3.0)];
+        t(
+            &drop,
+            &apart,
+            "the force jumps from 5 to 2 N at 1 m (line 2): the points there are set apart by 0.0001 of the largest deflection",
+        );
+        // Of many points, the ends and the extremes; at contact, too.
+        let many = [(0.0, 0.0), (0.0, 2.0), (1.0, 5.0), (1.0, 6.0), (1.0, 4.0), (1.0, 1.0)];
+        let many = [&many[..], &[(1.0, 2.0), (4.0, 3.0)]].concat();
+        let kept = [(0.0, 0.0), (h, 2.0), (1.0, 5.0), (1.0 + h / 3.0, 6.0)];
+        let kept = [&kept[..], &[(1.0 + h / 1.5, 1.0), (1.0 + h, 2.0), (4.0, 3.0)]].concat();
+        t(&many, &kept, "from 0 to 2 N at 0 m (line 1), from 5 to 2 N at 1 m (line 3)");
+        // At most half the way to the next point.
+        let close = [(0.0, 0.0), (1.0, 5.0), (1.0, 2.0), (1.0001, 3.0), (4.0, 3.0)];
+        let halved = [(0.0, 0.0), (1.0, 5.0), (1.00005, 2.0), (1.0001, 3.0), (4.0, 3.0)];
+        t(&close, &halved, "at most half the way to the next");
+        // At the end a rise is loading and a fall is unloading.
+        let rise = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (4.0, 9.0)];
+        t(&rise, &[&rise[..4], &[(4.0 + h, 9.0)]].concat(), "from 3 to 9 N at 4 m (line 4)");
+        let fall = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (4.0, 0.0), (3.0, 0.0)];
+        t(&fall, &[&fall[..4], &[(4.0 - h, 0.0), (3.0, 0.0)]].concat(), "from 3 to 0 N at 4 m");
+        let both = [&rise[..], &[(4.0, 0.0), (3.0, 0.0)]].concat();
+        let set = [(4.0, 3.0), (4.0 + h / 2.0, 9.0), (4.0, 0.0), (3.0, 0.0)];
+        t(&both, &[&rise[..3], &set].concat(), "from 3 to 0 N at 4 m");
+        let behind = [&plain_unloading()[..], &[(2.0, 1.0), (2.0, 0.0), (1.0, 0.0)]].concat();
+        let set = [(2.0, 1.0), (2.0 - h, 0.0), (1.0, 0.0)];
+        t(&behind, &[&plain_unloading()[..], &set].concat(), "from 1 to 0 N at 2 m");
+    }
+
+    /// A loading branch and the first point behind it.
+    fn plain_unloading() -> [(f64, f64); 5] {
+        [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (3.0, 2.0)]
+    }
+
     #[test]
     fn what_is_no_curve_is_refused_with_its_line() {
         fn t(points: &[(f64, f64)], expected: &str) {
@@ -379,8 +508,6 @@ mod tests {
         t(&[(0.0, f64::NAN), (1.0, 5.0), (2.0, 3.0), (3.0, 3.0)], "line 1: the force is NaN");
         t(&plain.map(|(d, _)| (d, 0.0)), "the force is 0 in every point");
         t(&plain.map(|(_, f)| (0.0, f)), "the deflection is 0 in every point");
-        let step = [&plain[..], &[(3.0, 9.0)]].concat();
-        t(&step, "line 5: the deflection must decrease behind the largest, found 3 m after 3 m");
         let wave = [&plain[..], &[(2.5, 1.0), (2.8, 0.0)]].concat();
         t(
             &wave,

@@ -1,5 +1,6 @@
 //! Why a file gives no curve.
 
+use crate::guess;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
@@ -19,7 +20,10 @@ pub enum ReadCurveError {
         source: io::Error,
     },
     /// There is no reader of that name.
-    #[error("there is no format \"{name}\" of curves that can be read: use one of {known}")]
+    #[error(
+        "there is no format \"{name}\" of curves that can be read: use one of {known}{}",
+        guess::hint(name, known)
+    )]
     NoSuchFormat {
         /// What was asked for.
         name: String,
@@ -35,6 +39,18 @@ pub enum ReadCurveError {
         path: PathBuf,
         /// The names there are.
         known: String,
+    },
+    /// Columns are asked for, and its format has none.
+    #[error(
+        "{path}: this is read as {format}, which has no columns to choose: remove {option}, or read it as a table with --from csv"
+    )]
+    NoColumns {
+        /// The file.
+        path: PathBuf,
+        /// As which it is read.
+        format: &'static str,
+        /// What was asked for.
+        option: &'static str,
     },
     /// It is no predicted curve.
     #[error(transparent)]
@@ -96,7 +112,7 @@ pub enum ContentError {
     Csv(#[from] csv::Error),
     /// A column is not there, or has no unit (read for a scenario).
     #[error(
-        "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\""
+        "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"{remedy}"
     )]
     Header {
         /// Of the header.
@@ -107,10 +123,40 @@ pub enum ContentError {
         example: &'static str,
         /// What stands there.
         found: String,
+        /// How to say which column it is, where that can be said.
+        remedy: String,
+    },
+    /// Several columns could be it.
+    #[error(
+        "{place}: several columns could be the {what}: {found}; choose one with {option}, by its name or number"
+    )]
+    WhichColumn {
+        /// Of the header.
+        place: Place,
+        /// Deflection, force or time.
+        what: &'static str,
+        /// The columns.
+        found: String,
+        /// The option that chooses.
+        option: &'static str,
+    },
+    /// The column that was asked for is not there.
+    #[error(
+        "{place}: {option} \"{asked}\" is no column: expected a number from 1, or one of {known}"
+    )]
+    NoSuchColumn {
+        /// Of the header.
+        place: Place,
+        /// The option.
+        option: &'static str,
+        /// What was asked for.
+        asked: String,
+        /// The columns there are.
+        known: String,
     },
     /// The values have no unit.
     #[error(
-        "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units, such as mm-t-s or SI"
+        "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI"
     )]
     NoUnit {
         /// Of the header, or of the first values.
@@ -124,14 +170,17 @@ pub enum ContentError {
     },
     /// A file of a format without units.
     #[error(
-        "the file does not say its units: give them with --units, such as mm-t-s or SI{remedy}"
+        "the file does not say its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
     )]
     NoUnits {
         /// How the file can say them.
         remedy: &'static str,
     },
     /// A unit that is not known.
-    #[error("{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}")]
+    #[error(
+        "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}",
+        guess::hint(unit, known)
+    )]
     UnknownUnit {
         /// Of the unit.
         place: Place,
@@ -201,15 +250,35 @@ pub enum ContentError {
         known: String,
     },
     /// It does not hold the one that was asked for.
-    #[error("the file has no curve \"{asked}\": it has {known}")]
+    #[error("the file has no curve \"{asked}\": it has {known}{}", guess::hint(asked, known))]
     NoSuchCurve {
         /// What was asked for.
         asked: String,
         /// The names there are.
         known: String,
     },
+    /// A folder of several ISO-MME tests.
+    #[error(
+        "the folder holds {tests} ISO-MME tests: give those that are meant, each by itself: {known}"
+    )]
+    SeveralTests {
+        /// How many there are.
+        tests: usize,
+        /// Their paths.
+        known: String,
+    },
+    /// The channel of an ISO-MME channel's times is not there.
+    #[error(
+        "{place}: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\" with the code of a channel of time (…TI…) beside it; there are {known}"
+    )]
+    NoTimes {
+        /// Of the reference channel.
+        place: Place,
+        /// The channels of time there are.
+        known: String,
+    },
     /// It has too few points.
-    #[error("the curve has {points} points{of}: expected at least {least}")]
+    #[error("the curve has {}{of}: expected at least {least}", crate::plural::counted(*points, "point"))]
     TooFew {
         /// How many there are.
         points: usize,

@@ -1,14 +1,16 @@
 //! Curve of an ISO-MME test (ISO/TS 13499): a channel of displacement and one of force over time.
 //!
 //! A channel file has lines `name :value`, then one value a line. Characters 13 and 14 of its
-//! channel code are the dimension: `DS` for displacement, `FO` for force. With the implicit
-//! reference channel, times are the time of the first sample and multiples of the interval, in s.
+//! channel code are the dimension: `DS` for displacement, `FO` for force, `TI` for time. With the implicit
+//! reference channel, or without any, times are the time of the first sample and multiples of the interval, in s;
+//! with an explicit one they are the values of the channel that `Reference channel name` says.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
 use super::curve::{Facts, ReadFile, title};
+use super::encoding::decoded;
 use super::error::{ContentError, Place, shown};
 use super::label::Quantity;
 use super::text::{lines, number};
@@ -19,9 +21,35 @@ use crate::signal::resample::interpolate;
 /// Files of a folder that are looked at: a test has some hundred channels.
 const MOST_FILES: usize = 1_000;
 
-/// Whether a folder holds a test.
-pub(super) fn is_test(folder: &Path) -> bool {
-    names(folder).is_ok_and(|names| names.iter().any(|path| has_extension(path, "mme")))
+/// The tests that a folder holds: its `.mme` files, else the folders in it that have one.
+pub(super) fn tests(folder: &Path) -> Vec<PathBuf> {
+    let of = |folder: &Path| -> Vec<PathBuf> {
+        let names = names(folder).unwrap_or_default().into_iter();
+        names.filter(|path| has_extension(path, "mme") && !path.is_dir()).collect()
+    };
+    let own = of(folder);
+    match own.is_empty() {
+        false => own,
+        true => {
+            let within = names(folder).unwrap_or_default().into_iter();
+            within.filter(|path| path.is_dir() && !of(path).is_empty()).collect()
+        }
+    }
+}
+
+/// Tests of a folder that a message lists.
+const LISTED: usize = 20;
+
+/// Refuses a folder of several tests: each has a speed of its own.
+pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), ContentError> {
+    match tests {
+        [only] if only.parent() == Some(folder) && !only.is_dir() => Ok(()),
+        tests => {
+            let known = tests.iter().take(LISTED).map(|test| test.display().to_string());
+            let (tests, known) = (tests.len(), known.collect::<Vec<_>>().join(" "));
+            Err(ContentError::SeveralTests { tests, known })
+        }
+    }
 }
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
@@ -46,7 +74,10 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
             found.push(channel);
         }
     }
+    let (times, found): (Vec<Channel>, Vec<Channel>) =
+        found.into_iter().partition(|channel| channel.quantity == Quantity::Time);
     let (deflection, force) = choose(found, input.options.curve.as_deref())?;
+    let (motion_s, at_s) = (deflection.times(&times)?, force.times(&times)?);
     for channel in [&deflection, &force] {
         let (code, what) = (&channel.code, channel.quantity.name());
         columns.notes.push(format!("{what}: channel {code} in {}", channel.unit));
@@ -56,16 +87,16 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     }
     columns.facts = merged(columns.facts, &[deflection.facts, force.facts]);
     columns.title = title(&force.name, &mut columns.notes);
-    let at_s = force.times();
-    if deflection.times() == at_s {
+    columns.notes.extend(force.note());
+    if motion_s == at_s {
         columns.deflection_m = deflection.values;
         columns.force_n = force.values;
         columns.time_s = Some(at_s);
         columns.places = Places::Lines(force.lines);
         return Ok(columns);
     }
-    let (from_s, motion_s) = (deflection.first_s, deflection.times());
-    let to_s = motion_s.last().copied().unwrap_or(from_s);
+    let (from_s, to_s) = (motion_s.first().copied(), motion_s.last().copied());
+    let (from_s, to_s) = (from_s.unwrap_or_default(), to_s.unwrap_or_default());
     let common: Vec<usize> =
         (0..at_s.len()).filter(|&i| (from_s..=to_s).contains(&at_s[i])).collect();
     let time_s: Vec<f64> = common.iter().map(|&i| at_s[i]).collect();
@@ -89,16 +120,17 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
 /// Takes what the test's `.mme` file says: of the folder, or the one that was given.
 fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), ContentError> {
     if !input.path.is_dir() {
-        described(input.bytes, &mut columns.facts);
-        return comments(input.bytes, &mut columns.facts);
+        described(input.text, &mut columns.facts);
+        return comments(input.text, &mut columns.facts);
     }
     let Some(path) = names(input.path)?.into_iter().find(|p| has_extension(p, "mme")) else {
         return Ok(());
     };
     let bytes = file::read(&path, MAX_CURVE_BYTES)?;
     columns.files.push(ReadFile::of(&path, &bytes));
-    described(&bytes, &mut columns.facts);
-    comments(&bytes, &mut columns.facts)
+    let text = decoded(&bytes).bytes;
+    described(&text, &mut columns.facts);
+    comments(&text, &mut columns.facts)
 }
 
 /// Takes masses (kg) and velocities (m/s) of the test objects.
@@ -176,60 +208,105 @@ fn channel_files(path: &Path) -> Result<Vec<PathBuf>, ContentError> {
     };
     let within = names(folder)?.into_iter().find(is_named);
     let all = names(within.as_deref().unwrap_or(folder))?;
-    Ok(all.into_iter().filter(|p| is_channel(p)).collect())
+    let mut all: Vec<PathBuf> = all.into_iter().filter(|p| is_channel(p)).collect();
+    // Of several tests in one folder, those of the test that was named.
+    if !is_folder && all.iter().any(|p| p.file_stem() == path.file_stem()) {
+        all.retain(|p| p.file_stem() == path.file_stem());
+    }
+    Ok(all)
 }
 
-/// A channel of displacement or force, in SI.
+/// A channel of displacement, force or time, in SI.
 struct Channel {
     code: String,
     name: String,
     quantity: Quantity,
     unit: String,
-    first_s: f64,
-    interval_s: f64,
+    times: Times,
     values: Vec<f64>,
     lines: Vec<u64>,
     facts: Facts,
     file: ReadFile,
 }
 
+/// The times of a channel's values.
+enum Times {
+    /// Of the first value, and the interval between two.
+    Even { first_s: f64, interval_s: f64, is_stated: bool },
+    /// Those of the channel with this code or name; of the only one of time, if it is empty.
+    Of { channel: String, line: u64 },
+}
+
 impl Channel {
-    fn times(&self) -> Vec<f64> {
-        (0..self.values.len()).map(|i| self.first_s + i as f64 * self.interval_s).collect()
+    /// In s, one per value.
+    fn times(&self, channels: &[Self]) -> Result<Vec<f64>, ContentError> {
+        let (wanted, line) = match &self.times {
+            Times::Even { first_s, interval_s, .. } => {
+                return Ok((0..self.values.len())
+                    .map(|i| first_s + i as f64 * interval_s)
+                    .collect());
+            }
+            Times::Of { channel, line } => (channel, *line),
+        };
+        let is_wanted = |c: &&Self| c.code == *wanted || c.name == *wanted;
+        let found = match (wanted.is_empty(), channels) {
+            (true, [only]) => Some(only),
+            _ => channels.iter().find(is_wanted),
+        };
+        let file = self.file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let named = |source| ContentError::Beside { file, source: Box::new(source) };
+        let Some(found) = found else {
+            let known: Vec<&str> = channels.iter().map(|c| &*c.code).take(LISTED).collect();
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            return Err(named(ContentError::NoTimes { place: Place::Line(line), known }));
+        };
+        match found.values.len() == self.values.len() {
+            true => Ok(found.values.clone()),
+            false => Err(named(ContentError::Declared {
+                place: Place::Line(line),
+                what: format!("the reference channel {}", found.code),
+                declared: format!("{} times", found.values.len()),
+                found: format!("{} values", self.values.len()),
+                remedy: "name the channel of its own times",
+            })),
+        }
+    }
+
+    /// How its times were taken, where that is not the usual way.
+    fn note(&self) -> Option<String> {
+        match &self.times {
+            Times::Even { is_stated: true, .. } => None,
+            Times::Even { .. } => Some(
+                "times: those of first sample and interval; the file names no reference channel"
+                    .into(),
+            ),
+            Times::Of { channel, .. } => Some(format!("times: those of the channel {channel}")),
+        }
     }
 
     /// The channel of a file; `None` if it is of another dimension.
     fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ContentError> {
+        let file = ReadFile::of(path, bytes);
+        let bytes = &decoded(bytes).bytes;
         let header = Header::read(bytes);
         let code = header.text("channel code");
         let quantity = match code.get(12..14) {
             Some("DS") => Quantity::Deflection,
             Some("FO") => Quantity::Force,
+            Some("TI") => Quantity::Time,
             _ => return Ok(None),
         };
         let (line, unit) = header.entry("unit");
-        let size = quantity.dimension().size_of(unit).ok_or_else(|| ContentError::UnknownUnit {
+        let size = quantity.size_of(unit).ok_or_else(|| ContentError::UnknownUnit {
             place: Place::Line(line),
             what: quantity.name(),
             unit: shown(unit),
             known: quantity.dimension().known_units(),
         })?;
-        let (line, reference) = header.entry("reference channel");
-        if !reference.eq_ignore_ascii_case("implicit") {
-            return Err(ContentError::Expected {
-                place: Place::Line(line),
-                expected: "\"Reference channel :implicit\" (times by an interval)".into(),
-                found: shown(reference),
-            });
-        }
-        let first_s = header.number("time of first sample")?;
-        let interval_s = header.number("sampling interval")?;
-        if interval_s <= 0.0 {
-            let (line, found) = header.entry("sampling interval");
-            let expected = "an interval above 0 in s".into();
-            let place = Place::Line(line);
-            return Err(ContentError::Expected { place, expected, found: shown(found) });
-        }
+        let times = match quantity {
+            Quantity::Time => Times::Even { first_s: 0.0, interval_s: 0.0, is_stated: true },
+            Quantity::Deflection | Quantity::Force => header.times()?,
+        };
         let (values, lines) = header.values(bytes, size)?;
         let mut facts = Facts::default();
         comments(bytes, &mut facts)?;
@@ -238,12 +315,11 @@ impl Channel {
             name: header.text("name of the channel").into(),
             quantity,
             unit: unit.into(),
-            first_s,
-            interval_s,
+            times,
             values,
             lines,
             facts,
-            file: ReadFile::of(path, bytes),
+            file,
         }))
     }
 }
@@ -254,6 +330,8 @@ struct Header {
     entries: Vec<(u64, String, String)>,
 }
 
+/// What the standard has for an entry without a value.
+const NO_VALUE: &str = "NOVALUE";
 /// Lines of a header: a few dozen.
 const HEADER_LINES: usize = 1_000;
 
@@ -283,6 +361,29 @@ impl Header {
             expected: format!("\"{name} :\" with a number"),
             found: shown(text),
         })
+    }
+
+    /// Of which channel the times are, or how they follow from an interval.
+    fn times(&self) -> Result<Times, ContentError> {
+        let (line, reference) = self.entry("reference channel");
+        let is = |text: &str| reference.eq_ignore_ascii_case(text);
+        let is_stated = is("implicit");
+        if !(is_stated || is("") || is(NO_VALUE)) {
+            let name = self.text("reference channel name");
+            let name = if name.eq_ignore_ascii_case(NO_VALUE) { "" } else { name };
+            // Some write the channel itself in its place.
+            let channel = if is("explicit") { name } else { reference };
+            return Ok(Times::Of { channel: channel.into(), line });
+        }
+        let first_s = self.number("time of first sample")?;
+        let interval_s = self.number("sampling interval")?;
+        if interval_s <= 0.0 {
+            let (line, found) = self.entry("sampling interval");
+            let expected = "an interval above 0 in s".into();
+            let place = Place::Line(line);
+            return Err(ContentError::Expected { place, expected, found: shown(found) });
+        }
+        Ok(Times::Even { first_s, interval_s, is_stated })
     }
 
     /// The values, in SI, and their lines.

@@ -63,15 +63,14 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, CurveFileError> {
 
 /// Whether the first byte that is no blank opens an object.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    let text = input.bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(input.bytes);
-    text.trim_ascii_start().starts_with(b"{")
+    input.text.trim_ascii_start().starts_with(b"{")
 }
 
 /// The declared force, with the body's beside it where the file has both; or the force that was
 /// asked for, alone.
 pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, ReadCurveError> {
     let damaged = |source| CurveFileError::Curve { path: input.path.into(), source };
-    let mut curve = parse(input.path, input.bytes)?;
+    let mut curve = parse(input.path, input.text)?;
     let both = curve.body_force_n.is_some();
     let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
     if let Some(asked) = input.options.force {

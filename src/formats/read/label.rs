@@ -14,16 +14,21 @@ pub(super) enum Quantity {
 
 /// Names of each quantity, without blanks and marks, in lower case.
 const NAMES: [(Quantity, &[&str]); 3] = [
+    (Quantity::Deflection, &["d", "x", "s", "u", "xdisplacement"]),
+    (
+        Quantity::Force,
+        &["f", "fx", "fy", "fz", "contactforce", "bodyforce", "normalforce", "xforce"],
+    ),
+    (Quantity::Time, &["t"]),
+];
+
+/// Words of each quantity, in lower case: names by themselves, and within the name of a column.
+const WORDS: [(Quantity, &[&str]); 3] = [
     (
         Quantity::Deflection,
         &[
-            "d",
-            "x",
-            "s",
-            "u",
             "deflection",
             "displacement",
-            "xdisplacement",
             "disp",
             "crush",
             "stroke",
@@ -31,16 +36,46 @@ const NAMES: [(Quantity, &[&str]); 3] = [
             "deformation",
             "intrusion",
             "travel",
+            "extension",
+            "weg",
+            "verschiebung",
+            "verformung",
+            "stauchung",
         ],
     ),
-    (
-        Quantity::Force,
-        &["f", "force", "load", "contactforce", "bodyforce", "normalforce", "xforce"],
-    ),
-    (Quantity::Time, &["t", "time"]),
+    (Quantity::Force, &["force", "load", "kraft"]),
+    (Quantity::Time, &["time", "zeit"]),
+];
+
+/// Words that end others, such as Standardkraft and Traversenweg.
+const ENDINGS: [(Quantity, &str); 2] = [(Quantity::Deflection, "weg"), (Quantity::Force, "kraft")];
+
+/// With one of these words a name is that of another quantity: an edge, a bound, a rate.
+const OTHERS: [&str; 18] = [
+    "low",
+    "lo",
+    "lower",
+    "high",
+    "hi",
+    "upper",
+    "min",
+    "max",
+    "std",
+    "deviation",
+    "error",
+    "tolerance",
+    "rate",
+    "target",
+    "setpoint",
+    "command",
+    "nominal",
+    "soll",
 ];
 
 impl Quantity {
+    /// In the order in which an axis is asked for them.
+    pub const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
+
     /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
@@ -56,6 +91,15 @@ impl Quantity {
             Self::Deflection => "d_m or d_mm",
             Self::Force => "force_N or force_kN",
             Self::Time => "t_s or t_ms",
+        }
+    }
+
+    /// The option that names its column.
+    pub fn option(self) -> &'static str {
+        match self {
+            Self::Deflection => "--deflection-column",
+            Self::Force => "--force-column",
+            Self::Time => "--time-column",
         }
     }
 
@@ -79,7 +123,31 @@ impl Quantity {
     fn named(name: &str) -> Option<Self> {
         let plain: String =
             name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-        NAMES.iter().find(|(_, names)| names.contains(&&*plain)).map(|(quantity, _)| *quantity)
+        let mut all = NAMES.iter().chain(&WORDS);
+        all.find(|(_, names)| names.contains(&&*plain)).map(|(quantity, _)| *quantity)
+    }
+
+    /// The only quantity that words of a name are of.
+    fn within(name: &str) -> Option<Self> {
+        let name = name.to_lowercase();
+        let words = || name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
+        if words().any(|word| OTHERS.contains(&word)) {
+            return None;
+        }
+        let of_word = |word: &str| {
+            let whole = WORDS.iter().find(|(_, names)| names.contains(&word)).map(|(q, _)| *q);
+            let ending = || ENDINGS.iter().find(|(_, end)| word.ends_with(end)).map(|(q, _)| *q);
+            whole.or_else(ending)
+        };
+        let mut named = words().filter_map(of_word);
+        let first = named.next()?;
+        named.all(|other| other == first).then_some(first)
+    }
+
+    /// SI value of a unit of this quantity.
+    pub fn size_of(self, unit: &str) -> Option<f64> {
+        // Micro is a letter of its own in texts that are no ASCII.
+        self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
     }
 }
 
@@ -96,12 +164,27 @@ impl Label {
     pub fn of_axis(text: &str) -> Option<Self> {
         let by_unit = || {
             let (_, unit) = in_brackets(text.trim())?;
-            let quantities = NAMES.iter().map(|(quantity, _)| *quantity);
-            let quantity =
-                quantities.into_iter().find(|q| q.dimension().size_of(unit).is_some())?;
+            let quantity = Quantity::ALL.into_iter().find(|q| q.size_of(unit).is_some())?;
             Some(Self { quantity, unit: Some(unit.into()) })
         };
         Self::parse(text).or_else(by_unit)
+    }
+
+    /// What a column holds: by its name, or by a word within its name such as `Y Force [kN]`.
+    pub fn of_column(text: &str) -> Option<Self> {
+        let within = || {
+            let (name, unit) = name_and_unit(text);
+            let quantity = Quantity::within(name)?;
+            let is_its = unit.is_none_or(|unit| quantity.size_of(unit).is_some());
+            is_its.then(|| Self { quantity, unit: unit.map(Into::into) })
+        };
+        Self::parse(text).or_else(within)
+    }
+
+    /// The column of a quantity that the user has named: with the unit of its header.
+    pub fn of_named(quantity: Quantity, text: &str) -> Self {
+        let (_, unit) = name_and_unit(text);
+        Self { quantity, unit: unit.map(Into::into) }
     }
 
     /// What a text names; `None` if that is nothing of a curve.
@@ -118,7 +201,7 @@ impl Label {
         }
         if let Some((name, unit)) = text.rsplit_once(['_', ' '])
             && let Some(quantity) = Quantity::named(name)
-            && quantity.dimension().size_of(unit).is_some()
+            && quantity.size_of(unit).is_some()
         {
             return Some(Self { quantity, unit: Some(unit.into()) });
         }
@@ -137,7 +220,7 @@ impl Label {
     ) -> Result<f64, ContentError> {
         let what = self.quantity.name();
         match (&self.unit, given) {
-            (Some(unit), _) => self.quantity.dimension().size_of(unit).ok_or_else(|| {
+            (Some(unit), _) => self.quantity.size_of(unit).ok_or_else(|| {
                 let known = self.quantity.dimension().known_units();
                 ContentError::UnknownUnit { place, what, unit: shown(unit), known }
             }),
@@ -159,6 +242,23 @@ fn in_brackets(text: &str) -> Option<(&str, &str)> {
     };
     let at = text.rfind(open)?;
     Some((&text[..at], text[at + 1..text.len() - 1].trim()))
+}
+
+/// The name of a column and its unit: in brackets, or behind a slash, comma, blank or underscore.
+fn name_and_unit(text: &str) -> (&str, Option<&str>) {
+    let text = text.trim().trim_matches('"').trim();
+    if let Some((name, unit)) = in_brackets(text) {
+        return (name, Some(unit));
+    }
+    match text.rsplit_once(['/', ',', ' ', '_']) {
+        Some((name, unit)) if is_unit(unit.trim()) => (name, Some(unit.trim())),
+        _ => (text, None),
+    }
+}
+
+/// Whether a text is a unit of a curve's columns.
+pub(super) fn is_unit(text: &str) -> bool {
+    Quantity::ALL.iter().any(|quantity| quantity.size_of(text).is_some())
 }
 
 #[cfg(test)]
@@ -190,5 +290,30 @@ mod tests {
         t("", None);
         t(")", None);
         t("€]", None);
+    }
+
+    #[test]
+    fn columns_are_told_by_words_of_their_names() {
+        fn t(text: &str, expected: Option<(Quantity, Option<&str>)>) {
+            let found = Label::of_column(text);
+            let found = found.as_ref().map(|l| (l.quantity, l.unit.as_deref()));
+            assert_eq!(found, expected, "{text}");
+        }
+        use Quantity::{Deflection, Force, Time};
+        for text in ["Y Force [kN]", "Force, contact [kN]", "Kraft / kN", "Standardkraft in kN"] {
+            t(text, Some((Force, Some("kN"))));
+        }
+        for text in ["Displacement (X) [mm]", "Weg / mm", "Compression mm", "Traversenweg,mm"] {
+            t(text, Some((Deflection, Some("mm"))));
+        }
+        t("Zeit [µs]", Some((Time, Some("µs"))));
+        t("Fz", Some((Force, None)));
+        t("Force of cell 2", Some((Force, None)));
+        t("force_low_N", None);
+        t("Force rate [kN/s]", None);
+        t("Displacement rate [mm/s]", None);
+        t("Load displacement [mm]", None);
+        t("Reinforced [mm]", None);
+        t("Temperature [°C]", None);
     }
 }

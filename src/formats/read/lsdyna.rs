@@ -21,7 +21,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
-    let mut deck = Deck::read(input.bytes)?;
+    let mut deck = Deck::read(input.text)?;
     let found = deck.choose(input.options.curve.as_deref())?;
     let Found { id, title: found, scale, points, lines, facts, units: stated } = found;
     let mut notes = vec![format!("curve: {id} of the deck")];
@@ -235,7 +235,7 @@ impl Deck {
 }
 
 /// The fields of a line: between commas, or of one width.
-struct Fields<'a> {
+pub(super) struct Fields<'a> {
     line: u64,
     width: usize,
     list: Vec<&'a str>,
@@ -246,7 +246,7 @@ struct Fields<'a> {
 const FIELDS: usize = 8;
 
 impl<'a> Fields<'a> {
-    fn of(text: &'a str, line: u64, width: usize) -> Self {
+    pub(super) fn of(text: &'a str, line: u64, width: usize) -> Self {
         if text.contains(',') {
             let list = text.split(',').take(FIELDS).collect();
             return Self { line, width, list, is_free: true };
@@ -257,7 +257,7 @@ impl<'a> Fields<'a> {
         Self { line, width, list: list.collect(), is_free: false }
     }
 
-    fn text(&self, field: usize) -> &'a str {
+    pub(super) fn text(&self, field: usize) -> &'a str {
         self.list.get(field).copied().unwrap_or_default()
     }
 
@@ -273,7 +273,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A number; 0 for an empty field where that may be.
-    fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, ContentError> {
+    pub(super) fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, ContentError> {
         let text = self.text(field).trim();
         if text.is_empty() && may_be_empty {
             return Ok(0.0);

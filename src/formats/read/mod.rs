@@ -11,13 +11,18 @@
 mod columns;
 pub mod csv;
 mod curve;
+mod encoding;
 mod error;
+mod frame;
 mod iso_mme;
 pub mod json;
 mod label;
+mod layout;
 mod lsdyna;
 mod mat;
 mod modelica;
+mod modelica_package;
+mod radioss;
 mod text;
 mod two_columns;
 
@@ -30,6 +35,7 @@ use crate::unit::UnitSystem;
 use columns::Columns;
 pub use curve::{Facts, ReadCurve, ReadFile};
 pub use error::{ContentError, Place, ReadCurveError};
+use label::Quantity;
 
 /// One format of curves.
 #[derive(Debug)]
@@ -48,7 +54,9 @@ pub struct Reader {
 /// What a reader gives.
 #[derive(Debug)]
 enum Read {
-    /// Columns, of which the curve is made.
+    /// Columns of a binary file, of which the curve is made.
+    Binary(fn(&Input<'_>) -> Result<Columns, ContentError>),
+    /// Columns of a text, of which the curve is made.
     Columns(fn(&Input<'_>) -> Result<Columns, ContentError>),
     /// The curve itself.
     Curve(fn(&Input<'_>) -> Result<ReadCurve, ReadCurveError>),
@@ -62,7 +70,7 @@ pub const READERS: &[Reader] = &[
         extensions: &["mat"],
         description: "MAT file of version 4: fd_load, or the only matrix of two columns",
         recognise: mat::recognise,
-        read: Read::Columns(mat::read),
+        read: Read::Binary(mat::read),
     },
     Reader {
         name: "json",
@@ -79,6 +87,20 @@ pub const READERS: &[Reader] = &[
         read: Read::Columns(lsdyna::read),
     },
     Reader {
+        name: "radioss",
+        extensions: &["rad"],
+        description: "Radioss /FUNCT of a starter or include file",
+        recognise: radioss::recognise,
+        read: Read::Columns(radioss::read),
+    },
+    Reader {
+        name: "mo",
+        extensions: &["mo"],
+        description: "Modelica package that crumple export wrote",
+        recognise: modelica_package::recognise,
+        read: Read::Columns(modelica_package::read),
+    },
+    Reader {
         name: "modelica",
         extensions: &["txt"],
         description: "Modelica CombiTable text (#1, double name(n,2))",
@@ -93,9 +115,9 @@ pub const READERS: &[Reader] = &[
         read: Read::Columns(iso_mme::read),
     },
     Reader {
-        name: "csv",
+        name: TABLES,
         extensions: &["csv", "tsv"],
-        description: "columns with a header, separated by commas, semicolons or tabs",
+        description: "columns below a header and titles, with commas, semicolons, tabs or blanks between",
         recognise: csv::recognise,
         read: Read::Columns(csv::read),
     },
@@ -119,6 +141,49 @@ pub struct ReadOptions {
     pub curve: Option<String>,
     /// The force, where the file has both.
     pub force: Option<ForceKind>,
+    /// The columns of a table, where its header does not tell.
+    pub columns: ColumnNames,
+}
+
+/// Columns of a table as the user names them: by their headers, or by numbers counted from 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ColumnNames {
+    /// Of the deflection.
+    pub deflection: Option<String>,
+    /// Of the force.
+    pub force: Option<String>,
+    /// Of the time; `none` for force over deflection without times, whatever the file has.
+    pub time: Option<String>,
+}
+
+/// The reader that has columns to choose.
+const TABLES: &str = "csv";
+/// The table's times are not read.
+const NO_TIMES: &str = "none";
+
+impl ColumnNames {
+    fn of(&self, quantity: Quantity) -> Option<&str> {
+        let asked = match quantity {
+            Quantity::Deflection => &self.deflection,
+            Quantity::Force => &self.force,
+            Quantity::Time => &self.time,
+        };
+        asked.as_deref().filter(|asked| quantity != Quantity::Time || *asked != NO_TIMES)
+    }
+
+    fn is_without_times(&self) -> bool {
+        self.time.as_deref() == Some(NO_TIMES)
+    }
+
+    /// The first option that is given.
+    fn option(&self) -> Option<&'static str> {
+        let is_given = |q: &Quantity| self.of(*q).is_some();
+        Quantity::ALL.into_iter().find(is_given).map(Quantity::option)
+    }
+
+    fn all(&self) -> Vec<&str> {
+        Quantity::ALL.into_iter().filter_map(|quantity| self.of(quantity)).collect()
+    }
 }
 
 /// A file, as readers get it.
@@ -126,17 +191,26 @@ pub(super) struct Input<'a> {
     path: &'a Path,
     /// Empty for a folder.
     bytes: &'a [u8],
+    /// The same as a text in UTF-8.
+    text: &'a [u8],
     options: &'a ReadOptions,
 }
 
+/// With these every ZIP archive begins, workbooks too.
+const ZIP: &[u8] = b"PK\x03\x04";
 /// Bytes by which a format is recognised.
 const BEGINNING: usize = 64 << 10;
 
 impl Input<'_> {
     /// What is looked at to recognise a format.
     fn beginning(&self) -> &[u8] {
-        &self.bytes[..self.bytes.len().min(BEGINNING)]
+        &self.text[..self.text.len().min(BEGINNING)]
     }
+}
+
+/// Whether `path` is a folder of ISO-MME tests; other folders are no curves.
+pub fn is_folder_of_tests(path: &Path) -> bool {
+    path.is_dir() && !iso_mme::tests(path).is_empty()
 }
 
 /// Reads the curve at `path`, a file, or for ISO-MME a test's folder.
@@ -147,22 +221,42 @@ pub fn read(
     path: &Path,
     options: &ReadOptions,
 ) -> Result<(ReadCurve, &'static Reader), ReadCurveError> {
-    let (bytes, own) = match path.is_dir() && iso_mme::is_test(path) {
-        true => (Vec::new(), None),
-        false => open(path).map(|(bytes, own)| (bytes, Some(own)))?,
+    let tests = if path.is_dir() { iso_mme::tests(path) } else { Vec::new() };
+    let (bytes, own) = match tests.is_empty() {
+        false => {
+            iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
+            (Vec::new(), None)
+        }
+        true => open(path).map(|(bytes, own)| (bytes, Some(own)))?,
     };
-    let input = Input { path, bytes: &bytes, options };
+    if bytes.starts_with(ZIP) {
+        let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV".into();
+        return Err(curve::content(path)(ContentError::NoCurve { expected: "a curve", found }));
+    }
+    let text = encoding::decoded(&bytes);
+    let input = Input { path, bytes: &bytes, text: &text.bytes, options };
     if bytes.is_empty() && own.is_some() {
         let empty = ContentError::NoCurve { expected: "a curve", found: "an empty file".into() };
         return Err(curve::content(path)(empty));
     }
     let reader = reader(&input)?;
+    if let (Some(option), true) = (options.columns.option(), reader.name != TABLES) {
+        let (path, format) = (path.into(), reader.name);
+        return Err(ReadCurveError::NoColumns { path, format, option });
+    }
     let mut curve = match reader.read {
-        Read::Columns(read) => {
-            read(&input).and_then(Columns::curve).map_err(curve::content(path))?
+        Read::Binary(read) | Read::Columns(read) => {
+            let mut columns = read(&input).map_err(curve::content(path))?;
+            if options.columns.is_without_times() {
+                columns.time_s = None;
+            }
+            columns.curve().map_err(curve::content(path))?
         }
         Read::Curve(read) => read(&input)?,
     };
+    if !matches!(reader.read, Read::Binary(_)) {
+        curve.notes.extend(text.note.map(Into::into));
+    }
     curve.files.splice(0..0, own);
     Ok((curve, reader))
 }

@@ -18,12 +18,14 @@ pub(super) const OURS: &str = "fd_load";
 const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    let text = input.bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(input.bytes);
-    text.strip_prefix(b"#1").is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
+    input
+        .text
+        .strip_prefix(b"#1")
+        .is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
-    let file = File::read(input.bytes)?;
+    let file = File::read(input.text)?;
     let table = file.choose(input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: table {} of the file", table.name)];
     let (length, force, system) = match table.sizes {

@@ -21,11 +21,9 @@ fn fortran(text: &str) -> Option<String> {
     Some(format!("{}E{}", &text[..sign], &text[sign..]))
 }
 
-/// The lines of a text, counted from 1, without line ends; what is no UTF-8 is replaced, since it
-/// can only stand in titles and comments.
-pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, std::borrow::Cow<'_, str>)> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    bytes.split(|&b| b == b'\n').enumerate().map(|(k, line)| {
+/// The lines of a text, counted from 1, without line ends; a character that was cut is replaced.
+pub(super) fn lines(text: &[u8]) -> impl Iterator<Item = (u64, std::borrow::Cow<'_, str>)> {
+    text.split(|&b| b == b'\n').enumerate().map(|(k, line)| {
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         (k as u64 + 1, String::from_utf8_lossy(line))
     })

@@ -24,7 +24,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
-    let mut file = File::read(input.bytes)?;
+    let mut file = File::read(input.text)?;
     let found = file.choose(input.options.curve.as_deref())?;
     let given = input.options.units.or(file.units);
     let mut notes = Vec::new();
@@ -101,7 +101,7 @@ impl Found {
 }
 
 /// A text that names two axes, apart: behind a bracket, or at tabs, commas or several blanks.
-fn pieces(text: &str) -> Vec<String> {
+pub(super) fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = vec![String::new()];
     for word in text.split([' ', '\t', ',', ';']) {
         let last = pieces.len() - 1;

@@ -1,0 +1,296 @@
+//! Building a database: every run of a study becomes a case; unchanged runs are kept.
+
+mod previous;
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::clock;
+use crate::curve::{Case, Origin};
+use crate::database::{CasePath, Database, DatabaseError};
+use crate::file::{LockError, WriterLock};
+use crate::manifest::Place;
+use crate::study::{self, LocatedRun, RunError, Study, StudyError};
+use previous::{Named, Previous};
+
+/// Why nothing could be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The manifest is wrong.
+    #[error("{0}")]
+    Study(#[from] StudyError),
+    /// The database is not ours, or damaged.
+    #[error("{0}")]
+    Database(#[from] DatabaseError),
+    /// Another process writes the database.
+    #[error("{0}")]
+    Lock(#[from] LockError),
+    /// No run is usable.
+    #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
+    NoRun {
+        /// The manifest.
+        path: PathBuf,
+        /// A line for each run.
+        reasons: String,
+        /// What the first of them is about in the manifest, if the manifest says it.
+        place: Option<Place>,
+    },
+}
+
+impl BuildError {
+    /// Where in the manifest it is wrong.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Study(error) => error.place(),
+            Self::NoRun { place, .. } => place.as_ref(),
+            Self::Database(_) | Self::Lock(_) => None,
+        }
+    }
+}
+
+/// Why a run could not be used, and what is wrong with its files, which may be the cause.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{reason}{}", shown(.place), listed(.problems))]
+pub struct RunFailure {
+    /// What it is about in the manifest, if the manifest says it.
+    pub place: Option<Box<Place>>,
+    /// Why the run is not usable.
+    #[source]
+    pub reason: RunError,
+    /// As `crumple inspect` finds them.
+    pub problems: Box<[String]>,
+}
+
+/// Problems that a message repeats.
+const LISTED: usize = 3;
+
+fn shown(place: &Option<Box<Place>>) -> String {
+    place.as_ref().map_or(String::new(), |place| format!("{place}: "))
+}
+
+fn listed(problems: &[String]) -> String {
+    if problems.is_empty() {
+        return String::new();
+    }
+    let shown = problems.iter().take(LISTED).cloned().collect::<Vec<_>>().join("; ");
+    let more = match problems.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!("; and {more} more, which crumple inspect lists"),
+    };
+    format!(" (damage in the run's files: {shown}{more})")
+}
+
+/// How one run ended.
+#[derive(Debug)]
+pub enum RunOutcome {
+    /// Read and extracted.
+    Built,
+    /// Unchanged since it was built.
+    Kept,
+    /// Not usable, with the reason; an earlier build of it stays in the database.
+    Failed {
+        /// Why, with the damage of its files.
+        reason: RunFailure,
+        /// Whether the database has the run from an earlier build.
+        earlier_kept: bool,
+    },
+}
+
+/// One run of a study after a build.
+#[derive(Debug)]
+pub struct BuiltRun {
+    /// Name of the run in the manifest.
+    pub name: String,
+    /// Where its case is, if the database has one.
+    pub case: CasePath,
+    /// How it ended.
+    pub outcome: RunOutcome,
+}
+
+/// What a build did.
+#[derive(Debug)]
+pub struct BuildReport {
+    /// Group of the study.
+    pub group: String,
+    /// Every run, in the order of the manifest.
+    pub runs: Vec<BuiltRun>,
+    /// Cases that the study no longer has.
+    pub removed: Vec<CasePath>,
+    /// Cases of runs that have another name or group than before: from where to where.
+    pub moved: Vec<(CasePath, CasePath)>,
+    /// Groups that were built from the manifest when it had another study or group and other runs
+    /// or recipe, and that stay; looked for when the database has nothing of the study yet.
+    pub earlier: Vec<String>,
+    /// The database as it is now.
+    pub database: Database,
+}
+
+impl BuildReport {
+    /// The case of a run.
+    pub fn case(&self, run: &BuiltRun) -> Option<&Case> {
+        self.database.cases(&run.case.group).iter().find(|case| case.name == run.case.name)
+    }
+}
+
+/// Builds the study at `manifest` into the database at `path`.
+///
+/// Runs whose recipe, entry and files are unchanged are not read again. A run that cannot
+/// be used is reported, and the others go on; the file is written once, whole, and not at all if
+/// nothing has changed. A study, group or run that was renamed takes its cases along, with their
+/// tags and notes. `progress` is called with the name of each run when it is done, from any thread.
+///
+/// # Errors
+/// [`BuildError`] if the manifest is wrong, the database is not ours, busy or cannot be
+/// written, or no run is usable. The database is then unchanged.
+pub fn build(
+    manifest: &Path,
+    path: &Path,
+    progress: impl Fn(&str) + Sync,
+) -> Result<BuildReport, BuildError> {
+    let study = study::load(manifest)?;
+    let _lock = WriterLock::take(path)?;
+    let mut database = match path.is_file() {
+        true => Database::read(path)?,
+        false => Database::default(),
+    };
+    let located: Vec<Result<LocatedRun<'_>, RunError>> =
+        study.runs().par_iter().map(|entry| study.locate(entry)).collect();
+    let previous = previous(&study, &located, &database);
+    // A case that somebody has changed since is made again.
+    let unaltered = database.all().filter(|c| !database.is_altered(&c.group, &c.name));
+    let fingerprints: HashMap<CasePath, &str> =
+        unaltered.map(|case| (CasePath::of(case), &*case.fingerprint)).collect();
+    let results: Vec<(String, Result<Option<Case>, RunFailure>)> = study
+        .runs()
+        .par_iter()
+        .zip(located)
+        .map(|(entry, located)| {
+            let name = entry.case_name();
+            let before = previous.of_run.get(&name);
+            let before = before.and_then(|(path, _)| fingerprints.get(path).copied());
+            let result = case(&study, entry, located, before);
+            progress(&name);
+            (name, result)
+        })
+        .collect();
+    if results.iter().all(|(_, r)| r.is_err()) {
+        let reasons: Vec<String> = results
+            .iter()
+            .filter_map(|(name, r)| r.as_ref().err().map(|e| format!("  {name}: {e}")))
+            .collect();
+        let place = results.iter().find_map(|(_, r)| r.as_ref().err()?.place.as_deref().cloned());
+        let reasons = reasons.join("\n");
+        return Err(BuildError::NoRun { path: manifest.into(), reasons, place });
+    }
+    let moved = move_along(&mut database, &study, &previous)?;
+    let runs = put(&mut database, &study, &previous, results)?;
+    let changed = !previous.left.is_empty()
+        || !moved.is_empty()
+        || runs.iter().any(|run| matches!(run.outcome, RunOutcome::Built));
+    if changed || !path.is_file() {
+        database.write(path)?;
+    }
+    Ok(BuildReport {
+        group: study.group().into(),
+        runs,
+        removed: previous.left,
+        moved,
+        earlier: previous.earlier.into_iter().collect(),
+        database,
+    })
+}
+
+/// The study's cases as the database has them.
+fn previous(
+    study: &Study,
+    located: &[Result<LocatedRun<'_>, RunError>],
+    database: &Database,
+) -> Previous {
+    let made_of = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.made_of();
+    let runs = study.runs().iter().zip(located);
+    let named = Named {
+        study: study.name(),
+        group: study.group(),
+        manifest: &study.path(),
+        runs: runs.map(|(entry, run)| (entry.case_name(), made_of(run))).collect(),
+    };
+    named.previous(database)
+}
+
+/// The run's case, or `None` if its fingerprint is the one it had before.
+fn case(
+    study: &Study,
+    entry: &study::RunEntry,
+    located: Result<LocatedRun<'_>, RunError>,
+    before: Option<&str>,
+) -> Result<Option<Case>, RunFailure> {
+    let failure = |reason, problems: Vec<String>| {
+        let place = study.place(entry, &reason).map(Box::new);
+        RunFailure { place, reason, problems: problems.into_boxed_slice() }
+    };
+    let located = located.map_err(|reason| failure(reason, Vec::new()))?;
+    if before == Some(&*located.fingerprint) {
+        return Ok(None);
+    }
+    located.extract().map(Some).map_err(|reason| failure(reason, located.problems()))
+}
+
+/// Puts the cases of renamed runs, groups and studies where they belong, and removes those that the
+/// study no longer has.
+fn move_along(
+    database: &mut Database,
+    study: &Study,
+    previous: &Previous,
+) -> Result<Vec<(CasePath, CasePath)>, DatabaseError> {
+    database.remove(&previous.left.iter().cloned().collect());
+    let places = previous.of_run.values().filter(|(from, to)| from != to).cloned();
+    let moves: BTreeMap<CasePath, CasePath> = places.collect();
+    database.relocate(&moves)?;
+    let runs: HashMap<&CasePath, &String> =
+        previous.of_run.iter().map(|(run, (_, to))| (to, run)).collect();
+    let (manifest, group) = (study.path(), study.group());
+    database.change(|case| {
+        if let Some(&run) = runs.get(&CasePath::of(case)) {
+            case.study = study.name().into();
+            let (manifest, group, run) = (manifest.clone(), group.into(), run.clone());
+            case.origin = Some(Origin { manifest, group, run });
+        }
+    });
+    Ok(moves.into_iter().collect())
+}
+
+/// Puts the cases that were built into the database.
+fn put(
+    database: &mut Database,
+    study: &Study,
+    previous: &Previous,
+    results: Vec<(String, Result<Option<Case>, RunFailure>)>,
+) -> Result<Vec<BuiltRun>, DatabaseError> {
+    let now = clock::now_utc();
+    // What users said of each.
+    let said = database.all().map(|c| (CasePath::of(c), (c.tags.clone(), c.user_notes.clone())));
+    let said: HashMap<CasePath, (Vec<String>, Vec<String>)> = said.collect();
+    let (mut runs, mut built) = (Vec::new(), Vec::new());
+    for (name, result) in results {
+        let before = previous.of_run.get(&name).map(|(_, path)| path);
+        let own = || CasePath { group: study.group().into(), name: name.clone() };
+        let path = before.cloned().unwrap_or_else(own);
+        let outcome = match result {
+            Ok(Some(mut case)) => {
+                (case.tags, case.user_notes) =
+                    before.and_then(|path| said.get(path)).cloned().unwrap_or_default();
+                (case.group, case.name) = (path.group.clone(), path.name.clone());
+                case.built_utc = Some(now.clone());
+                built.push(case);
+                RunOutcome::Built
+            }
+            Ok(None) => RunOutcome::Kept,
+            Err(reason) => RunOutcome::Failed { reason, earlier_kept: before.is_some() },
+        };
+        runs.push(BuiltRun { name, case: path, outcome });
+    }
+    database.put_all(built)?;
+    Ok(runs)
+}

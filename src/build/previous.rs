@@ -1,0 +1,143 @@
+//! Which cases of a database are a study's, and where they belong now.
+//!
+//! A case knows its study by name, and by [`Origin`](crate::curve::Origin) the manifest, group and
+//! run that it was built from, as they were called then.
+//!
+//! 1. The cases of a study are those of its name and group.
+//! 2. If there are none, study or group may have been renamed: then the study's cases are those of
+//!    a study and group that were built from the same manifest, or from one that is gone, and of
+//!    which one at least is made of the same bytes by the same recipe as a run of this study.
+//! 3. A run's case is the one of its name; for a run that has none, a case made of the same whose
+//!    name no run has any more.
+//! 4. A case goes where the manifest says if the manifest says something else than it did when the
+//!    case was built. Else it stays where it is: it may have been renamed in the database.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::path::Path;
+
+use crate::curve::Case;
+use crate::curve::from_table::IMPORTED;
+use crate::database::{CasePath, Database};
+use crate::file;
+
+/// A study as its cases know it.
+pub(super) struct Named<'a> {
+    /// Name of the study.
+    pub study: &'a str,
+    /// Its group.
+    pub group: &'a str,
+    /// Path of its manifest from the root on.
+    pub manifest: &'a str,
+    /// Names of its runs, each with what its case is made of if its files were found.
+    pub runs: Vec<(String, Option<String>)>,
+}
+
+/// The cases of a study as a database has them.
+#[derive(Default)]
+pub(super) struct Previous {
+    /// The case of each run that has one, by the run's name: where it is, and where it belongs.
+    pub of_run: HashMap<String, (CasePath, CasePath)>,
+    /// Cases whose run the study no longer has.
+    pub left: Vec<CasePath>,
+    /// If the database has no case of the study: groups with cases that were built from the manifest
+    /// when it was of another study or group, and are no run's.
+    pub earlier: BTreeSet<String>,
+}
+
+impl Named<'_> {
+    /// Finds the study's cases.
+    pub(super) fn previous(&self, database: &Database) -> Previous {
+        let built: Vec<&Case> = database.all().filter(|case| case.study != IMPORTED).collect();
+        let is_own = |case: &&&Case| case.study == self.study && group_of(case) == self.group;
+        let mut cases: Vec<&Case> = built.iter().filter(is_own).copied().collect();
+        if cases.is_empty() {
+            cases = self.renamed(&built);
+        }
+        let names: HashSet<&str> = self.runs.iter().map(|(name, _)| name.as_str()).collect();
+        let mut previous = Previous::default();
+        let mut without: Vec<&Case> = Vec::new();
+        for case in cases {
+            match names.contains(run_of(case)) {
+                true => {
+                    let (run, place) = (run_of(case), self.place(case, run_of(case)));
+                    // Of several, as after a merge, the one of the run's own name.
+                    if case.name == run || !previous.of_run.contains_key(run) {
+                        previous.of_run.insert(run.into(), (CasePath::of(case), place));
+                    }
+                }
+                false => without.push(case),
+            }
+        }
+        // Made of each, for runs that have no case of their name.
+        let mut made_of: HashMap<Option<String>, Vec<&Case>> = HashMap::new();
+        for case in without {
+            made_of.entry(case.made_of()).or_default().push(case);
+        }
+        for (name, made) in &self.runs {
+            if previous.of_run.contains_key(name) || made.is_none() {
+                continue;
+            }
+            if let Some(case) = made_of.get_mut(made).and_then(Vec::pop) {
+                let place = (CasePath::of(case), self.place(case, name));
+                previous.of_run.insert(name.clone(), place);
+            }
+        }
+        if previous.of_run.is_empty() {
+            let is_ours = |case: &&&Case| {
+                case.origin.as_ref().is_some_and(|origin| origin.manifest == self.manifest)
+                    && case.group != self.group
+            };
+            previous.earlier = built.iter().filter(is_ours).map(|c| c.group.clone()).collect();
+        }
+        previous.left = made_of.into_values().flatten().map(CasePath::of).collect();
+        previous.left.sort();
+        previous
+    }
+
+    /// The cases that this study had under another name or in another group.
+    fn renamed<'a>(&self, built: &[&'a Case]) -> Vec<&'a Case> {
+        let ours: HashSet<&String> =
+            self.runs.iter().filter_map(|(_, made_of)| made_of.as_ref()).collect();
+        // Of one study and group, so that whoever has two under one path loses neither.
+        let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
+        for &case in built {
+            if let Some(origin) = &case.origin {
+                let key = (&*case.study, &*origin.group, &*origin.manifest);
+                found.entry(key).or_default().push(case);
+            }
+        }
+        found.retain(|(_, _, manifest), _| {
+            let (then, now) = (Path::new(manifest), Path::new(self.manifest));
+            then == now || !then.exists() || file::is_same(then, now)
+        });
+        let same = |cases: &[&Case]| {
+            let made_of = cases.iter().filter_map(|case| case.made_of());
+            made_of.filter(|made_of| ours.contains(made_of)).count()
+        };
+        let counted = found.into_values().map(|cases| (same(&cases), cases));
+        let most = counted.filter(|(same, _)| *same > 0).max_by_key(|(same, _)| *same);
+        most.map(|(_, cases)| cases).unwrap_or_default()
+    }
+
+    /// Where a case belongs that is of the run of this name.
+    fn place(&self, case: &Case, run: &str) -> CasePath {
+        let now = |then: &str, said: &str, is: &String| match then == said {
+            true => is.clone(),
+            false => said.into(),
+        };
+        CasePath {
+            group: now(group_of(case), self.group, &case.group),
+            name: now(run_of(case), run, &case.name),
+        }
+    }
+}
+
+/// The group that the manifest had for a case.
+fn group_of(case: &Case) -> &str {
+    case.origin.as_ref().map_or(&case.group, |origin| &origin.group)
+}
+
+/// The run that a case was built from.
+fn run_of(case: &Case) -> &str {
+    case.origin.as_ref().map_or(&case.name, |origin| &origin.run)
+}

@@ -1,0 +1,207 @@
+//! Force over deflection: the runs of a group, predictions, and a speed that was left out.
+
+use super::speed;
+use crate::curve::{Case, CurveUnloading, DrivingCurve, ForceKind};
+use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
+use crate::surrogate::band::{Band, LeftOutSpeeds};
+use crate::surrogate::{ModelCase, PredictedCurve};
+
+/// Axes of force over deflection.
+fn axes(largest_n: f64) -> Panel {
+    Panel::new(Axis::new("deflection", "m", 1.0), Axis::prefixed("force", "N", largest_n))
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// Loading and unloading of a case: deflections in m and forces in N, until the bodies part.
+///
+/// The body's force is that of its recorded speeds; `None` if the case has no such force.
+fn both_ways(case: &Case, force: ForceKind) -> Option<(Vec<f64>, Vec<f64>)> {
+    if force == case.force_kind {
+        let curve = &case.sampled;
+        let turn = (0..curve.force_n().len())
+            .max_by(|&a, &b| curve.deflection_m()[a].total_cmp(&curve.deflection_m()[b]))?;
+        // Where the force is gone, the bodies have parted.
+        let behind = curve.force_n()[turn..].iter().position(|f| *f <= 0.0);
+        let end = behind.map_or(curve.force_n().len(), |parted| turn + parted.max(1));
+        return Some((curve.deflection_m()[..end].to_vec(), curve.force_n()[..end].to_vec()));
+    }
+    if force == ForceKind::Contact {
+        return None;
+    }
+    let driving = DrivingCurve::recorded(case)?;
+    let (mut d, mut f) =
+        (driving.loading.deflection_m().to_vec(), driving.loading.force_n().to_vec());
+    if let CurveUnloading::Recorded { deflection_m, force_n, .. } = &driving.unloading {
+        d.extend(deflection_m);
+        f.extend(force_n);
+    }
+    Some((d, f))
+}
+
+/// How runs of a group are called: by speed, and by name where speeds repeat.
+fn names(cases: &[Case]) -> Vec<String> {
+    let speeds: Vec<String> = cases.iter().map(|case| speed(case.speed.m_per_s)).collect();
+    let is_alone = |k: usize| speeds.iter().filter(|s| **s == speeds[k]).count() == 1;
+    let name = |k: usize| match is_alone(k) {
+        true => format!("FE at {}", speeds[k]),
+        false => format!("FE at {} ({})", speeds[k], cases[k].name),
+    };
+    (0..cases.len()).map(name).collect()
+}
+
+/// Force over deflection of all runs of a group, loading and unloading.
+///
+/// `force` is the recipe's force, or the body's beside it; runs without that force are named in a note.
+pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
+    let mut series = Vec::new();
+    let mut missing = Vec::new();
+    let mut top = 0.0;
+    for (k, (case, name)) in cases.iter().zip(names(cases)).enumerate() {
+        match both_ways(case, force) {
+            Some((d, f)) => {
+                top = largest(&f).max(top);
+                series.push(Series::line(&name, k, d, f));
+            }
+            None => missing.push(name),
+        }
+    }
+    let panel = Panel { series, ..axes(top) };
+    let kind = cases.first().map_or("speed", |case| case.speed.kind.name());
+    let title = format!("{group}: {} force by {kind} speed", force.name());
+    let mut chart = Chart::of(&title, panel);
+    if !missing.is_empty() {
+        chart.notes.push(format!("Without a {} force: {}.", force.name(), missing.join(", ")));
+    }
+    chart
+}
+
+/// A predicted curve with its band, over the training curves beside its speed.
+///
+/// `neighbours` are a model's cases; the nearest below and above are drawn, or the two nearest outside of all.
+pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
+    let v = curve.speed_m_per_s;
+    let mut panel = axes(largest(&curve.force_n));
+    for (k, case) in beside(neighbours, v).into_iter().enumerate() {
+        let is_body =
+            curve.provenance.force_kind == ForceKind::Body && !case.body_force_n.is_empty();
+        let force_n = if is_body { &case.body_force_n } else { &case.force_n };
+        let name = format!("FE at {}", speed(case.speed_m_per_s));
+        let look = [0, 2][k];
+        panel.series.push(Series::line(&name, look, case.deflection_m.clone(), force_n.clone()));
+    }
+    add_prediction(&mut panel, curve);
+    panel.marks.push(Mark { name: "maximal crush".into(), x: curve.max_deflection_m });
+    let title = format!(
+        "{} at {}: {} force by the model {}",
+        curve.provenance.group,
+        speed(v),
+        curve.provenance.force_kind.name(),
+        curve.model
+    );
+    let mut chart = Chart::of(&title, panel);
+    chart.notes.extend(curve.warnings.iter().map(|warning| format!("Warning: {warning}.")));
+    chart
+}
+
+/// The cases below and above a speed; at an end the two nearest.
+fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
+    let mut sorted: Vec<&ModelCase> = cases.iter().collect();
+    sorted.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));
+    let above = sorted.iter().position(|case| case.speed_m_per_s >= v).unwrap_or(sorted.len());
+    let from = above.saturating_sub(1).min(sorted.len().saturating_sub(2));
+    sorted.into_iter().skip(from).take(2).collect()
+}
+
+/// The look of predictions.
+const PREDICTED: usize = 1;
+
+/// The predicted line, its band below it, and the body's force beside it.
+fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
+    let (d, f) = (&curve.deflection_m, &curve.force_n);
+    if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
+        let (low, high) = (low.clone(), high.clone());
+        panel.bands.push(plot::Band {
+            name: band_name(curve),
+            look: PREDICTED,
+            x: d.clone(),
+            low,
+            high,
+        });
+    }
+    let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
+    panel.series.push(Series::line(&name, PREDICTED, d.clone(), f.clone()).shown(Shown::Emphasis));
+    if let Some(body_n) = &curve.body_force_n {
+        panel.series.push(Series::line("its body force", 3, d.clone(), body_n.clone()));
+    }
+}
+
+/// Which band, its level, and from how many curves.
+fn band_name(curve: &PredictedCurve) -> String {
+    match &curve.provenance.band {
+        Some(band) => {
+            let which = match band.left_out {
+                LeftOutSpeeds::Inner => "inner",
+                LeftOutSpeeds::Ends => "end",
+            };
+            let speeds = if band.curves == 1 { "speed" } else { "speeds" };
+            let Band { level, curves, .. } = band;
+            format!(
+                "empirical {:.0} % range from {curves} left-out {which} {speeds}",
+                100.0 * level
+            )
+        }
+        None => "band of the curve's file".into(),
+    }
+}
+
+/// A curve that was predicted without the run beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOutPrediction<'a> {
+    /// The run that was left out.
+    pub case: &'a Case,
+    /// What the others predict for its speed.
+    pub curve: &'a PredictedCurve,
+    /// Times in s and closing speeds in m/s of one mass that the predicted curve stops.
+    pub motion: Option<(&'a [f64], &'a [f64])>,
+}
+
+/// A run that was left out beside its prediction: force over deflection, and the speed over time.
+pub fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
+    let kind = curve.provenance.force_kind;
+    let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
+    forces.title = format!("{} force", kind.name());
+    let fe = format!("FE at {}", speed(case.speed.m_per_s));
+    if let Some((d, f)) = both_ways(case, kind) {
+        forces.series.push(Series::line(&fe, 0, d, f));
+    }
+    add_prediction(&mut forces, curve);
+    let mut panels = vec![forces];
+    if let Some((time_s, v_m_per_s)) = motion {
+        let mut speeds =
+            Panel::new(Axis::new("time", "ms", 1e3), Axis::new("closing speed", "m/s", 1.0));
+        speeds.title = "one mass against a wall".into();
+        let end = time_s.last().copied().unwrap_or_default();
+        let states = case.sampled.time_s().iter().take_while(|t| **t <= end).count();
+        let fe_time = case.sampled.time_s()[..states].to_vec();
+        speeds.series.push(Series::line(
+            &fe,
+            0,
+            fe_time,
+            case.closing_speed_m_per_s[..states].to_vec(),
+        ));
+        let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
+        let ours = Series::line(&name, PREDICTED, time_s.to_vec(), v_m_per_s.to_vec());
+        speeds.series.push(ours.shown(Shown::Emphasis));
+        panels.push(speeds);
+    }
+    let title = format!(
+        "{}: {} left out and predicted by {}",
+        case.group,
+        speed(case.speed.m_per_s),
+        curve.model
+    );
+    Chart::row(&title, panels)
+}

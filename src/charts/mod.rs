@@ -1,0 +1,38 @@
+//! What crumple's results look like: charts of curves, predictions, runs and histories.
+//!
+//! Each function takes results and gives a [`Chart`](crate::plot::Chart); `crumple plot` writes it, the report shows it.
+//!
+//! ```
+//! use crumple::build::build;
+//! use crumple::charts::group_curves;
+//! use crumple::curve::ForceKind;
+//! use std::path::Path;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe/lead-car-wall/study.toml");
+//! let report = build(&study, &folder.path().join("curves.h5"), |_run| {})?;
+//! let cases = report.database.cases("lead-car-wall");
+//! let chart = group_curves("lead-car-wall", cases, ForceKind::Contact);
+//! assert_eq!(chart.panels[0].series.len(), cases.len());
+//! std::fs::write(folder.path().join("curves.png"), chart.drawing().png(2.0)?)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod curves;
+mod histories;
+mod left_out;
+mod motion;
+mod train;
+
+pub use curves::{LeftOutPrediction, group_curves, left_out, prediction};
+pub use histories::{HistoryError, HistoryOptions, histories};
+pub use left_out::{LeftOutError, left_out_at};
+pub use motion::{BodyMotion, Energies, InterfaceMotion, Motion, MotionError, Quantity};
+pub use train::train_speeds;
+
+use crate::unit::km_per_h;
+
+/// A speed in km/h with at most one digit behind the point.
+fn speed(m_per_s: f64) -> String {
+    km_per_h(m_per_s)
+}

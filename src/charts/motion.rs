@@ -1,0 +1,252 @@
+//! A multi-body run over time: speeds, accelerations, forces, energies; and force over deflection.
+
+use crate::multibody::{Chain, Run};
+use crate::plot::{Axis, Chart, Panel, Series};
+use crate::table::{CsvTable, NoNumber};
+
+/// What of a run is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Speeds of the bodies over time.
+    Velocity,
+    /// Accelerations of the bodies over time.
+    Acceleration,
+    /// Forces of the interfaces over time.
+    Force,
+    /// Forces of the interfaces over their deflection.
+    Crush,
+    /// Kinetic, stored and dissipated energy over time.
+    Energy,
+}
+
+/// Histories of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyMotion {
+    /// Its name.
+    pub name: String,
+    /// Speed in m/s, one value per time.
+    pub v_m_per_s: Vec<f64>,
+    /// Acceleration in m/s².
+    pub a_m_per_s2: Vec<f64>,
+}
+
+/// Histories of an interface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InterfaceMotion {
+    /// Its name.
+    pub name: String,
+    /// Deflection in m, one value per time.
+    pub deflection_m: Vec<f64>,
+    /// Force in N.
+    pub force_n: Vec<f64>,
+}
+
+/// Energies of the whole chain, one value per time, in J.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Energies {
+    /// Of the motion.
+    pub kinetic_j: Vec<f64>,
+    /// That would come back.
+    pub stored_j: Vec<f64>,
+    /// Lost in the interfaces.
+    pub dissipated_j: Vec<f64>,
+}
+
+/// A run as it is drawn: from a scenario, or from the file of a result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Times in s.
+    pub time_s: Vec<f64>,
+    /// In the order of the legend.
+    pub bodies: Vec<BodyMotion>,
+    /// In the order of the legend.
+    pub interfaces: Vec<InterfaceMotion>,
+    /// Absent where the masses are not known.
+    pub energies: Option<Energies>,
+}
+
+/// Why a table is no result of a run. Lines and columns count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum MotionError {
+    /// The text is no table.
+    #[error(transparent)]
+    Csv(#[from] csv::Error),
+    /// It has other columns.
+    #[error(
+        "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\""
+    )]
+    Columns {
+        /// Line of the header.
+        line: u64,
+        /// The header.
+        found: String,
+    },
+    /// A field is no finite number.
+    #[error("line {line}, column {column}: expected a number, found \"{found}\"")]
+    NotANumber {
+        /// Line in the file.
+        line: u64,
+        /// Column in that line.
+        column: usize,
+        /// The field's text.
+        found: String,
+    },
+    /// There are no rows.
+    #[error("there are no rows below the header: was the run stopped?")]
+    Empty,
+}
+
+impl From<NoNumber> for MotionError {
+    fn from(NoNumber { line, column, found, .. }: NoNumber) -> Self {
+        Self::NotANumber { line, column, found }
+    }
+}
+
+impl Motion {
+    /// Of the CSV file of a result, as `crumple simulate -o` writes it.
+    ///
+    /// # Errors
+    /// [`MotionError`] if it has other columns, or fields that are no finite numbers.
+    pub fn of_csv(text: &[u8]) -> Result<Self, MotionError> {
+        let mut table = CsvTable::open(text, 0)?;
+        let header: Vec<String> = table.header().iter().map(String::from).collect();
+        let line = table.header_line();
+        if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
+            return Err(MotionError::Columns { line, found: header.join(",") });
+        }
+        let mut columns = vec![Vec::new(); header.len()];
+        for row in table.rows() {
+            let row = row?;
+            for (k, column) in columns.iter_mut().enumerate() {
+                column.push(row.number(k)?);
+            }
+        }
+        if columns[0].is_empty() {
+            return Err(MotionError::Empty);
+        }
+        let of = |quantity: &str, name: &str| {
+            let wanted = format!("{quantity}[{name}]");
+            header.iter().position(|h| *h == wanted).map(|k| columns[k].clone()).unwrap_or_default()
+        };
+        let names = |quantity: &'static str| {
+            let inside = move |h: &String| {
+                Some(h.strip_prefix(quantity)?.strip_prefix('[')?.strip_suffix(']')?.to_string())
+            };
+            header.iter().filter_map(inside).collect::<Vec<String>>()
+        };
+        let bodies: Vec<BodyMotion> = names("v_m_per_s")
+            .into_iter()
+            .map(|name| BodyMotion {
+                v_m_per_s: of("v_m_per_s", &name),
+                a_m_per_s2: of("a_m_per_s2", &name),
+                name,
+            })
+            .collect();
+        let interfaces: Vec<InterfaceMotion> = names("force_N")
+            .into_iter()
+            .map(|name| InterfaceMotion {
+                deflection_m: of("deflection_m", &name),
+                force_n: of("force_N", &name),
+                name,
+            })
+            .collect();
+        if bodies.is_empty() && interfaces.is_empty() {
+            return Err(MotionError::Columns { line, found: header.join(",") });
+        }
+        Ok(Self { time_s: columns.swap_remove(0), bodies, interfaces, energies: None })
+    }
+
+    /// Of a run of a chain, with the bodies in the order of `order` (indices into the chain).
+    pub fn of_run(chain: &Chain, run: &Run, order: &[usize]) -> Self {
+        let body = |&i: &usize| BodyMotion {
+            name: chain.bodies()[i].name.clone(),
+            v_m_per_s: run.bodies[i].v_m_per_s.clone(),
+            a_m_per_s2: run.bodies[i].a_m_per_s2.clone(),
+        };
+        let interfaces = chain.interfaces().iter().zip(&run.interfaces);
+        let states = run.time_s.len();
+        let sum = |of: &dyn Fn(usize) -> f64| (0..states).map(of).collect::<Vec<f64>>();
+        let kinetic = |t: usize| {
+            let bodies = chain.bodies().iter().zip(&run.bodies);
+            bodies.map(|(b, h)| 0.5 * b.mass_kg * h.v_m_per_s[t] * h.v_m_per_s[t]).sum()
+        };
+        Self {
+            time_s: run.time_s.clone(),
+            bodies: order.iter().map(body).collect(),
+            interfaces: interfaces
+                .map(|(interface, history)| InterfaceMotion {
+                    name: interface.name.clone(),
+                    deflection_m: history.deflection_m.clone(),
+                    force_n: history.force_n.clone(),
+                })
+                .collect(),
+            energies: Some(Energies {
+                kinetic_j: sum(&kinetic),
+                stored_j: sum(&|t| run.interfaces.iter().map(|i| i.stored_j[t]).sum()),
+                dissipated_j: sum(&|t| run.interfaces.iter().map(|i| i.dissipated_j[t]).sum()),
+            }),
+        }
+    }
+
+    /// The chart of one quantity; `None` for energies that are not known.
+    pub fn chart(&self, title: &str, quantity: Quantity) -> Option<Chart> {
+        let panel = match quantity {
+            Quantity::Velocity => {
+                self.of_bodies(Axis::new("speed", "m/s", 1.0), |body| &body.v_m_per_s)
+            }
+            Quantity::Acceleration => {
+                self.of_bodies(Axis::new("acceleration", "m/s²", 1.0), |body| &body.a_m_per_s2)
+            }
+            Quantity::Force => {
+                let series =
+                    self.interfaces.iter().enumerate().map(|(k, i)| {
+                        Series::line(&i.name, k, self.time_s.clone(), i.force_n.clone())
+                    });
+                Panel { series: series.collect(), ..Panel::new(time(), self.force_axis()) }
+            }
+            Quantity::Crush => self.crush(),
+            Quantity::Energy => self.energy()?,
+        };
+        Some(Chart::of(title, panel))
+    }
+
+    fn of_bodies(&self, y: Axis, values: impl Fn(&BodyMotion) -> &Vec<f64>) -> Panel {
+        let series = self.bodies.iter().enumerate().map(|(k, body)| {
+            Series::line(&body.name, k, self.time_s.clone(), values(body).clone())
+        });
+        Panel { series: series.collect(), ..Panel::new(time(), y) }
+    }
+
+    fn force_axis(&self) -> Axis {
+        let forces = self.interfaces.iter().flat_map(|i| &i.force_n);
+        Axis::prefixed("force", "N", forces.fold(0.0, |top: f64, f| top.max(f.abs())))
+    }
+
+    /// From where an interface closes; before, its gap is open.
+    fn crush(&self) -> Panel {
+        let mut panel = Panel::new(Axis::new("deflection", "m", 1.0), self.force_axis());
+        for (k, interface) in self.interfaces.iter().enumerate() {
+            let pairs = interface.deflection_m.iter().zip(&interface.force_n);
+            let closed: Vec<(f64, f64)> =
+                pairs.filter(|(d, f)| **d > 0.0 || **f != 0.0).map(|(d, f)| (*d, *f)).collect();
+            let (d, f) = closed.into_iter().unzip();
+            panel.series.push(Series::line(&interface.name, k, d, f));
+        }
+        panel
+    }
+
+    fn energy(&self) -> Option<Panel> {
+        let Energies { kinetic_j, stored_j, dissipated_j } = self.energies.as_ref()?;
+        let top = kinetic_j.iter().chain(dissipated_j).copied().fold(0.0, f64::max);
+        let mut panel = Panel::new(time(), Axis::prefixed("energy", "J", top));
+        let all = [("kinetic", kinetic_j), ("stored", stored_j), ("dissipated", dissipated_j)];
+        for (k, (name, values)) in all.into_iter().enumerate() {
+            panel.series.push(Series::line(name, k, self.time_s.clone(), values.clone()));
+        }
+        Some(panel)
+    }
+}
+
+fn time() -> Axis {
+    Axis::new("time", "ms", 1e3)
+}

@@ -1,0 +1,96 @@
+//! What a measured or legacy curve's file does not say of itself, as several commands take it.
+
+use crumple::formats::read::{ColumnNames, ReadOptions};
+use crumple::import::{ImportError, Settings};
+use crumple::unit::{STIFFNESS, SpeedKind};
+
+use super::Failure;
+use super::arguments::{mass, one_of};
+
+/// How a file is read, and the impact that its curve belongs to.
+#[derive(clap::Args)]
+pub struct CurveFile {
+    /// What the speed is measured against [default: what the file says, else the group's]
+    #[arg(long, value_parser = one_of(KINDS))]
+    kind: Option<SpeedKind>,
+    /// Mass of the other body of a pair [default: what the file says, else that of the body]
+    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
+    other_mass: Option<f64>,
+    /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
+    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
+    unloading: Option<f64>,
+    /// Format of the file, if its content shall not tell (crumple db add --list)
+    #[arg(long)]
+    from: Option<String>,
+    /// Number or name of the curve in a file of several
+    #[arg(long)]
+    curve: Option<String>,
+    /// Column of the deflection in a table, by its header or its number from 1
+    #[arg(long, value_name = "COLUMN")]
+    deflection_column: Option<String>,
+    /// Column of the force
+    #[arg(long, value_name = "COLUMN")]
+    force_column: Option<String>,
+    /// Column of the time; none for force over deflection without times (slow tests)
+    #[arg(long, value_name = "COLUMN")]
+    time_column: Option<String>,
+    /// Take curves whose energy cannot be that of speed and mass
+    #[arg(long)]
+    accept_energy: bool,
+}
+
+const KINDS: &[(&str, SpeedKind, &str)] = &[
+    ("wall", SpeedKind::Wall, "Of one body against a rigid wall"),
+    ("closing", SpeedKind::Closing, "Of two bodies against each other"),
+];
+
+fn stiffness(text: &str) -> Result<f64, String> {
+    STIFFNESS.parse_positive(text).map_err(|e| e.to_string())
+}
+
+impl CurveFile {
+    /// Whether anything is said.
+    pub fn is_asked(&self) -> bool {
+        let read = [
+            &self.from,
+            &self.curve,
+            &self.deflection_column,
+            &self.force_column,
+            &self.time_column,
+        ];
+        let is_number = self.other_mass.is_some() || self.unloading.is_some();
+        self.kind.is_some() || is_number || self.accept_energy || read.iter().any(|o| o.is_some())
+    }
+
+    /// What is said here; the rest is as by default.
+    pub fn settings(&self) -> Settings {
+        let columns = ColumnNames {
+            deflection: self.deflection_column.clone(),
+            force: self.force_column.clone(),
+            time: self.time_column.clone(),
+        };
+        Settings {
+            kind: self.kind,
+            other_mass_kg: self.other_mass,
+            unloading_stiffness_n_per_m: self.unloading,
+            read: ReadOptions {
+                format: self.from.clone(),
+                curve: self.curve.clone(),
+                columns,
+                ..ReadOptions::default()
+            },
+            accept_energy: self.accept_energy,
+            ..Settings::default()
+        }
+    }
+}
+
+/// Wrong usage where the command line lacks something, or says what cannot be.
+pub fn failure(error: ImportError) -> Failure {
+    match error {
+        ImportError::Missing { .. }
+        | ImportError::MassOfWall { .. }
+        | ImportError::OtherForce { .. } => Failure::Usage(error.to_string()),
+        other => other.into(),
+    }
+}

@@ -1,0 +1,25 @@
+//! `crumple db check`: every value read, and held against what follows from it.
+
+use std::path::Path;
+
+use crumple::database::check::{self, Checked};
+use crumple::plural::counted;
+
+use super::{CommandResult, GlobalOptions, Outcome, output};
+
+pub fn run(path: &Path, options: GlobalOptions) -> CommandResult {
+    let checked = check::check(path)?;
+    let Checked { cases, findings } = &checked;
+    if options.json {
+        output::print_json(&checked)?;
+    } else {
+        output::print(|out| {
+            for f in findings {
+                writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
+            }
+            let (cases, found) = (counted(*cases, "case"), counted(findings.len(), "finding"));
+            writeln!(out, "{cases} checked, {found}")
+        })?;
+    }
+    Ok(if findings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}

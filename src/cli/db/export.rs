@@ -1,0 +1,49 @@
+//! `crumple db export`: cases and their samples as CSV tables.
+
+use std::path::PathBuf;
+
+use crumple::curate::{self, Tables};
+use crumple::curve::Case;
+use crumple::database::Database;
+use serde::Serialize;
+
+use super::chosen::Chosen;
+use super::{CommandResult, GlobalOptions, Outcome, output};
+
+/// Cases, and the folder for their tables.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Folder to write to; made if it is not there
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Also write originals.csv, the curves at the solver's rate
+    #[arg(long)]
+    originals: bool,
+}
+
+#[derive(Serialize)]
+struct Document {
+    database: String,
+    cases: usize,
+    files: Vec<String>,
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let database = Database::read(&args.database)?;
+    let selection = args.chosen.selection();
+    let cases: Vec<&Case> = selection.find(&args.database, &database)?;
+    let tables = if args.originals { Tables::WithOriginals } else { Tables::Sampled };
+    let files = curate::write_tables(&cases, &args.output, tables)?;
+    let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    if options.json {
+        let database = args.database.display().to_string();
+        output::print_json(&Document { database, cases: cases.len(), files })?;
+    } else {
+        output::print(|out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
+    }
+    Ok(Outcome::Clean)
+}

@@ -1,0 +1,187 @@
+//! `crumple db merge` and `copy`: databases joined, cases copied between groups and databases.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crumple::curate::{self, Effect, Joined, OnConflict, Target};
+use crumple::database::CasePath;
+use serde::Serialize;
+
+use super::chosen::Chosen;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+
+/// What happens to a case whose name another curve has, and whether anything is written.
+#[derive(clap::Args)]
+struct How {
+    /// Give a new case whose name another curve has another name, such as 36kmh_2
+    #[arg(long, conflicts_with = "replace")]
+    rename: bool,
+    /// Let a new case take the place of another curve of its name
+    #[arg(long)]
+    replace: bool,
+    /// Only say what would be done
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl How {
+    fn on_conflict(&self) -> OnConflict {
+        match (self.rename, self.replace) {
+            (true, _) => OnConflict::Rename,
+            (_, true) => OnConflict::Replace,
+            _ => OnConflict::Refuse,
+        }
+    }
+
+    fn effect(&self) -> Effect {
+        if self.dry_run { Effect::OnlySaid } else { Effect::Written }
+    }
+}
+
+/// Databases, and where they are joined.
+#[derive(clap::Args)]
+pub struct MergeArgs {
+    /// Curve databases; later ones are joined to earlier ones, and all to -o if that is one of them
+    #[arg(required = true, num_args = 2..)]
+    databases: Vec<PathBuf>,
+    /// Database to write: a new file, or one of those that are joined
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    how: How,
+}
+
+pub fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
+    let joined =
+        curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.effect())?;
+    report(&joined, &args.output, args.how.dry_run, options)
+}
+
+/// Cases, and where they are copied.
+#[derive(clap::Args)]
+pub struct CopyArgs {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Database to copy to; made if it is not there [default: the same]
+    #[arg(long, value_name = "DATABASE")]
+    to: Option<PathBuf>,
+    /// Group to copy to [default: the case's own]
+    #[arg(long, value_name = "GROUP")]
+    to_group: Option<String>,
+    #[command(flatten)]
+    how: How,
+}
+
+pub fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
+    if args.to.is_none() && args.to_group.is_none() {
+        return Err(Failure::Usage(
+            "say where the cases are copied: with --to-group, --to (another database) or both"
+                .into(),
+        ));
+    }
+    let selection = args.chosen.some("copied")?;
+    let target = Target { database: args.to.clone(), group: args.to_group.clone() };
+    let (on_conflict, effect) = (args.how.on_conflict(), args.how.effect());
+    let joined = curate::copy(&args.database, &selection, &target, on_conflict, effect)?;
+    let output = args.to.as_deref().unwrap_or(&args.database);
+    report(&joined, output, args.how.dry_run, options)
+}
+
+#[derive(Serialize)]
+struct Document {
+    database: String,
+    added: Vec<From>,
+    equal: Vec<From>,
+    renamed: Vec<From>,
+    replaced: Vec<From>,
+    dry_run: bool,
+}
+
+/// A case with its database, and what it is called now if that is another name.
+#[derive(Serialize)]
+struct From {
+    from: String,
+    case: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    now: Option<String>,
+}
+
+impl From {
+    fn own((path, case): &(PathBuf, CasePath)) -> Self {
+        Self { from: path.display().to_string(), case: case.to_string(), now: None }
+    }
+
+    fn other((path, case, now): &(PathBuf, CasePath, CasePath)) -> Self {
+        let now = Some(now.to_string());
+        Self { from: path.display().to_string(), case: case.to_string(), now }
+    }
+}
+
+fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -> CommandResult {
+    for (from, items) in &joined.not_taken {
+        options.warn(&format!(
+            "{} holds what crumple has not written and does not take along: {items}",
+            from.display()
+        ));
+    }
+    let document = Document {
+        database: path.display().to_string(),
+        added: joined.added.iter().map(From::own).collect(),
+        equal: joined.equal.iter().map(From::other).collect(),
+        renamed: joined.renamed.iter().map(From::other).collect(),
+        replaced: joined.replaced.iter().map(From::own).collect(),
+        dry_run,
+    };
+    if options.json {
+        output::print_json(&document)?;
+    } else {
+        output::print(|out| print(out, &document))?;
+    }
+    Ok(if joined.not_taken.is_empty() { Outcome::Clean } else { Outcome::Warned })
+}
+
+fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+    let Document { database, added, equal, renamed, replaced, dry_run } = document;
+    print_together(out, "added", added)?;
+    let (own, other): (Vec<&From>, Vec<&From>) =
+        equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
+    print_together(out, "there already:", own)?;
+    for (what, cases) in [
+        ("there already:", other),
+        ("renamed", renamed.iter().collect()),
+        ("replaced", replaced.iter().collect()),
+    ] {
+        for From { from, case, now } in cases {
+            let now = now.as_ref().map_or(String::new(), |now| format!(" as {now}"));
+            writeln!(out, "{what} {case}{now} (of {from})")?;
+        }
+    }
+    let did = if *dry_run { "would write" } else { "wrote" };
+    writeln!(
+        out,
+        "{did} {database}: {} added, {} replaced, {} there already",
+        output::counted(added.len() + renamed.len(), "case"),
+        replaced.len(),
+        equal.len()
+    )
+}
+
+/// A line for the cases of each group of each database.
+fn print_together<'a>(
+    out: &mut dyn Write,
+    what: &str,
+    cases: impl IntoIterator<Item = &'a From>,
+) -> io::Result<()> {
+    let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for From { from, case, .. } in cases {
+        let group = case.split('/').next().unwrap_or_default();
+        *groups.entry((from, group)).or_default() += 1;
+    }
+    for ((from, group), count) in groups {
+        writeln!(out, "{what} {} of group {group} (of {from})", output::counted(count, "case"))?;
+    }
+    Ok(())
+}

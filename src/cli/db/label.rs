@@ -1,0 +1,115 @@
+//! `crumple db tag` and `note`: what users say of cases.
+
+use std::path::{Path, PathBuf};
+
+use crumple::curate::{self, Labels, Selection};
+use crumple::database::CasePath;
+use serde::Serialize;
+
+use super::chosen::Chosen;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+
+/// Cases, and the tags that they get and lose.
+#[derive(clap::Args)]
+pub struct TagArgs {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Tag to add; repeated or after commas
+    #[arg(long, value_name = "TAG", value_delimiter = ',')]
+    add: Vec<String>,
+    /// Tag to remove; repeated or after commas
+    #[arg(long, value_name = "TAG", value_delimiter = ',')]
+    remove: Vec<String>,
+    /// Remove all tags that they have
+    #[arg(long, conflicts_with = "remove")]
+    clear: bool,
+}
+
+pub fn tag(args: &TagArgs, options: GlobalOptions) -> CommandResult {
+    let labels = Labels {
+        add_tags: args.add.clone(),
+        remove_tags: args.remove.clone(),
+        clear_tags: args.clear,
+        ..Labels::default()
+    };
+    run(&args.database, &args.chosen.some("tagged")?, &labels, options)
+}
+
+/// Cases, and the notes that they get and lose.
+#[derive(clap::Args)]
+pub struct NoteArgs {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Note to add; may be repeated
+    #[arg(long, value_name = "TEXT")]
+    add: Vec<String>,
+    /// Note to remove, word for word; may be repeated
+    #[arg(long, value_name = "TEXT")]
+    remove: Vec<String>,
+    /// Remove all notes that were added
+    #[arg(long, conflicts_with = "remove")]
+    clear: bool,
+}
+
+pub fn note(args: &NoteArgs, options: GlobalOptions) -> CommandResult {
+    let labels = Labels {
+        add_notes: args.add.clone(),
+        remove_notes: args.remove.clone(),
+        clear_notes: args.clear,
+        ..Labels::default()
+    };
+    run(&args.database, &args.chosen.some("noted on")?, &labels, options)
+}
+
+#[derive(Serialize)]
+struct Document {
+    database: String,
+    cases: Vec<Labelled>,
+}
+
+/// A case with what users say of it now.
+#[derive(Serialize)]
+struct Labelled {
+    group: String,
+    case: String,
+    tags: Vec<String>,
+    user_notes: Vec<String>,
+}
+
+fn run(
+    database: &Path,
+    selection: &Selection,
+    labels: &Labels,
+    options: GlobalOptions,
+) -> CommandResult {
+    if *labels == Labels::default() {
+        return Err(Failure::Usage("say what is changed: with --add, --remove or --clear".into()));
+    }
+    let cases = curate::label(database, selection, labels)?;
+    let database = database.display().to_string();
+    if options.json {
+        let labelled = cases.into_iter().map(|case| Labelled {
+            group: case.group,
+            case: case.name,
+            tags: case.tags,
+            user_notes: case.user_notes,
+        });
+        output::print_json(&Document { database, cases: labelled.collect() })?;
+        return Ok(Outcome::Clean);
+    }
+    output::print(|out| {
+        for case in &cases {
+            let tags = if case.tags.is_empty() { "no tags".into() } else { case.tags.join(", ") };
+            writeln!(out, "{}: {tags}", CasePath::of(case))?;
+            for note in &case.user_notes {
+                writeln!(out, "  note: {note}")?;
+            }
+        }
+        writeln!(out, "wrote {database} ({})", output::counted(cases.len(), "case"))
+    })?;
+    Ok(Outcome::Clean)
+}

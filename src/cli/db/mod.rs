@@ -1,0 +1,151 @@
+//! `crumple db`: look into a curve database, and curate it. One file for commands that belong
+//! together.
+
+mod add;
+mod check;
+mod chosen;
+mod export;
+mod join;
+mod label;
+mod list;
+mod rename;
+mod row;
+mod show;
+
+use std::path::PathBuf;
+
+use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output};
+pub use row::CaseRow;
+
+/// List, show, check, add, rename, join, tag and export cases of a curve database
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple db ls curves.h5
+  crumple db show curves.h5 --group lead-car-wall --case 36kmh
+  crumple db check curves.h5 --strict
+  crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t
+  crumple db rm curves.h5 --group lead-car-wall --speed ..15km/h --dry-run
+  crumple db tag curves.h5 --group lead-car-wall --add reviewed
+  crumple db merge curves.h5 others.h5 -o all.h5
+  crumple db export curves.h5 -o tables
+Commands that change a database lock it; whenever they are stopped, the old or the new file is there.")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// List groups and cases by speed
+    #[command(after_help = "Examples:
+  crumple db ls curves.h5
+  crumple db ls curves.h5 --group lead-car-wall --speed 20km/h..50km/h
+  crumple db ls curves.h5 --tag reviewed --json")]
+    Ls(list::Args),
+    /// Show cases with their curves, or beside each other
+    #[command(after_help = "Examples:
+  crumple db show curves.h5 --group lead-car-wall --case 36kmh
+  crumple db show curves.h5 --json > curves.json
+  crumple db show curves.h5 --compare --case lead-car-wall/36kmh --case lead-car-wall/48kmh
+  crumple db show curves.h5 --compare --tag reviewed
+Differences are shares of the first case. force L1 is sum|F-F0|/sum|F0| of the loading branches, over even
+steps of the deflection up to which both have one.")]
+    Show(show::Args),
+    /// Read every value and hold what is stored against what follows from it
+    ///
+    /// Finds values that are not those that were written, not finite or out of order, holes in
+    /// time, energies, ends of loading and stiffnesses that are not the curve's, two kinds of
+    /// speed in a group, runs that ended while loading, and repeats the warnings of the
+    /// extraction. Indices count from 0, as in HDF5's tools.
+    #[command(after_help = "Examples:
+  crumple db check curves.h5
+  crumple db check curves.h5 --strict    # exit code 3 if there is a finding")]
+    Check {
+        /// Curve database
+        database: PathBuf,
+    },
+    /// Add measured and legacy curves from files
+    ///
+    /// Every file becomes a case of the study "imported", with its path, size and hash. A curve
+    /// without times is given the motion that its own force asks for: its largest deflection is
+    /// taken as the largest crush. All files are read before anything is written.
+    #[command(after_help = "Examples:
+  crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t
+  crumple db add curves.h5 25.json 36.json 50.json --group legacy
+  crumple db add curves.h5 a.k b.k --group pairs --speed 36km/h,54km/h --kind closing --mass 24t --units mm-t-s
+  crumple db add curves.h5 T123.mme --group tests --speed 36km/h --mass 24t
+  crumple db add --list
+Headers of columns name quantity and unit: d_mm, displacement [mm], F_kN, Force [N], time (ms).")]
+    Add(Box<add::Args>),
+    /// Remove cases or whole groups
+    #[command(after_help = "Examples:
+  crumple db rm curves.h5 --group lead-car-wall --case 12kmh
+  crumple db rm curves.h5 --group lead-car-wall --speed ..15km/h --dry-run
+  crumple db rm curves.h5 --tag doubtful
+  crumple db rm curves.h5 --group tests
+A build adds the runs of its study again; take a run out of the study to be rid of its case.")]
+    Rm(rename::RemoveArgs),
+    /// Give a case or a group another name
+    ///
+    /// A build of the study that a renamed case is from goes on with it under its new name.
+    #[command(after_help = "Examples:
+  crumple db rename curves.h5 --group lead-car-wall --to nose
+  crumple db rename curves.h5 --group lead-car-wall --case 36kmh --to reference
+  crumple db rename curves.h5 --case lead-car-wall/36kmh --to reference")]
+    Rename(rename::RenameArgs),
+    /// Join databases
+    ///
+    /// Equal curves of a group are taken once, with the tags and notes of both. Different curves
+    /// of one name are refused unless --rename or --replace says what to do with them.
+    #[command(after_help = "Examples:
+  crumple db merge a.h5 b.h5 -o all.h5
+  crumple db merge a.h5 b.h5 c.h5 -o a.h5 --dry-run    # into the first
+  crumple db merge a.h5 newer.h5 -o a.h5 --replace")]
+    Merge(join::MergeArgs),
+    /// Copy cases to another group or database
+    ///
+    /// A copy in another group is no longer its study's: building that leaves it as it is.
+    #[command(after_help = "Examples:
+  crumple db copy curves.h5 --group lead-car-wall --speed 20km/h..50km/h --to-group inner-speeds
+  crumple db copy curves.h5 --tag reviewed --to approved.h5
+  crumple db copy curves.h5 --case lead-car-wall/36kmh --to b.h5 --to-group nose --dry-run")]
+    Copy(join::CopyArgs),
+    /// Add and remove tags of cases
+    #[command(after_help = "Examples:
+  crumple db tag curves.h5 --group lead-car-wall --add reviewed,nose
+  crumple db tag curves.h5 --case lead-car-wall/72kmh --remove reviewed --add doubtful
+  crumple db ls curves.h5 --tag reviewed
+Tags and notes stay with a case when it is built again.")]
+    Tag(label::TagArgs),
+    /// Add and remove notes on cases
+    #[command(after_help = "Examples:
+  crumple db note curves.h5 --case lead-car-wall/72kmh --add \"the nose rides up from 80 ms on\"
+  crumple db note curves.h5 --case lead-car-wall/72kmh --clear
+Tags and notes stay with a case when it is built again.")]
+    Note(label::NoteArgs),
+    /// Write cases and their samples as CSV tables
+    ///
+    /// cases.csv has a line for each case, curves.csv one for each sample at the common interval,
+    /// with the names of its case. For single curves in other tools' formats: crumple export.
+    #[command(after_help = "Examples:
+  crumple db export curves.h5 -o tables
+  crumple db export curves.h5 --group lead-car-wall --originals -o tables
+docs/databases.md has recipes for pandas, polars, DuckDB, Parquet and xarray.")]
+    Export(export::Args),
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    match &args.command {
+        Command::Ls(args) => list::run(args, options),
+        Command::Show(args) => show::run(args, options),
+        Command::Check { database } => check::run(database, options),
+        Command::Add(args) => add::run(args, options),
+        Command::Rm(args) => rename::remove(args, options),
+        Command::Rename(args) => rename::rename(args, options),
+        Command::Merge(args) => join::merge(args, options),
+        Command::Copy(args) => join::copy(args, options),
+        Command::Tag(args) => label::tag(args, options),
+        Command::Note(args) => label::note(args, options),
+        Command::Export(args) => export::run(args, options),
+    }
+}

@@ -1,0 +1,140 @@
+//! One line of a list of cases, and everything of one case.
+
+use std::collections::BTreeMap;
+
+use crumple::curve::{Case, ForceKind, Origin, Parameter, SourceFile};
+use crumple::unit::{SpeedKind, km_per_h};
+use serde::Serialize;
+
+use super::Failure;
+
+/// What a list says of one case.
+#[derive(Serialize)]
+pub struct CaseRow {
+    pub name: String,
+    speed_m_per_s: f64,
+    speed_kind: SpeedKind,
+    mass_kg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_mass_kg: Option<f64>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    parameters: BTreeMap<String, Parameter>,
+    force_kind: ForceKind,
+    states: usize,
+    #[serde(rename = "peak_force_N")]
+    peak_force_n: f64,
+    max_deflection_m: f64,
+    loading_end: usize,
+    truncated: bool,
+    #[serde(rename = "unloading_stiffness_N_per_m")]
+    unloading_stiffness_n_per_m: Option<f64>,
+    #[serde(rename = "work_J")]
+    work_j: f64,
+    #[serde(rename = "kinetic_energy_J")]
+    kinetic_energy_j: f64,
+    work_over_energy: f64,
+    contact_time_s: f64,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tags: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub user_notes: Vec<String>,
+}
+
+impl CaseRow {
+    pub const HEADING: [&str; 6] = ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
+
+    pub fn of(case: &Case) -> Self {
+        Self {
+            name: case.name.clone(),
+            speed_m_per_s: case.speed.m_per_s,
+            speed_kind: case.speed.kind,
+            mass_kg: case.masses.body_kg,
+            parameters: case.parameters.clone(),
+            other_mass_kg: case.masses.other_kg,
+            force_kind: case.force_kind,
+            states: case.sampled.time_s().len(),
+            peak_force_n: case.peak_force_n(),
+            max_deflection_m: case.max_deflection_m(),
+            loading_end: case.loading_end(),
+            truncated: case.is_truncated(),
+            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            work_j: case.audit.work_j,
+            kinetic_energy_j: case.audit.kinetic_j,
+            work_over_energy: case.audit.ratio(),
+            contact_time_s: case.contact_time_s,
+            notes: case.notes.clone(),
+            warnings: case.warnings.clone(),
+            tags: case.tags.clone(),
+            user_notes: case.user_notes.clone(),
+        }
+    }
+
+    pub fn cells(&self) -> Vec<String> {
+        vec![
+            format!("{} ({})", km_per_h(self.speed_m_per_s), self.speed_kind.name()),
+            format!("{:.2} t", self.mass_kg / 1e3),
+            format!("{:.3} MN", self.peak_force_n / 1e6),
+            format!(
+                "{:.4} m{}",
+                self.max_deflection_m,
+                if self.truncated { " (truncated)" } else { "" }
+            ),
+            format!("{:.4}", self.work_over_energy),
+            self.unloading_stiffness_n_per_m.map_or("-".into(), |k| format!("{:.1} MN/m", k / 1e6)),
+        ]
+    }
+}
+
+/// Everything of one case.
+#[derive(Serialize)]
+pub struct FullCase<'a> {
+    #[serde(flatten)]
+    row: CaseRow,
+    study: &'a str,
+    time_s: &'a [f64],
+    deflection_m: &'a [f64],
+    #[serde(rename = "force_N")]
+    force_n: &'a [f64],
+    closing_speed_m_per_s: &'a [f64],
+    original: Columns<'a>,
+    recipe: serde_json::Value,
+    sources: &'a [SourceFile],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    built_utc: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<&'a Origin>,
+    fingerprint: &'a str,
+}
+
+#[derive(Serialize)]
+struct Columns<'a> {
+    time_s: &'a [f64],
+    deflection_m: &'a [f64],
+    #[serde(rename = "force_N")]
+    force_n: &'a [f64],
+}
+
+impl<'a> FullCase<'a> {
+    pub fn of(case: &'a Case) -> Result<Self, Failure> {
+        Ok(Self {
+            row: CaseRow::of(case),
+            study: &case.study,
+            time_s: case.sampled.time_s(),
+            deflection_m: case.sampled.deflection_m(),
+            force_n: case.sampled.force_n(),
+            closing_speed_m_per_s: &case.closing_speed_m_per_s,
+            original: Columns {
+                time_s: case.original.time_s(),
+                deflection_m: case.original.deflection_m(),
+                force_n: case.original.force_n(),
+            },
+            recipe: serde_json::from_str(&case.recipe)?,
+            sources: &case.sources,
+            built_utc: case.built_utc.as_deref(),
+            origin: case.origin.as_ref(),
+            fingerprint: &case.fingerprint,
+        })
+    }
+}

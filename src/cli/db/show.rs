@@ -1,0 +1,196 @@
+//! `crumple db show`: cases with their curves, or beside each other.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::curate::{self, Difference, Selection};
+use crumple::curve::{Case, Parameter};
+use crumple::database::Database;
+use crumple::unit::km_per_h;
+
+use super::super::braille;
+use super::chosen::Chosen;
+use super::list::{Groups, print_group};
+use super::row::{CaseRow, FullCase};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+
+/// A database, and which of its cases are shown how.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Hold the cases against the first of them, in the order of --case
+    #[arg(long)]
+    compare: bool,
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    let selection = args.chosen.selection();
+    let alone = |selection: &Selection| {
+        let Selection { groups, cases, speed, tags } = selection;
+        let is_one = cases.len() == 1 && groups.len() <= 1 && speed.is_none() && tags.is_empty();
+        is_one.then(|| (groups.first().cloned(), cases[0].clone()))
+    };
+    if let Some((group, name)) = alone(&selection).filter(|_| !args.compare) {
+        // A name of one group is read by itself.
+        let (group, name) = match (group, name.split_once('/')) {
+            (None, Some((group, name))) => (Some(group.to_string()), name.to_string()),
+            (group, _) => (group, name),
+        };
+        let case = Database::read_case(&args.database, group.as_deref(), &name)?;
+        return show(&[&case], options);
+    }
+    let database = Database::read(&args.database)?;
+    if args.compare {
+        return compare(&args.in_order(&selection, &database)?, options);
+    }
+    let cases: Vec<&Case> = match selection.is_all() {
+        true => database.all().collect(),
+        false => selection.find(&args.database, &database)?,
+    };
+    show(&cases, options)
+}
+
+impl Args {
+    /// The chosen cases, those that are named in the order of their names.
+    fn in_order<'a>(
+        &self,
+        selection: &Selection,
+        database: &'a Database,
+    ) -> Result<Vec<&'a Case>, Failure> {
+        if selection.cases.is_empty() {
+            return Ok(selection.find(&self.database, database)?);
+        }
+        let mut cases: Vec<&Case> = Vec::new();
+        for name in &selection.cases {
+            let one = Selection { cases: vec![name.clone()], ..selection.clone() };
+            cases.extend(one.find(&self.database, database)?);
+        }
+        Ok(cases)
+    }
+}
+
+fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
+    if options.json {
+        let mut groups: BTreeMap<String, Vec<FullCase<'_>>> = BTreeMap::new();
+        for case in cases {
+            groups.entry(case.group.clone()).or_default().push(FullCase::of(case)?);
+        }
+        output::print_json(&Groups { groups, warnings: Vec::new() })?;
+        return Ok(Outcome::Clean);
+    }
+    output::print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
+    Ok(Outcome::Clean)
+}
+
+fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
+    print_group(out, &case.group, &[CaseRow::of(case)])?;
+    writeln!(out)?;
+    if let Some(built) = &case.built_utc {
+        writeln!(out, "built {built}")?;
+    }
+    for source in &case.sources {
+        writeln!(
+            out,
+            "from {} ({} bytes, blake3 {}…, {} {})",
+            source.absolute_path.as_ref().unwrap_or(&source.path),
+            source.size_bytes,
+            &source.blake3.get(..12).unwrap_or(&source.blake3),
+            source.solver.as_deref().unwrap_or("unknown solver"),
+            source.version.as_deref().unwrap_or("")
+        )?;
+    }
+    for (name, value) in &case.parameters {
+        match value {
+            Parameter::Number(value) => writeln!(out, "parameter: {name} = {value}")?,
+            Parameter::Category(value) => writeln!(out, "parameter: {name} = {value}")?,
+        }
+    }
+    for note in &case.notes {
+        writeln!(out, "note: {note}")?;
+    }
+    for warning in &case.warnings {
+        writeln!(out, "warning: {warning}")?;
+    }
+    for note in &case.user_notes {
+        writeln!(out, "user's note: {note}")?;
+    }
+    writeln!(out, "\nforce [MN] over deflection [m]")?;
+    let (d, f) = (case.original.deflection_m(), case.original.force_n());
+    braille::curve(out, d, f)?;
+    writeln!(out)
+}
+
+fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
+    if cases.len() < 2 {
+        return Err(Failure::Usage(
+            "--compare needs at least two cases: name each with --case, or choose them with --group, --speed or --tag".into(),
+        ));
+    }
+    let Some(comparison) = curate::compare(cases)? else { return Ok(Outcome::Clean) };
+    if options.json {
+        output::print_json(&comparison)?;
+        return Ok(Outcome::Clean);
+    }
+    let is_one_group = cases.iter().all(|case| case.group == cases[0].group);
+    let name = |case: &Difference| match is_one_group {
+        true => case.case.clone(),
+        false => format!("{}/{}", case.group, case.case),
+    };
+    let names: Vec<String> = comparison.cases.iter().map(name).collect();
+    let heading: Vec<&str> = [if is_one_group { cases[0].group.as_str() } else { "" }]
+        .into_iter()
+        .chain(names.iter().map(String::as_str))
+        .collect();
+    let rows: Vec<Vec<String>> = QUANTITIES
+        .iter()
+        .map(|(name, cell)| {
+            let cells = comparison.cases.iter().enumerate().map(|(k, case)| cell(case, k == 0));
+            [name.to_string()].into_iter().chain(cells).collect()
+        })
+        .collect();
+    output::print(|out| output::table(out, &heading, &rows))?;
+    Ok(Outcome::Clean)
+}
+
+/// A quantity's name, and its cell for a case; the reference has no difference.
+type Quantity = (&'static str, fn(&Difference, bool) -> String);
+
+const QUANTITIES: [Quantity; 7] = [
+    ("speed", |c, first| {
+        let speed = format!("{} ({})", km_per_h(c.speed_m_per_s), c.speed_kind.name());
+        with_difference(speed, c.speed_difference, first)
+    }),
+    ("mass", |c, first| {
+        with_difference(format!("{:.2} t", c.mass_kg / 1e3), c.mass_difference, first)
+    }),
+    ("max crush", |c, first| {
+        let crush = format!("{:.4} m", c.max_deflection_m);
+        with_difference(crush, c.max_deflection_difference, first)
+    }),
+    ("energy", |c, first| {
+        with_difference(format!("{:.4} MJ", c.work_j / 1e6), c.work_difference, first)
+    }),
+    ("peak force", |c, first| {
+        let force = format!("{:.3} MN", c.peak_force_n / 1e6);
+        with_difference(force, c.peak_force_difference, first)
+    }),
+    ("force L1", |c, first| match c.force_l1.filter(|_| !first) {
+        Some(l1) => format!("{:.1} %", l1 * 100.0),
+        None => "-".into(),
+    }),
+    ("up to", |c, first| match first {
+        true => "-".into(),
+        false => format!("{:.4} m", c.common_deflection_m),
+    }),
+];
+
+fn with_difference(value: String, difference: f64, is_reference: bool) -> String {
+    match is_reference {
+        true => value,
+        false => format!("{value} {:>+7.1} %", difference * 100.0),
+    }
+}

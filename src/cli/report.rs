@@ -1,0 +1,106 @@
+//! `crumple report`: one HTML page about a database and its runs.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use crumple::database::Database;
+use crumple::file::write_whole;
+use crumple::report::{MethodSpeeds, ReportSettings, report};
+use serde::Serialize;
+
+use super::arguments::{self, one_of};
+use super::output;
+use super::progress::Bar;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input, keep_inputs};
+
+/// Write one self-contained HTML page: curves, validation, predictions, methods, train results
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  crumple report curves.h5 -o report.html
+  crumple report curves.h5 scenario.toml train-set.toml -o report.html
+  crumple report curves.h5 --group lead-car-wall --speed 50km/h --nsdm-seeds 3 -o report.html
+The page needs no network and no other file. Scenarios are run; one with a [reference] is held against FE.")]
+pub struct Args {
+    /// Curve database
+    database: PathBuf,
+    /// Scenarios (TOML) whose runs are shown
+    scenarios: Vec<PathBuf>,
+    /// Page to write; \"-\" is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Group to show; may be repeated (default: all)
+    #[arg(long)]
+    group: Vec<String>,
+    /// Speed of the predicted curves (default: the middle of each group's widest gap)
+    #[arg(long, value_parser = arguments::speed)]
+    speed: Option<f64>,
+    /// Title of the page (default: the database's name)
+    #[arg(long)]
+    title: Option<String>,
+    /// Left-out speeds at which the methods are compared, half a second each
+    #[arg(long, value_parser = one_of(METHODS), default_value = "worst")]
+    methods: MethodSpeeds,
+    /// Fits of the spring and damper (NSDM) for the table of methods, half a second each
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    nsdm_seeds: u64,
+    /// Seed of the forests
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+const METHODS: &[(&str, MethodSpeeds, &str)] = &[
+    ("none", MethodSpeeds::None, "Methods are not compared"),
+    ("worst", MethodSpeeds::Worst, "Where the chosen model has its largest error"),
+    ("all", MethodSpeeds::All, "Every inner speed"),
+];
+
+#[derive(Serialize)]
+struct Document {
+    file: PathBuf,
+    bytes: usize,
+    warnings: usize,
+}
+
+pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    keep_input(&args.database, &args.output)?;
+    args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
+    if is_stdout(&args.output) && options.json {
+        return Err(Failure::Usage("standard output takes one of: \"-o -\", or --json".into()));
+    }
+    let database = Database::read(&args.database)?;
+    let settings = ReportSettings {
+        title: args.title.clone(),
+        groups: args.group.clone(),
+        speed_m_per_s: args.speed,
+        methods: args.methods,
+        nsdm_seeds: args.nsdm_seeds,
+        seed: args.seed,
+    };
+    let bar = Bar::new(options, "reporting");
+    let made =
+        report(&args.database, &database, &args.scenarios, &[], &settings, |step| bar.step(step));
+    bar.end();
+    let (page, warnings) = made?;
+    if is_stdout(&args.output) {
+        output::print_data(|out| out.write_all(page.as_bytes()))?;
+        return Ok(outcome(warnings));
+    }
+    write_whole(&args.output, page.as_bytes())?;
+    let document = Document { file: args.output.clone(), bytes: page.len(), warnings };
+    if options.json {
+        output::print_json(&document)?;
+    } else {
+        output::print(|out| print(out, &document))?;
+    }
+    Ok(outcome(warnings))
+}
+
+fn outcome(warnings: usize) -> Outcome {
+    if warnings == 0 { Outcome::Clean } else { Outcome::Warned }
+}
+
+fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+    let Document { file, bytes, warnings } = document;
+    let kilobytes = bytes.div_ceil(1000);
+    writeln!(out, "wrote {} ({kilobytes} kB); warnings in it: {warnings}", file.display())
+}

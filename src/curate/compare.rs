@@ -1,0 +1,101 @@
+//! Cases beside each other: what differs from the first of them.
+
+use serde::Serialize;
+
+use crate::curve::{Case, Envelope, EnvelopeError, ForceKind};
+use crate::dataset::grid;
+use crate::signal::l1_ratio;
+use crate::unit::SpeedKind;
+
+/// Cases beside each other.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The case that the others are held against.
+    pub reference: String,
+    /// One entry per case, the reference first.
+    pub cases: Vec<Difference>,
+}
+
+/// One case, and its differences from the reference; those of values are shares of the reference's.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// Group of the case.
+    pub group: String,
+    /// Name of the case.
+    pub case: String,
+    /// Impact speed, in m/s.
+    pub speed_m_per_s: f64,
+    /// What it is measured against.
+    pub speed_kind: SpeedKind,
+    /// Which force the curve is.
+    pub force_kind: ForceKind,
+    /// Mass of the body, in kg.
+    pub mass_kg: f64,
+    /// Largest deflection, in m.
+    pub max_deflection_m: f64,
+    /// ∫F dd up to it, in J.
+    #[serde(rename = "work_J")]
+    pub work_j: f64,
+    /// Largest force, in N.
+    #[serde(rename = "peak_force_N")]
+    pub peak_force_n: f64,
+    /// Difference of the speed.
+    pub speed_difference: f64,
+    /// Difference of the mass.
+    pub mass_difference: f64,
+    /// Difference of the largest deflection.
+    pub max_deflection_difference: f64,
+    /// Difference of the work.
+    pub work_difference: f64,
+    /// Difference of the largest force.
+    pub peak_force_difference: f64,
+    /// Deflection up to which both have a loading branch, in m.
+    pub common_deflection_m: f64,
+    /// Σ|F − F₀| / Σ|F₀| of the loading branches over even steps of that deflection; `None` if the
+    /// reference has no force there.
+    pub force_l1: Option<f64>,
+}
+
+/// Steps of the common deflection at least.
+const STEPS: usize = 400;
+
+/// Holds cases against the first of them.
+///
+/// # Errors
+/// [`EnvelopeError`] if a case has no loading branch.
+pub fn compare(cases: &[&Case]) -> Result<Option<Comparison>, EnvelopeError> {
+    let Some(first) = cases.first() else { return Ok(None) };
+    let reference = first.loading()?.envelope;
+    let differences: Result<Vec<Difference>, EnvelopeError> = cases
+        .iter()
+        .map(|case| Ok(difference(first, &reference, case, case.loading()?.envelope)))
+        .collect();
+    let reference = format!("{}/{}", first.group, first.name);
+    Ok(Some(Comparison { reference, cases: differences? }))
+}
+
+fn difference(first: &Case, reference: &Envelope, case: &Case, envelope: Envelope) -> Difference {
+    let share = |value: fn(&Case) -> f64| value(case) / value(first) - 1.0;
+    let common_deflection_m = reference.end_m().min(envelope.end_m());
+    let along = grid(common_deflection_m, STEPS);
+    let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
+    let force_l1 = l1_ratio(&at(reference), &at(&envelope));
+    Difference {
+        group: case.group.clone(),
+        case: case.name.clone(),
+        speed_m_per_s: case.speed.m_per_s,
+        speed_kind: case.speed.kind,
+        force_kind: case.force_kind,
+        mass_kg: case.masses.body_kg,
+        max_deflection_m: case.max_deflection_m(),
+        work_j: case.audit.work_j,
+        peak_force_n: case.peak_force_n(),
+        speed_difference: share(|c| c.speed.m_per_s),
+        mass_difference: share(|c| c.masses.body_kg),
+        max_deflection_difference: share(Case::max_deflection_m),
+        work_difference: share(|c| c.audit.work_j),
+        peak_force_difference: share(Case::peak_force_n),
+        common_deflection_m,
+        force_l1: Some(force_l1).filter(|l1| l1.is_finite()),
+    }
+}

@@ -1,0 +1,129 @@
+//! Tags and notes of cases.
+
+use std::collections::{BTreeSet, HashSet};
+use std::path::Path;
+
+use super::{CurateError, Effect, Selection, write};
+use crate::curve::Case;
+use crate::database::{CasePath, Database};
+use crate::file::WriterLock;
+
+/// What is added to cases and taken from them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Labels {
+    /// Tags that they get.
+    pub add_tags: Vec<String>,
+    /// Tags that they lose.
+    pub remove_tags: Vec<String>,
+    /// Whether they lose all tags that they have.
+    pub clear_tags: bool,
+    /// Notes that they get, behind those that they have.
+    pub add_notes: Vec<String>,
+    /// Notes that they lose.
+    pub remove_notes: Vec<String>,
+    /// Whether they lose all notes that they have.
+    pub clear_notes: bool,
+}
+
+/// Longest tag and note, in characters.
+const MAX_TAG: usize = 100;
+const MAX_NOTE: usize = 10_000;
+
+impl Labels {
+    fn check(&self) -> Result<(), CurateError> {
+        for tag in &self.add_tags {
+            let why = if tag.trim().is_empty() || tag.trim() != tag {
+                "it is blank, or has blanks around it"
+            } else if tag.contains(|c: char| c.is_control() || [',', ';'].contains(&c)) {
+                "it may not contain \",\", \";\" or control characters"
+            } else if tag.chars().count() > MAX_TAG {
+                "it has more than 100 characters; say it in a note"
+            } else {
+                continue;
+            };
+            let text = tag.chars().take(MAX_TAG).collect();
+            return Err(CurateError::Label { what: "tag", text, why });
+        }
+        for note in &self.add_notes {
+            let why = if note.trim().is_empty() {
+                "it is blank"
+            } else if note.contains(|c: char| c.is_control() && c != '\n') {
+                "it may not contain control characters"
+            } else if note.chars().count() > MAX_NOTE {
+                "it has more than 10000 characters"
+            } else {
+                continue;
+            };
+            let text = note.chars().take(MAX_TAG).collect();
+            return Err(CurateError::Label { what: "note", text, why });
+        }
+        Ok(())
+    }
+
+    /// Whether every tag and note that is to be taken away is that of a case.
+    fn check_removed(&self, path: &Path, cases: &[&Case]) -> Result<(), CurateError> {
+        type Texts = fn(&Case) -> &Vec<String>;
+        let of_tags: (&'static str, &[String], Texts) = ("tag", &self.remove_tags, |c| &c.tags);
+        let of_notes: (&'static str, &[String], Texts) =
+            ("note", &self.remove_notes, |c| &c.user_notes);
+        for (what, removed, texts) in [of_tags, of_notes] {
+            let there: BTreeSet<&String> = cases.iter().flat_map(|case| texts(case)).collect();
+            if let Some(text) = removed.iter().find(|text| !there.contains(text)) {
+                let known: Vec<String> = there.iter().map(|text| format!("\"{text}\"")).collect();
+                return Err(CurateError::NoLabel {
+                    path: path.into(),
+                    count: cases.len(),
+                    what,
+                    text: text.clone(),
+                    known: if known.is_empty() { "none".into() } else { known.join(", ") },
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn apply(&self, case: &mut Case) {
+        case.tags.retain(|tag| !self.clear_tags && !self.remove_tags.contains(tag));
+        case.tags.extend(self.add_tags.iter().cloned());
+        case.tags.sort();
+        case.tags.dedup();
+        case.user_notes.retain(|note| !self.clear_notes && !self.remove_notes.contains(note));
+        for note in &self.add_notes {
+            if !case.user_notes.contains(note) {
+                case.user_notes.push(note.clone());
+            }
+        }
+    }
+}
+
+/// Changes tags and notes of the chosen cases of the database at `path`; returns these as they are
+/// now. Where nothing changes the file is not written.
+///
+/// # Errors
+/// [`CurateError`] if nothing is chosen, a text is no tag or note, or one that is to be taken away
+/// is not there.
+pub fn label(
+    path: &Path,
+    selection: &Selection,
+    labels: &Labels,
+) -> Result<Vec<Case>, CurateError> {
+    labels.check()?;
+    let _lock = WriterLock::take(path)?;
+    let mut database = Database::read(path)?;
+    let chosen = selection.find(path, &database)?;
+    labels.check_removed(path, &chosen)?;
+    let chosen: HashSet<CasePath> = chosen.into_iter().map(CasePath::of).collect();
+    let (mut changed, mut cases) = (false, Vec::new());
+    database.change(|case| {
+        if chosen.contains(&CasePath::of(case)) {
+            let before = (case.tags.clone(), case.user_notes.clone());
+            labels.apply(case);
+            changed |= before != (case.tags.clone(), case.user_notes.clone());
+            cases.push(case.clone());
+        }
+    });
+    if changed {
+        write(&database, path, Effect::Written)?;
+    }
+    Ok(cases)
+}

@@ -1,0 +1,78 @@
+//! Removing cases, and giving cases and groups other names.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::{CurateError, Effect, Selection, write};
+use crate::curve::Case;
+use crate::database::{CasePath, Database, names};
+use crate::file::WriterLock;
+
+/// Removes the chosen cases from the database at `path`; returns them.
+///
+/// # Errors
+/// [`CurateError`] if nothing is chosen, or the database cannot be written.
+pub fn remove(
+    path: &Path,
+    selection: &Selection,
+    effect: Effect,
+) -> Result<Vec<Case>, CurateError> {
+    let _lock = WriterLock::take(path)?;
+    let mut database = Database::read(path)?;
+    let chosen: Vec<Case> = selection.find(path, &database)?.into_iter().cloned().collect();
+    database.remove(&chosen.iter().map(CasePath::of).collect());
+    write(&database, path, effect)?;
+    Ok(chosen)
+}
+
+/// Gives the one chosen case another name in its group; returns both.
+///
+/// # Errors
+/// [`CurateError`] if not just one is chosen, or the name is none or another case's.
+pub fn rename_case(
+    path: &Path,
+    group: Option<&str>,
+    case: &str,
+    name: &str,
+) -> Result<(CasePath, CasePath), CurateError> {
+    check("case", name)?;
+    let _lock = WriterLock::take(path)?;
+    let mut database = Database::read(path)?;
+    let groups = group.map(String::from).into_iter().collect();
+    let selection = Selection { groups, cases: vec![case.into()], ..Selection::default() };
+    let from = CasePath::of(selection.find(path, &database)?[0]);
+    let to = CasePath { group: from.group.clone(), name: name.into() };
+    if from != to {
+        database.relocate(&BTreeMap::from([(from.clone(), to.clone())]))?;
+        database.write(path)?;
+    }
+    Ok((from, to))
+}
+
+/// Gives a group another name; returns its cases as they are called now.
+///
+/// # Errors
+/// [`CurateError`] if there is no such group, or the name is none or another group's.
+pub fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<CasePath>, CurateError> {
+    check("group", name)?;
+    let _lock = WriterLock::take(path)?;
+    let mut database = Database::read(path)?;
+    let cases: Vec<CasePath> = database.group(path, group)?.iter().map(CasePath::of).collect();
+    if group == name {
+        return Ok(cases);
+    }
+    if !database.cases(name).is_empty() {
+        return Err(CurateError::GroupTaken { path: path.into(), group: name.into() });
+    }
+    let moved = |case: &CasePath| CasePath { group: name.into(), name: case.name.clone() };
+    let moves: BTreeMap<CasePath, CasePath> =
+        cases.iter().map(|case| (case.clone(), moved(case))).collect();
+    database.relocate(&moves)?;
+    database.write(path)?;
+    Ok(moves.into_values().collect())
+}
+
+/// Whether a group or case may have this name.
+pub(super) fn check(what: &'static str, name: &str) -> Result<(), CurateError> {
+    names::check(name).map_err(|why| CurateError::Name { what, name: names::shown(name), why })
+}

@@ -1,0 +1,227 @@
+//! Choosing cases of a database: by group, name, speed and tag.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use super::CurateError;
+use crate::curve::Case;
+use crate::database::{CasePath, Database};
+use crate::dataset::is_same_speed;
+use crate::unit::{SPEED, UnitError, km_per_h};
+
+/// Which cases; every part that is given narrows the choice, and each value of a part widens it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selection {
+    /// Groups; all if empty.
+    pub groups: Vec<String>,
+    /// Names of cases, or `GROUP/NAME`; all if empty.
+    pub cases: Vec<String>,
+    /// Impact speeds.
+    pub speed: Option<SpeedRange>,
+    /// Cases that have one of these; all if empty.
+    pub tags: Vec<String>,
+}
+
+/// Speeds from one to another, both among them, in m/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedRange {
+    /// The lowest; 0 if any is.
+    pub low_m_per_s: f64,
+    /// The highest; infinite if any is.
+    pub high_m_per_s: f64,
+}
+
+/// Why a text is no range of speeds.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SpeedRangeError {
+    /// One of its ends is no speed.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+    /// It has no end.
+    #[error("\"{text}\" is no range of speeds: write 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h")]
+    NoEnd {
+        /// As given.
+        text: String,
+    },
+    /// It ends below its beginning.
+    #[error("\"{text}\" ends below its beginning: write the lower speed first")]
+    Order {
+        /// As given.
+        text: String,
+    },
+}
+
+impl FromStr for SpeedRange {
+    type Err = SpeedRangeError;
+
+    /// Reads `20km/h..40km/h`, an end of which may be left out, or one speed.
+    fn from_str(text: &str) -> Result<Self, SpeedRangeError> {
+        let Some((low, high)) = text.split_once("..") else {
+            let speed = SPEED.parse_positive(text)?;
+            return Ok(Self { low_m_per_s: speed, high_m_per_s: speed });
+        };
+        let end = |end: &str, open: f64| match end.trim() {
+            "" => Ok(open),
+            end => SPEED.parse_not_negative(end),
+        };
+        if low.trim().is_empty() && high.trim().is_empty() {
+            return Err(SpeedRangeError::NoEnd { text: text.into() });
+        }
+        let (low_m_per_s, high_m_per_s) = (end(low, 0.0)?, end(high, f64::INFINITY)?);
+        match low_m_per_s <= high_m_per_s {
+            true => Ok(Self { low_m_per_s, high_m_per_s }),
+            false => Err(SpeedRangeError::Order { text: text.into() }),
+        }
+    }
+}
+
+impl fmt::Display for SpeedRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (low, high) = (self.low_m_per_s, self.high_m_per_s);
+        match (low > 0.0, high.is_finite()) {
+            _ if low == high => write!(f, "{}", km_per_h(low)),
+            (true, true) => write!(f, "{} to {}", km_per_h(low), km_per_h(high)),
+            (true, false) => write!(f, "at least {}", km_per_h(low)),
+            _ => write!(f, "at most {}", km_per_h(high)),
+        }
+    }
+}
+
+impl SpeedRange {
+    fn holds(&self, speed_m_per_s: f64) -> bool {
+        let is_end = |end: f64| end > 0.0 && is_same_speed(speed_m_per_s, end);
+        (self.low_m_per_s..=self.high_m_per_s).contains(&speed_m_per_s)
+            || is_end(self.low_m_per_s)
+            || is_end(self.high_m_per_s)
+    }
+}
+
+/// Cases that a message lists.
+const LISTED: usize = 20;
+
+impl Selection {
+    /// Whether it chooses nothing by itself: all cases.
+    pub fn is_all(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The chosen cases, by group, speed and name; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`CurateError`] for a group or name that is not there or is in several groups, and if
+    /// nothing is chosen; it lists what there is.
+    pub fn find<'a>(
+        &self,
+        path: &Path,
+        database: &'a Database,
+    ) -> Result<Vec<&'a Case>, CurateError> {
+        for group in &self.groups {
+            database.group(path, group)?;
+        }
+        let of_groups: Vec<&Case> = database
+            .all()
+            .filter(|case| self.groups.is_empty() || self.groups.contains(&case.group))
+            .collect();
+        let mut named: Vec<&Case> = Vec::new();
+        for name in &self.cases {
+            named.push(one_named(path, name, &of_groups)?);
+        }
+        let is_chosen = |case: &&Case| {
+            (self.cases.is_empty() || named.iter().any(|c| CasePath::of(c) == CasePath::of(case)))
+                && self.speed.is_none_or(|range| range.holds(case.speed.m_per_s))
+                && (self.tags.is_empty() || self.tags.iter().any(|tag| case.tags.contains(tag)))
+        };
+        let chosen: Vec<&Case> = of_groups.iter().copied().filter(is_chosen).collect();
+        match chosen.is_empty() {
+            false => Ok(chosen),
+            true => Err(CurateError::NoMatch {
+                path: path.into(),
+                asked: self.asked(),
+                known: listed(&of_groups),
+            }),
+        }
+    }
+
+    /// What is asked of a case, in words that follow "no case".
+    fn asked(&self) -> String {
+        let mut asked = Vec::new();
+        if !self.cases.is_empty() {
+            asked.push(format!("among {}", self.cases.join(", ")));
+        }
+        if let Some(range) = self.speed {
+            asked.push(format!("has a speed of {range}"));
+        }
+        if !self.tags.is_empty() {
+            let tags: Vec<String> = self.tags.iter().map(|tag| format!("\"{tag}\"")).collect();
+            asked.push(format!("has the tag {}", tags.join(" or ")));
+        }
+        match asked.is_empty() {
+            true => "is there".into(),
+            false => asked.join(" and "),
+        }
+    }
+}
+
+/// The case of this name, or of this group and name.
+fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case, CurateError> {
+    let is_named = |case: &&&Case| match name.split_once('/') {
+        Some((group, name)) => case.group == group && case.name == name,
+        None => case.name == name,
+    };
+    let found: Vec<&Case> = cases.iter().filter(is_named).copied().collect();
+    match found[..] {
+        [case] => Ok(case),
+        [] => {
+            Err(CurateError::NoCase { path: path.into(), name: name.into(), known: listed(cases) })
+        }
+        _ => Err(CurateError::WhichCase {
+            path: path.into(),
+            name: name.into(),
+            known: found
+                .iter()
+                .map(|c| CasePath::of(c).to_string())
+                .collect::<Vec<_>>()
+                .join(" or "),
+        }),
+    }
+}
+
+/// Cases with their speeds and tags, for a message.
+fn listed(cases: &[&Case]) -> String {
+    let shown = |case: &&Case| {
+        let tags = match case.tags.is_empty() {
+            true => String::new(),
+            false => format!(", {}", case.tags.join(", ")),
+        };
+        format!("{} ({}{tags})", CasePath::of(case), km_per_h(case.speed.m_per_s))
+    };
+    let names: Vec<String> = cases.iter().take(LISTED).map(shown).collect();
+    match cases.len() - names.len() {
+        0 if names.is_empty() => "none".into(),
+        0 => names.join(", "),
+        more => format!("{} and {more} more", names.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_speeds() {
+        let range = |text: &str| text.parse::<SpeedRange>();
+        let holds = |text: &str, km_per_h: f64| range(text).unwrap().holds(km_per_h / 3.6);
+        assert!(holds("20km/h..40km/h", 20.0) && holds("20km/h..40km/h", 40.0));
+        assert!(!holds("20km/h..40km/h", 19.9) && !holds("20km/h..40km/h", 40.1));
+        assert!(holds("..40km/h", 1.0) && holds("10 m/s ..", 500.0));
+        assert!(holds("36km/h", 36.01) && !holds("36km/h", 36.1), "as one speed counts");
+        let said = |text: &str| range(text).unwrap_err().to_string();
+        assert_eq!(
+            said("40km/h..20km/h"),
+            "\"40km/h..20km/h\" ends below its beginning: write the lower speed first"
+        );
+        assert!(said("..").contains("write 20km/h..40km/h"), "{}", said(".."));
+        assert!(said("20..40").contains("speed \"20\" has no unit"), "{}", said("20..40"));
+    }
+}

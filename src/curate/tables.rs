@@ -1,0 +1,182 @@
+//! Cases as CSV tables: one of the cases, and long ones of the samples of their curves.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::CurateError;
+use crate::curve::body::body_force_n;
+use crate::curve::{Case, Parameter};
+use crate::file::{WriteError, write_at};
+
+/// Which tables are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tables {
+    /// `cases.csv` and `curves.csv`, the curves at their common interval.
+    Sampled,
+    /// Also `originals.csv`, the curves at the solver's rate.
+    WithOriginals,
+}
+
+/// Writes the tables of cases into the folder at `path`, which is made if it is not there; returns
+/// their paths. Numbers have as many digits as they need to be read back the same; what a case
+/// does not have is empty.
+///
+/// # Errors
+/// [`WriteError`] if the folder cannot be made or a table not be written.
+pub fn write_tables(
+    cases: &[&Case],
+    path: &Path,
+    tables: Tables,
+) -> Result<Vec<PathBuf>, CurateError> {
+    std::fs::create_dir_all(path).map_err(|e| WriteError::new(path, e))?;
+    let mut written = Vec::new();
+    let mut table = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
+        let path = path.join(name);
+        write_at(&path, |file: &File| {
+            let mut out = BufWriter::new(file);
+            fill(&mut out)?;
+            out.flush()?;
+            file.sync_all().map(Some)
+        })?;
+        written.push(path);
+        Ok::<(), WriteError>(())
+    };
+    table("cases.csv", &|out| write_cases(out, cases))?;
+    table("curves.csv", &|out| write_sampled(out, cases))?;
+    if tables == Tables::WithOriginals {
+        table("originals.csv", &|out| write_originals(out, cases))?;
+    }
+    Ok(written)
+}
+
+/// Columns of every case; its parameters follow, each as `parameter_NAME`.
+const COLUMNS: [&str; 25] = [
+    "group",
+    "case",
+    "study",
+    "speed_m_per_s",
+    "speed_kind",
+    "mass_kg",
+    "other_mass_kg",
+    "force_kind",
+    "max_deflection_m",
+    "peak_force_N",
+    "work_J",
+    "kinetic_energy_J",
+    "work_over_energy",
+    "unloading_stiffness_N_per_m",
+    "truncated",
+    "contact_time_s",
+    "solver_wall_time_s",
+    "states",
+    "tags",
+    "user_notes",
+    "warnings",
+    "sources",
+    "solver",
+    "built_utc",
+    "fingerprint",
+];
+
+fn write_cases(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
+    let parameters: BTreeSet<&String> = cases.iter().flat_map(|c| c.parameters.keys()).collect();
+    let mut table = csv::Writer::from_writer(out);
+    let named = parameters.iter().map(|name| format!("parameter_{name}"));
+    table.write_record(COLUMNS.iter().map(ToString::to_string).chain(named))?;
+    for case in cases {
+        let values = parameters.iter().map(|name| match case.parameters.get(*name) {
+            Some(Parameter::Number(number)) => shown(*number),
+            Some(Parameter::Category(category)) => category.clone(),
+            None => String::new(),
+        });
+        table.write_record(row(case).into_iter().chain(values))?;
+    }
+    table.flush()
+}
+
+fn row(case: &Case) -> [String; COLUMNS.len()] {
+    let optional = |value: Option<f64>| value.map_or(String::new(), shown);
+    let sources = case.sources.iter().map(|s| s.absolute_path.clone().unwrap_or(s.path.clone()));
+    let solver = case.sources.iter().find_map(|source| {
+        Some([source.solver.as_deref()?, source.version.as_deref().unwrap_or("")].join(" "))
+    });
+    [
+        case.group.clone(),
+        case.name.clone(),
+        case.study.clone(),
+        shown(case.speed.m_per_s),
+        case.speed.kind.name().into(),
+        shown(case.masses.body_kg),
+        optional(case.masses.other_kg),
+        case.force_kind.name().into(),
+        shown(case.max_deflection_m()),
+        shown(case.peak_force_n()),
+        shown(case.audit.work_j),
+        shown(case.audit.kinetic_j),
+        shown(case.audit.ratio()),
+        optional(case.unloading_stiffness_n_per_m),
+        case.is_truncated().to_string(),
+        shown(case.contact_time_s),
+        optional(case.solver_wall_time_s),
+        case.sampled.time_s().len().to_string(),
+        case.tags.join(";"),
+        case.user_notes.join("\n"),
+        case.warnings.join("\n"),
+        sources.collect::<Vec<_>>().join(";"),
+        solver.map(|s| s.trim().into()).unwrap_or_default(),
+        case.built_utc.clone().unwrap_or_default(),
+        case.fingerprint.clone(),
+    ]
+}
+
+fn write_sampled(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
+    let heading = "group,case,time_s,deflection_m,force_N,body_force_N,closing_speed_m_per_s";
+    writeln!(out, "{heading}")?;
+    for case in cases {
+        let body = body_force_n(case);
+        let curve = &case.sampled;
+        let columns = [
+            curve.time_s(),
+            curve.deflection_m(),
+            curve.force_n(),
+            &body,
+            &case.closing_speed_m_per_s,
+        ];
+        write_samples(out, case, &columns)?;
+    }
+    Ok(())
+}
+
+fn write_originals(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
+    writeln!(out, "group,case,time_s,deflection_m,force_N")?;
+    for case in cases {
+        let curve = &case.original;
+        write_samples(out, case, &[curve.time_s(), curve.deflection_m(), curve.force_n()])?;
+    }
+    Ok(())
+}
+
+/// A line for each sample of a case: its names, which may hold commas and quotes, then numbers.
+fn write_samples(out: &mut dyn Write, case: &Case, columns: &[&[f64]]) -> io::Result<()> {
+    let mut names = csv::Writer::from_writer(Vec::new());
+    names.write_record([&case.group, &case.name])?;
+    let names = names.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
+    let names = names.strip_suffix(b"\n").unwrap_or(&names);
+    let mut digits = zmij::Buffer::new();
+    for sample in 0..columns.first().map_or(0, |column| column.len()) {
+        out.write_all(names)?;
+        for column in columns {
+            out.write_all(b",")?;
+            out.write_all(digits.format(column[sample]).as_bytes())?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// A number with as many digits as it needs.
+fn shown(value: f64) -> String {
+    zmij::Buffer::new().format(value).into()
+}

@@ -1,0 +1,319 @@
+//! Writing a database over a file into which others have put something: a copy of the file is
+//! edited and, after it was read back and nothing of theirs is missing, renamed into place. So
+//! their links, types and attributes stay as they were encoded.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fs;
+use std::path::Path;
+
+use super::foreign::{self, Item, is_of_dimensions, listed};
+use super::layout::{self, CASE_ATTRIBUTES, CASES, Columns, Content, ORIGINAL, VERSION};
+use super::{CasePath, Database, DatabaseError};
+use crate::curve::Case;
+use crate::file::{self, write_by_path};
+use crate::hdf5::dimensions::{DimensionError, Dimensions};
+use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Group};
+
+/// Writes a database over the file at `path` with all that others have put into it, which is
+/// `before`: into a copy of the file, in which only what differs is changed, and which then takes
+/// its place.
+///
+/// # Errors
+/// [`DatabaseError::WouldDrop`] if something would be lost; the file is then unchanged.
+pub(super) fn write_keeping(
+    database: &Database,
+    path: &Path,
+    before: &BTreeSet<Item>,
+) -> Result<(), DatabaseError> {
+    let is_current = layout::open(path)?.version == VERSION;
+    let mut old = layout::decode(path)?;
+    let moves = Moves::of(&old, database, before);
+    let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
+    let would_drop = |what: String| DatabaseError::WouldDrop { path: path.into(), what };
+    write_by_path(path, |draft| {
+        fs::copy(path, draft).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
+        let edited = moves.make(draft, &old, database).and_then(|()| {
+            old.remove(&moves.gone);
+            old.relocate(&moves.all)?;
+            Edit { old: &old, new: database, is_current, moves: &moves }.make(draft)
+        });
+        edited.map_err(|e| match e {
+            EditError::Hdf5(e) => would_drop(format!("{} ({e})", listed(&before))),
+            EditError::Dimensions(e) => would_drop(format!("{} ({e})", listed(&before))),
+            EditError::Content(e) => e,
+        })?;
+        // Whatever went wrong in it is seen here, before the old file is replaced.
+        let after = foreign::found(&layout::open(draft)?)?;
+        let lost: BTreeSet<Item> = before.difference(&after).cloned().collect();
+        if !lost.is_empty() {
+            return Err(would_drop(listed(&lost)));
+        }
+        match layout::decode(draft)?.holds_what(database) {
+            true => Ok(()),
+            false => Err(would_drop(listed(&before))),
+        }
+    })
+}
+
+enum EditError {
+    Hdf5(hdf5::Error),
+    Dimensions(DimensionError),
+    Content(DatabaseError),
+}
+
+impl From<hdf5::Error> for EditError {
+    fn from(error: hdf5::Error) -> Self {
+        Self::Hdf5(error)
+    }
+}
+
+impl From<DatabaseError> for EditError {
+    fn from(error: DatabaseError) -> Self {
+        Self::Content(error)
+    }
+}
+
+/// What of a file's cases is not in its place in the new database. What others have put into a case
+/// or group moves with it; a case without such is deleted and written anew.
+struct Moves {
+    /// Cases that are no longer there.
+    gone: HashSet<CasePath>,
+    /// Groups that have another name with all that is in them.
+    groups: BTreeMap<String, String>,
+    /// Cases that have to be moved once the groups have been.
+    cases: Vec<(CasePath, CasePath)>,
+    /// All cases that are moved.
+    all: BTreeMap<CasePath, CasePath>,
+}
+
+impl Moves {
+    fn of(old: &Database, new: &Database, theirs: &BTreeSet<Item>) -> Self {
+        let (before, after): (HashSet<CasePath>, HashSet<CasePath>) =
+            (old.all().map(CasePath::of).collect(), new.all().map(CasePath::of).collect());
+        let mut all = new.moved.clone();
+        all.retain(|from, to| from != to && before.contains(from));
+        let mut groups = BTreeMap::new();
+        for group in old.groups().filter(|group| new.cases(group).is_empty()) {
+            let targets = all.iter().filter(|(from, _)| from.group == group);
+            let targets: BTreeSet<&str> = targets.map(|(_, to)| to.group.as_str()).collect();
+            if let (1, Some(target)) = (targets.len(), targets.first())
+                && theirs.iter().any(|item| item.group() == group)
+                && old.cases(target).is_empty()
+                && !groups.values().any(|taken| taken == target)
+            {
+                groups.insert(group.to_string(), target.to_string());
+            }
+        }
+        let with_theirs: HashSet<CasePath> = theirs.iter().filter_map(Item::case).collect();
+        all.retain(|from, _| groups.contains_key(&from.group) || with_theirs.contains(from));
+        let taken: HashSet<&CasePath> = all.values().collect();
+        let is_gone = |path: &&CasePath| {
+            !all.contains_key(path) && (!after.contains(path) || taken.contains(path))
+        };
+        let gone: HashSet<CasePath> = before.iter().filter(is_gone).cloned().collect();
+        let renamed = |group: &String| groups.get(group).unwrap_or(group).clone();
+        let cases = all.iter().map(|(from, to)| {
+            (CasePath { group: renamed(&from.group), name: from.name.clone() }, to.clone())
+        });
+        let cases = cases.filter(|(from, to)| from != to).collect();
+        Self { gone, groups, cases, all }
+    }
+
+    /// Where something of others is afterwards.
+    fn of_item(&self, item: &Item) -> Item {
+        let rest = item.place.split_once('/').map_or("", |(_, rest)| rest);
+        let place = match (item.case().and_then(|case| self.all.get(&case)), item.group()) {
+            (Some(to), _) => {
+                let inside = rest.split_once('/').map_or("", |(_, inside)| inside);
+                format!("{to}/{inside}")
+            }
+            (None, group) => match self.groups.get(group) {
+                Some(to) => format!("{to}/{rest}"),
+                None => return item.clone(),
+            },
+        };
+        Item { what: item.what, place }
+    }
+
+    /// Deletes what is gone from the file at `path`, which holds `old`, and moves what has another
+    /// place.
+    fn make(&self, path: &Path, old: &Database, new: &Database) -> Result<(), EditError> {
+        let file = open(path)?;
+        let root = file.root();
+        for case in &self.gone {
+            root.delete(&case.to_string())?;
+        }
+        for group in old.groups().filter(|group| new.cases(group).is_empty()) {
+            let found = root.group(group)?;
+            if found.attr_datatypes()?.contains_key(CASES) {
+                found.remove_attr(CASES)?;
+            }
+        }
+        file.commit()?;
+        for (from, to) in &self.groups {
+            file.copy(from, to)?;
+            file.commit()?;
+            root.delete(from)?;
+        }
+        // By way of names of their own, lest two change places.
+        let between = |k: usize| format!("crumple moves case {k}");
+        for (k, (from, _)) in self.cases.iter().enumerate() {
+            file.copy(&from.to_string(), &between(k))?;
+            file.commit()?;
+            root.delete(&from.to_string())?;
+        }
+        file.commit()?;
+        let mut there: BTreeSet<String> = root.groups()?.into_iter().collect();
+        for (k, (_, to)) in self.cases.iter().enumerate() {
+            if there.insert(to.group.clone()) {
+                root.create_group(&to.group)?;
+                file.commit()?;
+            }
+            file.copy(&between(k), &to.to_string())?;
+            file.commit()?;
+            root.delete(&between(k))?;
+        }
+        file.commit()?;
+        drop(root);
+        Ok(file.close()?)
+    }
+}
+
+fn open(path: &Path) -> Result<File, EditError> {
+    // The draft is locked already.
+    let access = FileAccessProperties::new().with_locking(FileLocking::Disabled);
+    Ok(File::open_rw_with_options(path, access)?)
+}
+
+/// The change from one database to another in a file whose cases are in their places.
+struct Edit<'a> {
+    old: &'a Database,
+    new: &'a Database,
+    /// Whether the file's layout is the one that is written.
+    is_current: bool,
+    moves: &'a Moves,
+}
+
+impl Edit<'_> {
+    /// Makes the file at `path`, which holds the old database, hold the new one. All in one step,
+    /// so that every header that waits for a scale's address is there once.
+    fn make(&self, path: &Path) -> Result<(), EditError> {
+        let file = open(path)?;
+        let root = file.root();
+        for (name, value) in layout::root_attributes() {
+            root.set_attr(name, value)?;
+        }
+        let mut dimensions = Dimensions::default();
+        self.put(&root, &mut dimensions)?;
+        drop(root);
+        file.commit()?;
+        file.close()?;
+        let io = |source| DatabaseError::Io { path: path.into(), source };
+        let mut bytes = file::read(path, u64::MAX - 1).map_err(io)?;
+        dimensions.finish(&mut bytes).map_err(EditError::Dimensions)?;
+        Ok(fs::write(path, bytes).map_err(io)?)
+    }
+
+    fn put(&self, root: &Group, dimensions: &mut Dimensions) -> Result<(), EditError> {
+        let there: HashSet<String> = root.groups()?.into_iter().collect();
+        let moved: HashSet<&CasePath> = self.moves.all.values().collect();
+        for name in self.new.groups() {
+            let group = match there.contains(name) {
+                true => root.group(name)?,
+                false => root.create_group(name)?,
+            };
+            group.set_attr(CASES, layout::case_names(self.new.cases(name)))?;
+            let before: HashMap<&str, &Case> =
+                self.old.cases(name).iter().map(|case| (case.name.as_str(), case)).collect();
+            for case in self.new.cases(name) {
+                let content = || layout::with_hashes(self.new, case);
+                let Some(before) = before.get(&*case.name) else {
+                    add(&group, case, content()?, dimensions)?;
+                    continue;
+                };
+                let is_in_place = self.is_current && !moved.contains(&CasePath::of(case));
+                if *before == case && is_in_place {
+                    continue;
+                }
+                let found = group.group(&case.name)?;
+                let content = content()?;
+                if !(has_same_curves(before, case) && is_in_place) {
+                    replace_curves(&found, &content, dimensions)?;
+                }
+                replace_attributes(&found, content)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn add(
+    group: &Group,
+    case: &Case,
+    content: Content<'_>,
+    dimensions: &mut Dimensions,
+) -> Result<(), EditError> {
+    group.create_group_with(&case.name, |group| {
+        for (name, value) in content.attributes {
+            group.set_attr(name, value);
+        }
+        group.create_group(ORIGINAL);
+        let mut columns = Columns { dimensions, time: None };
+        for (path, values) in content.datasets {
+            group.create_dataset(&path, |dataset| columns.fill(dataset, &path, &values));
+        }
+    })?;
+    Ok(())
+}
+
+/// Whether all datasets of two cases hold the same values.
+fn has_same_curves(a: &Case, b: &Case) -> bool {
+    a.sampled == b.sampled
+        && a.original == b.original
+        && a.closing_speed_m_per_s == b.closing_speed_m_per_s
+        && a.masses == b.masses
+}
+
+fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditError> {
+    let there = case.attrs()?;
+    for name in CASE_ATTRIBUTES.iter().filter(|name| there.contains_key(**name)) {
+        if !content.attributes.iter().any(|(n, _)| n == name) {
+            case.remove_attr(name)?;
+        }
+    }
+    // Each text that is written takes 4 KiB, whatever it replaces.
+    let is_same = |a: &AttrValue, b: &AttrValue| {
+        (a.as_str(), a.as_f64(), a.as_i64()) == (b.as_str(), b.as_f64(), b.as_i64())
+    };
+    for (name, value) in content.attributes {
+        if !there.get(name).is_some_and(|before| is_same(before, &value)) {
+            case.set_attr(name, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the datasets of a case anew: their headers refer to the place where their scale then is.
+fn replace_curves(
+    case: &Group,
+    content: &Content<'_>,
+    dimensions: &mut Dimensions,
+) -> Result<(), EditError> {
+    let mut columns = Columns { dimensions, time: None };
+    for (path, values) in &content.datasets {
+        // Absent in files of earlier versions.
+        let mut theirs = HashMap::new();
+        if let Ok(found) = case.dataset(path) {
+            theirs = found.attrs()?;
+            theirs.retain(|name, _| !is_of_dimensions(name));
+            case.delete(path)?;
+        }
+        case.create_dataset(path, |dataset| {
+            columns.fill_beside(dataset, path, values, theirs.len());
+            for (name, value) in theirs {
+                dataset.set_attr(&name, value);
+            }
+        })?;
+    }
+    Ok(())
+}

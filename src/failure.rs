@@ -1,0 +1,251 @@
+//! Errors as one document for programs: a code for each kind, the message, its causes and its place.
+
+use std::error::Error;
+use std::io;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::assess::error::{CompareError, TrainError, ValidateError};
+use crate::build::{BuildError, RunFailure};
+use crate::charts::{HistoryError, LeftOutError};
+use crate::curate::CurateError;
+use crate::database::DatabaseError;
+use crate::dataset::DatasetError;
+use crate::file::{LockError, WriteError};
+use crate::formats::ExportError;
+use crate::formats::read::ReadCurveError;
+use crate::formats::read::json::CurveFileError;
+use crate::history_hdf5::ConvertError;
+use crate::import::ImportError;
+use crate::init::InitError;
+use crate::manifest::{ManifestError, Place};
+use crate::multibody::SimulationError;
+use crate::nsdm::NsdmError;
+use crate::plot::PngError;
+use crate::rating::SignalError;
+use crate::report::ReportError;
+use crate::scenario::ScenarioError;
+use crate::solver::ReadError;
+use crate::study::{RunError, StudyError};
+use crate::surrogate::{ModelError, PredictError};
+use crate::sweep::{MergeError, SweepError};
+
+/// What `--json` prints on standard output when a command fails.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorDocument {
+    /// The error.
+    pub error: ErrorReport,
+}
+
+/// One error.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorReport {
+    /// Its kind; a code never changes its meaning.
+    pub code: ErrorCode,
+    /// What standard error would have said, without the excerpt.
+    pub message: String,
+    /// Causes that the message does not contain itself, the nearest first.
+    pub causes: Vec<String>,
+    /// File that is wrong, where its text tells so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line in the file, counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Column in the line, in characters counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// What may have been meant, such as `did you mean "x"?`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hint: Option<String>,
+}
+
+/// Kinds of errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorCode {
+    /// The arguments make no sense, or do not fit together or with the file.
+    Usage,
+    /// A file cannot be opened, read or written.
+    Io,
+    /// Another process writes the file.
+    Locked,
+    /// A TOML file is no TOML, or has an unknown key or a value that cannot be.
+    Toml,
+    /// A study contradicts itself, or none of its runs can be used.
+    Study,
+    /// A run of a study gives no curve.
+    Run,
+    /// A scenario contradicts itself, or what it names does not fit.
+    Scenario,
+    /// A plan of a sweep is wrong, or its results are of another sweep.
+    Sweep,
+    /// A file is no curve database, is damaged, or has no such group or case.
+    Database,
+    /// A solver's file cannot be read, or lacks what is asked of it.
+    SolverFile,
+    /// A curve's file cannot be read.
+    CurveFile,
+    /// Curves cannot be taken into a database.
+    Import,
+    /// Cases make no training set.
+    Dataset,
+    /// A model cannot be fitted or read.
+    Model,
+    /// A model gives no curve.
+    Prediction,
+    /// Models cannot be validated.
+    Validation,
+    /// Methods cannot be compared.
+    Comparison,
+    /// A multi-body run cannot be made.
+    Simulation,
+    /// A file for another tool cannot be made.
+    Export,
+    /// Signals cannot be rated.
+    Rating,
+    /// A chart cannot be drawn.
+    Plot,
+    /// There is no report.
+    Report,
+    /// Anything else.
+    Other,
+}
+
+/// The error as a type, also where it is boxed.
+fn of<'e, T: Error + 'static>(error: &'e (dyn Error + 'static)) -> Option<&'e T> {
+    error.downcast_ref::<T>().or_else(|| Some(&**error.downcast_ref::<Box<T>>()?))
+}
+
+/// The codes of error types, those that stand in others behind these.
+fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
+    macro_rules! codes {
+        ($($($kind:ty),+ => $code:ident;)*) => {
+            $($(if of::<$kind>(error).is_some() { return Some(ErrorCode::$code); })+)*
+        };
+    }
+    codes! {
+        io::Error, WriteError => Io;
+        LockError => Locked;
+        ManifestError => Toml;
+        BuildError, StudyError, InitError => Study;
+        RunFailure, RunError => Run;
+        ScenarioError => Scenario;
+        SweepError, MergeError => Sweep;
+        DatabaseError, CurateError => Database;
+        ReadError, ConvertError => SolverFile;
+        ReadCurveError, CurveFileError => CurveFile;
+        ImportError => Import;
+        DatasetError => Dataset;
+        ModelError => Model;
+        PredictError => Prediction;
+        ValidateError => Validation;
+        CompareError, TrainError, NsdmError => Comparison;
+        SimulationError => Simulation;
+        ExportError => Export;
+        SignalError, crate::rating::table::TableError => Rating;
+        PngError, HistoryError, LeftOutError, crate::charts::MotionError => Plot;
+        ReportError => Report;
+    }
+    None
+}
+
+/// The error and its causes, the outermost first.
+fn chain<'e>(error: &'e (dyn Error + 'static)) -> impl Iterator<Item = &'e (dyn Error + 'static)> {
+    std::iter::successors(Some(error), |error| (*error).source())
+}
+
+/// Code of an error: that of the innermost cause whose kind is known.
+pub fn code(error: &(dyn Error + 'static)) -> ErrorCode {
+    chain(error).filter_map(own_code).last().unwrap_or(ErrorCode::Other)
+}
+
+/// The place in a TOML file that an error is about.
+pub fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
+    chain(error).find_map(|error| {
+        (of::<ManifestError>(error).and_then(ManifestError::place))
+            .or_else(|| of::<StudyError>(error).and_then(StudyError::place))
+            .or_else(|| of::<ScenarioError>(error).and_then(ScenarioError::place))
+            .or_else(|| of::<SweepError>(error).and_then(SweepError::place))
+            .or_else(|| of::<TrainError>(error).and_then(TrainError::place))
+            .or_else(|| of::<BuildError>(error).and_then(BuildError::place))
+            .or_else(|| of::<RunFailure>(error).and_then(|failure| failure.place.as_deref()))
+    })
+}
+
+/// The causes of an error that the messages above them do not contain, the nearest first.
+pub fn causes(error: &(dyn Error + 'static)) -> Vec<String> {
+    let mut shown = error.to_string();
+    let mut causes = Vec::new();
+    for cause in chain(error).skip(1) {
+        let text = cause.to_string();
+        if !shown.contains(&text) {
+            causes.push(text.clone());
+        }
+        shown = text;
+    }
+    causes
+}
+
+impl ErrorDocument {
+    /// The document of an error.
+    pub fn new(error: &(dyn Error + 'static)) -> Self {
+        let message = error.to_string();
+        let place = place(error);
+        let error = ErrorReport {
+            code: code(error),
+            hint: hint(&message),
+            message,
+            causes: causes(error),
+            file: place.map(|place| place.path().display().to_string()),
+            line: place.and_then(Place::line),
+            column: place.and_then(Place::column),
+        };
+        Self { error }
+    }
+
+    /// The document of a wrong command line.
+    pub fn usage(message: &str) -> Self {
+        Self {
+            error: ErrorReport {
+                code: ErrorCode::Usage,
+                message: message.into(),
+                causes: Vec::new(),
+                file: None,
+                line: None,
+                column: None,
+                hint: hint(message),
+            },
+        }
+    }
+}
+
+/// The question of a message, as `guess` puts it, or the tip for a wrong command line.
+fn hint(message: &str) -> Option<String> {
+    if let Some((_, tip)) = message.split_once("tip: ") {
+        return tip.split("; ").next().map(String::from);
+    }
+    let begin = message.find("did you mean ")?;
+    let end = begin + message[begin..].find('?')? + 1;
+    Some(message[begin..end].into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn the_innermost_known_kind_gives_the_code() {
+        let study = crate::study::parse(Path::new("s.toml"), "[study]\ngrop = 1\n").unwrap_err();
+        let document = ErrorDocument::new(&BuildError::from(study)).error;
+        assert_eq!(document.code, ErrorCode::Toml);
+        assert_eq!((document.file.as_deref(), document.line), (Some("s.toml"), Some(2)));
+        assert_eq!(document.hint.as_deref(), Some("did you mean \"group\"?"));
+        let missing = crate::scenario::load(Path::new("/none/s.toml")).unwrap_err();
+        assert_eq!(code(&missing), ErrorCode::Io);
+        assert_eq!(code(&ReportError::from(missing)), ErrorCode::Io, "also where it is boxed");
+        assert_eq!(code(&std::fmt::Error), ErrorCode::Other);
+    }
+}

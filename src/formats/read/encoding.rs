@@ -1,0 +1,87 @@
+//! Text of any usual encoding as UTF-8: UTF-8 or UTF-16 with or without a byte-order mark, else Latin-1.
+
+use std::borrow::Cow;
+
+/// A text as UTF-8 without a byte-order mark, and what was done for it.
+pub(super) struct Decoded<'a> {
+    pub bytes: Cow<'a, [u8]>,
+    pub note: Option<&'static str>,
+}
+
+/// Bytes by which UTF-16 without a mark is told.
+const BEGINNING: usize = 64;
+
+/// The text that the bytes are; bytes of no text become one, too.
+pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
+    let of_pairs = |rest: &[u8], pair: fn([u8; 2]) -> u16, note| {
+        let mut units: Vec<u16> = rest.chunks_exact(2).map(|two| pair([two[0], two[1]])).collect();
+        if rest.len() % 2 == 1 {
+            // Half a character: the file is cut.
+            units.push(u16::from(b'?'));
+        }
+        let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+        let bytes = text.collect::<String>().into_bytes();
+        Decoded { bytes: Cow::Owned(bytes), note: Some(note) }
+    };
+    match bytes {
+        [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),
+        [0xFF, 0xFE, rest @ ..] => {
+            of_pairs(rest, u16::from_le_bytes, "text: UTF-16, little-endian")
+        }
+        [0xFE, 0xFF, rest @ ..] => of_pairs(rest, u16::from_be_bytes, "text: UTF-16, big-endian"),
+        _ if is_zero(bytes, 1) => of_pairs(
+            bytes,
+            u16::from_le_bytes,
+            "text: UTF-16, little-endian, without a byte-order mark",
+        ),
+        _ if is_zero(bytes, 0) => of_pairs(
+            bytes,
+            u16::from_be_bytes,
+            "text: UTF-16, big-endian, without a byte-order mark",
+        ),
+        _ => utf8_or_latin1(bytes),
+    }
+}
+
+/// Whether at the beginning the odd bytes, or the even ones, are zero and no others, as in ASCII
+/// texts of UTF-16.
+fn is_zero(bytes: &[u8], which: usize) -> bool {
+    let beginning = &bytes[..bytes.len().min(BEGINNING) / 2 * 2];
+    let mut bytes = beginning.iter().enumerate();
+    beginning.len() >= 8 && bytes.all(|(k, byte)| (k % 2 == which) == (*byte == 0))
+}
+
+fn utf8_or_latin1(bytes: &[u8]) -> Decoded<'_> {
+    if std::str::from_utf8(bytes).is_ok() {
+        return Decoded { bytes: Cow::Borrowed(bytes), note: None };
+    }
+    // A character of Latin-1 has the number of its byte.
+    let text: String = bytes.iter().copied().map(char::from).collect();
+    let note = Some("text: Latin-1, as it is no UTF-8");
+    Decoded { bytes: Cow::Owned(text.into_bytes()), note }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_of_every_encoding_are_one() {
+        let text = "Kraft/kN µ°ü\n1;2\n";
+        let pairs = |of: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(of).collect::<Vec<u8>>();
+        let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        let t = |bytes: Vec<u8>, note: Option<&str>| {
+            let decoded = decoded(&bytes);
+            assert_eq!(String::from_utf8_lossy(&decoded.bytes), text, "{note:?}");
+            assert_eq!(decoded.note.map(|n| &n[6..14]), note);
+        };
+        t(text.into(), None);
+        t([b"\xEF\xBB\xBF", text.as_bytes()].concat(), None);
+        t([vec![0xFF, 0xFE], pairs(u16::to_le_bytes)].concat(), Some("UTF-16, "));
+        t([vec![0xFE, 0xFF], pairs(u16::to_be_bytes)].concat(), Some("UTF-16, "));
+        t(latin1, Some("Latin-1,"));
+        let plain: Vec<u8> = "d_m;F_N\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert_eq!(&*decoded(&plain).bytes, b"d_m;F_N\n");
+        assert_eq!(&*decoded(&[0xFF, 0xFE, b'a', 0, b'b']).bytes, b"a?");
+    }
+}

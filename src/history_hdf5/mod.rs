@@ -1,0 +1,425 @@
+//! Histories as HDF5: one dataset per component, states by entities.
+
+mod units;
+
+use std::collections::{HashMap, HashSet};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use crate::file::{WriteError, write_at, write_whole};
+use crate::hdf5::dimensions::{Dimensions, Scale};
+use crate::hdf5::skeleton::{Skeleton, write_all_at};
+use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
+use crate::history::{EntityId, History, Side};
+use crate::solver::lsdyna::deck::Deck;
+use crate::solver::{self, Blocks, ReadError, Selection, SolverFile, decks};
+use crate::unit::UnitSystem;
+use units::unit_of;
+
+/// Why a solver's file could not be converted.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvertError {
+    /// The solver's file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// HDF5 cannot hold the histories.
+    #[error("cannot encode the histories: {detail}")]
+    Encode {
+        /// Why not, in the words of the library.
+        detail: String,
+    },
+    /// The output cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What is known of a file's histories beside the file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside<'a> {
+    /// Units of the values; the deck's if absent, and if that has none they stay unknown.
+    pub units: Option<UnitSystem>,
+    /// The deck of the run, which has units and the titles that the file lacks.
+    pub deck: Option<&'a Deck>,
+}
+
+/// Converts the selected histories of the file at `input` to HDF5, in the solver's units.
+///
+/// An undamaged nodout is written state by state while it is read, on all threads, and
+/// never held as a whole; any other file is read first. Gives back what the file says of
+/// itself, with its problems; the histories are left out where they went straight on.
+///
+/// # Errors
+/// [`ConvertError`] if the file cannot be read or the output not be written; the output is
+/// then unchanged.
+pub fn convert(
+    input: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+    beside: &Beside<'_>,
+    output: &Path,
+) -> Result<SolverFile, ConvertError> {
+    // Neither can be opened twice, nor be written at any place.
+    let is_file = |path: &Path| path.metadata().is_ok_and(|meta| meta.is_file());
+    let is_device = output.exists() && !is_file(output);
+    if !is_device
+        && is_file(input)
+        && let Some(blocks) = solver::blocks(input, format, selection)?
+        && let Some(file) = stream(input, blocks, beside, output)?
+    {
+        return Ok(file);
+    }
+    let file = solver::read(input, format, selection)?;
+    write_whole(output, &encode(&file, beside, Some(input))?)?;
+    Ok(file)
+}
+
+/// Whether a file is HDF5 but no file of histories: a curve database, or of someone else.
+/// What cannot be read as HDF5 to its root counts as such, since a table may be damaged.
+pub fn is_other_hdf5(path: &Path) -> bool {
+    let format = match hdf5::open(path) {
+        Ok(file) => {
+            let attributes = file.root().attrs().ok();
+            attributes.and_then(|a| Some(a.get("format")?.as_str()?.to_string()))
+        }
+        Err(OpenError::Damaged { .. }) => None,
+        Err(OpenError::Io(_) | OpenError::NoSignature) => return false,
+    };
+    format.as_deref() != Some(FORMAT)
+}
+
+/// Encodes the selected histories of a file, in the solver's units; `source` is its path.
+///
+/// `/time` holds one time per state; `/<component>` has the shape states × entities (or
+/// states, for a global quantity) and the attribute `ids`, for interfaces also `sides`.
+/// What no attribute holds is a dataset: of more than 8 000 entities the ids in
+/// `/ids/<component>`, of more than 4 000 the sides in `/sides/<component>`. A component whose
+/// name cannot be a dataset's has `_` in it, and its own name in the attribute `component`.
+///
+/// The dimensions are named: `time`, and for the entities a word such as `node`, whose dataset
+/// holds the ids and has the attributes `ids`, `sides` and `titles`, where there are any (of more
+/// than 4 000 entities the dataset `/titles/node`). Components of other entities have a dimension
+/// of their own, `node_2`. Where the units are known, every dataset whose name tells what it is of
+/// has the attribute `units`.
+///
+/// # Errors
+/// [`ConvertError::Encode`] if HDF5 cannot hold them.
+pub fn encode(
+    file: &SolverFile,
+    beside: &Beside<'_>,
+    source: Option<&Path>,
+) -> Result<Vec<u8>, ConvertError> {
+    let mut layout = Layout::of(file, beside, source);
+    let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
+    let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
+    for history in &file.histories {
+        let k = *index.entry(&history.component).or_insert_with(|| {
+            components.push((&history.component, Vec::new()));
+            components.len() - 1
+        });
+        components[k].1.push(history);
+    }
+    for (component, channels) in components {
+        let entities: Vec<EntityId> = channels.iter().filter_map(|h| h.entity).collect();
+        let dataset = layout.component(component, &entities);
+        if entities.is_empty() {
+            dataset.with_f64_data(&channels[0].values);
+            continue;
+        }
+        let mut rows = Vec::with_capacity(file.time.len() * channels.len());
+        for state in 0..file.time.len() {
+            rows.extend(channels.iter().map(|h| h.values[state]));
+        }
+        dataset.with_f64_data(&rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
+    }
+    let (out, dimensions) = layout.finish()?;
+    let mut bytes = out.finish().map_err(not_encoded)?;
+    dimensions.finish(&mut bytes).map_err(not_encoded)?;
+    Ok(bytes)
+}
+
+fn not_encoded(error: impl std::fmt::Display) -> ConvertError {
+    ConvertError::Encode { detail: error.to_string() }
+}
+
+/// A file of histories under work: everything but the values of components.
+struct Layout {
+    out: FileBuilder,
+    dimensions: Dimensions,
+    time: Scale,
+    names: Names,
+    /// Section of the solver's file.
+    section: String,
+    units: Option<UnitSystem>,
+    titles: HashMap<EntityId, String>,
+    /// Dimensions of entities.
+    entities: Vec<(Vec<EntityId>, Scale)>,
+    /// Components, and dimensions with titles, of more entities than an attribute holds texts of.
+    long: Vec<(String, Vec<EntityId>)>,
+    titles_of: Vec<(String, Vec<EntityId>)>,
+}
+
+impl Layout {
+    /// A file with what describes the source, and the times.
+    fn of(file: &SolverFile, beside: &Beside<'_>, source: Option<&Path>) -> Self {
+        let mut out = FileBuilder::new();
+        let mut attr = |name: &str, value: &str| {
+            out.set_attr(name, AttrValue::VarLenString(value.into()));
+        };
+        attr("format", FORMAT);
+        attr("source_format", file.format);
+        for (name, value) in [("title", &file.title), ("version", &file.version)] {
+            value.iter().for_each(|value| attr(name, value));
+        }
+        if let Some(path) = source.and_then(|path| std::path::absolute(path).ok()) {
+            attr("source", &path.display().to_string());
+        }
+        let stated = || beside.deck?.units.as_ref()?.system;
+        let units = beside.units.or_else(stated);
+        units.iter().for_each(|units| attr("units", &units.to_string()));
+        let mut dimensions = Dimensions::default();
+        let dataset = out.create_dataset(TIME);
+        let time = dimensions.scale(dataset, TIME);
+        dataset.with_f64_data(&file.time);
+        if let Some(units) = units {
+            dataset.set_attr(UNITS, AttrValue::VarLenString(units.names().2.into()));
+        }
+        let mut entities = file.entities.clone();
+        if let Some(deck) = beside.deck {
+            decks::fill_entity_titles(&file.section, &mut entities, deck);
+        }
+        let titles = entities.into_iter().filter_map(|e| Some((e.id, e.title?)));
+        Self {
+            out,
+            dimensions,
+            time,
+            names: Names::default(),
+            section: file.section.clone(),
+            units,
+            titles: titles.collect(),
+            entities: Vec::new(),
+            long: Vec::new(),
+            titles_of: Vec::new(),
+        }
+    }
+
+    /// The dataset of a component, with everything but its values.
+    fn component(&mut self, component: &str, entities: &[EntityId]) -> &mut DatasetBuilder {
+        let mut scales = vec![self.time];
+        scales.extend((!entities.is_empty()).then(|| self.dimension(entities)));
+        let name = self.names.of(component);
+        if entities.len() > MAX_TEXTS {
+            self.long.push((name.clone(), entities.to_vec()));
+        }
+        let dataset = self.out.create_dataset(&name);
+        if name != component {
+            dataset.set_attr("component", AttrValue::VarLenString(component.into()));
+        }
+        let unit = self.units.and_then(|units| unit_of(&self.section, component, units));
+        if let Some(unit) = unit {
+            dataset.set_attr(UNITS, AttrValue::VarLenString(unit));
+        }
+        describe(dataset, entities);
+        self.dimensions.attach(dataset, &scales);
+        dataset
+    }
+
+    /// The dimension of these entities.
+    fn dimension(&mut self, entities: &[EntityId]) -> Scale {
+        if let Some((_, scale)) = self.entities.iter().find(|(known, _)| known == entities) {
+            return *scale;
+        }
+        let word = solver::entity_word(&self.section).replace(' ', "_");
+        let name = match self.entities.len() {
+            0 => word,
+            before => format!("{word}_{}", before + 1),
+        };
+        let name = self.names.of(&name);
+        let dataset = self.out.create_dataset(&name);
+        let scale = self.dimensions.scale(dataset, &name);
+        dataset.with_i64_data(&ids(entities));
+        describe(dataset, entities);
+        let title = |e: &EntityId| self.titles.get(e).map_or("", String::as_str);
+        let titles: Vec<&str> = entities.iter().map(title).collect();
+        if titles.iter().any(|title| !title.is_empty()) {
+            match titles.len() <= MAX_TEXTS {
+                true => drop(dataset.set_attr(TITLES, texts(&titles))),
+                false => self.titles_of.push((name.clone(), entities.to_vec())),
+            }
+        }
+        self.entities.push((entities.to_vec(), scale));
+        scale
+    }
+
+    /// Adds what no attribute holds.
+    fn finish(mut self) -> Result<(FileBuilder, Dimensions), ConvertError> {
+        let many = |most: usize| self.long.iter().filter(move |(_, e)| e.len() > most);
+        let with_ids: Vec<_> = many(MAX_IDS).collect();
+        if !with_ids.is_empty() {
+            let mut group = self.out.create_group(IDS);
+            for (name, entities) in with_ids {
+                group.create_dataset(name).with_i64_data(&ids(entities));
+            }
+            self.out.add_group(group.finish());
+        }
+        let with_sides = many(MAX_TEXTS).filter_map(|(name, e)| Some((name, sides(e)?)));
+        let title = |e: &EntityId| self.titles.get(e).map_or("", String::as_str);
+        let titles = self.titles_of.iter().map(|(n, e)| (n, e.iter().map(title).collect()));
+        for (group, texts) in
+            [(SIDES, with_sides.collect::<Vec<_>>()), (TITLES, titles.collect::<Vec<_>>())]
+        {
+            if texts.is_empty() {
+                continue;
+            }
+            let mut group = self.out.create_group(group);
+            for (name, texts) in texts {
+                group.create_dataset(name).with_strings(&texts).map_err(not_encoded)?;
+            }
+            self.out.add_group(group.finish());
+        }
+        Ok((self.out, self.dimensions))
+    }
+}
+
+/// Entities whose ids an attribute can hold (64 KiB), and whose sides or titles, which take twice
+/// that.
+const MAX_IDS: usize = 8_000;
+const MAX_TEXTS: usize = 4_000;
+
+/// Writes the entities of a dataset as its attributes, as far as these hold them.
+fn describe(dataset: &mut DatasetBuilder, entities: &[EntityId]) {
+    if !entities.is_empty() && entities.len() <= MAX_IDS {
+        dataset.set_attr("ids", AttrValue::I64Array(ids(entities)));
+    }
+    if let Some(sides) = sides(entities).filter(|sides| sides.len() <= MAX_TEXTS) {
+        dataset.set_attr("sides", texts(&sides));
+    }
+}
+
+fn ids(entities: &[EntityId]) -> Vec<i64> {
+    entities.iter().map(|e| e.id).collect()
+}
+
+fn texts(texts: &[&str]) -> AttrValue {
+    AttrValue::VarLenStringArray(texts.iter().map(ToString::to_string).collect())
+}
+
+/// Names of the sides, if there are entities and all have one.
+fn sides(entities: &[EntityId]) -> Option<Vec<&'static str>> {
+    let sides: Option<Vec<&str>> = entities.iter().map(|e| e.side.map(Side::name)).collect();
+    sides.filter(|sides| !sides.is_empty())
+}
+
+/// Root attribute `format` of these files.
+const FORMAT: &str = "crumple histories";
+const TIME: &str = "time";
+const IDS: &str = "ids";
+const SIDES: &str = "sides";
+const TITLES: &str = "titles";
+/// Attribute of a dataset with the unit of its values.
+const UNITS: &str = "units";
+
+/// Gives components names that datasets can have, each another.
+#[derive(Default)]
+struct Names {
+    taken: HashSet<String>,
+}
+
+impl Names {
+    /// A dataset's name has no `/`, which would be a path, and is no name of this layout.
+    fn of(&mut self, component: &str) -> String {
+        let mut name = component.replace(['/', '\0'], "_");
+        while matches!(&*name, "" | "." | TIME | IDS | SIDES | TITLES) || self.taken.contains(&name)
+        {
+            name.push('_');
+        }
+        self.taken.insert(name.clone());
+        name
+    }
+}
+
+/// States that are handed on together, so that writes are not too short; of states with
+/// more values than this each alone.
+const TOGETHER: usize = 2;
+const MANY_VALUES: usize = 1 << 18;
+
+/// Writes a nodout state by state. `None` if it turns out to be damaged.
+fn stream(
+    input: &Path,
+    blocks: Blocks,
+    beside: &Beside<'_>,
+    output: &Path,
+) -> Result<Option<SolverFile>, ConvertError> {
+    let states = blocks.file.time.len();
+    let mut layout = Layout::of(&blocks.file, beside, Some(input));
+    let mut skeleton = Skeleton::default();
+    for column in &blocks.columns {
+        let dataset = layout.component(&column.component, &column.entities);
+        skeleton.reserve(dataset, states, column.entities.len());
+    }
+    let (out, dimensions) = layout.finish()?;
+    let failed_read = |source| ReadError::Io { path: PathBuf::from(input), source };
+    let mut read_error = None;
+    let written = write_at(output, |file| {
+        let Some(offsets) = skeleton.write_with(out, &dimensions, file)? else { return Ok(None) };
+        match fill(&blocks, &offsets, file) {
+            Ok(whole) => Ok(whole.then_some(())),
+            Err(Trouble::Writing(error)) => Err(error),
+            Err(Trouble::Reading(error)) => {
+                read_error = Some(error);
+                Ok(None)
+            }
+        }
+    })?;
+    if let Some(error) = read_error {
+        return Err(failed_read(error).into());
+    }
+    Ok(written.map(|()| blocks.file))
+}
+
+enum Trouble {
+    Reading(io::Error),
+    Writing(io::Error),
+}
+
+/// Reads all states and writes their values to `offsets`, one per column; false if a state
+/// is damaged.
+fn fill(blocks: &Blocks, offsets: &[u64], file: &File) -> Result<bool, Trouble> {
+    let states = blocks.file.time.len();
+    let values = blocks.values();
+    let together = if values > MANY_VALUES { 1 } else { TOGETHER };
+    let damaged = AtomicBool::new(false);
+    (0..states.div_ceil(together)).into_par_iter().try_for_each_init(
+        || (blocks.window(), vec![0.0; values * together], Vec::new()),
+        |(window, read, bytes), group| {
+            let first = group * together;
+            let count = together.min(states - first);
+            for (k, state) in read.chunks_exact_mut(values).take(count).enumerate() {
+                if damaged.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                if !blocks.read(window, first + k, state).map_err(Trouble::Reading)? {
+                    damaged.store(true, Ordering::Relaxed);
+                }
+            }
+            let mut start = 0;
+            for (column, offset) in blocks.columns.iter().zip(offsets) {
+                let width = column.entities.len();
+                bytes.clear();
+                for state in read.chunks_exact(values).take(count) {
+                    let row = &state[start..start + width];
+                    bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+                }
+                let at = offset + (first * width * size_of::<f64>()) as u64;
+                write_all_at(file, bytes, at).map_err(Trouble::Writing)?;
+                start += width;
+            }
+            Ok(())
+        },
+    )?;
+    Ok(!damaged.into_inner())
+}

@@ -1,0 +1,409 @@
+//! The recipe that most runs agree on: kind, direction, force and nodes; runs that need another
+//! one are told apart, never merged.
+
+use std::collections::BTreeMap;
+
+use super::Given;
+use super::explain::{self, Explanation, FOLLOWS, RELATED, size};
+use super::left_out::Reason;
+use super::survey::{ForceCandidate, NodeCandidate, Survey};
+use super::titles::is_centre;
+use crate::curve::recipe::DisplacementComponent;
+use crate::history::Side;
+use crate::study::StudyKind;
+
+/// A node stands for its body if it leaves at most this much more of the impulse than the best
+/// one: as a factor and as a share of the impulse.
+const AS_GOOD: (f64, f64) = (1.5, 0.01);
+/// The same for a node whose title says that it is the centre of gravity.
+const CENTRE_AS_GOOD: f64 = 0.05;
+/// Steps of the roughness below which velocities are equally smooth, for each whole.
+const EVEN: f64 = 10.0;
+/// Alternatives that are named.
+const NAMED: usize = 5;
+
+/// The recipe that most runs agree on.
+#[derive(Clone, Debug)]
+pub(super) struct Agreed {
+    pub kind: StudyKind,
+    pub direction: DisplacementComponent,
+    pub nodes: Vec<ChosenNode>,
+    /// `None` if no force moves the bodies: then mass times acceleration stands for it.
+    pub force: Option<ChosenForce>,
+    /// What the chosen nodes leave of the impulse in the run where they follow it worst.
+    pub residual: f64,
+    /// For each run whether it can take the recipe.
+    pub members: Vec<Result<(), Reason>>,
+}
+
+/// A node and those that could stand for the same body.
+#[derive(Clone, Debug)]
+pub(super) struct ChosenNode {
+    pub id: i64,
+    pub title: Option<String>,
+    pub residual: f64,
+    pub others: Vec<Alternative>,
+}
+
+/// A force and those that could be meant.
+#[derive(Clone, Debug)]
+pub(super) struct ChosenForce {
+    pub file: &'static str,
+    pub id: i64,
+    pub side: Option<Side>,
+    pub component: String,
+    pub title: Option<String>,
+    /// Whether the other side has the same force.
+    pub other_side: bool,
+    pub others: Vec<Alternative>,
+}
+
+/// What else could be meant, and how well it would do.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Alternative {
+    /// As a recipe would name it.
+    pub id: String,
+    /// Title and how well it does.
+    pub about: String,
+}
+
+/// What runs must share to have one recipe.
+type Key = (bool, &'static str, Option<(&'static str, i64)>);
+
+/// A run's survey with what explains it best.
+struct View<'a> {
+    survey: &'a Survey,
+    best: Option<Explanation>,
+}
+
+impl Agreed {
+    /// The recipe of most of the runs; `None` if there are no runs.
+    pub(super) fn of(surveys: &[&Survey], given: &Given) -> Option<Self> {
+        let single = given.half_model.then_some(StudyKind::Wall);
+        let kind = single.or(given.kind);
+        let views: Vec<View<'_>> =
+            surveys.iter().map(|survey| View { survey, best: best(survey, given, kind) }).collect();
+        let mut votes: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
+        for (k, view) in views.iter().enumerate() {
+            votes.entry(key(view)).or_default().push(k);
+        }
+        // Of equally many votes the force that explains more, then the first run's.
+        let left = |runs: &[usize]| -> f64 { runs.iter().map(|&k| views[k].residual()).sum() };
+        let (key, voters) = votes.iter().min_by(|a, b| {
+            let by_votes = b.1.len().cmp(&a.1.len());
+            by_votes.then(left(a.1).total_cmp(&left(b.1))).then(a.1[0].cmp(&b.1[0]))
+        })?;
+        let model = &views[voters[0]];
+        let explained: Vec<Result<Option<Explanation>, Reason>> =
+            views.iter().map(|view| view.takes(key, kind, given)).collect();
+        let direction = model.survey.direction;
+        let mut agreed = Self {
+            kind: if key.0 { StudyKind::Pair } else { StudyKind::Wall },
+            direction,
+            nodes: Vec::new(),
+            force: None,
+            residual: 0.0,
+            members: Vec::new(),
+        };
+        agreed.force = key.2.map(|_| chosen_force(&views, &explained));
+        agreed.choose_nodes(&views, &explained, given);
+        Some(agreed)
+    }
+
+    /// Chooses a node for each body, and tells the runs that do not have it.
+    fn choose_nodes(
+        &mut self,
+        views: &[View<'_>],
+        explained: &[Result<Option<Explanation>, Reason>],
+        given: &Given,
+    ) {
+        let bodies = if self.kind == StudyKind::Pair { 2 } else { 1 };
+        let are_given = given.node.is_some() || given.force.is_some();
+        let given = [given.node, given.minus_node];
+        for (slot, given) in given.into_iter().take(bodies).enumerate() {
+            let of_runs: Vec<Vec<Judged<'_>>> = views
+                .iter()
+                .zip(explained)
+                .map(|(view, explained)| match explained {
+                    Ok(explained) => judged(view.survey, explained.as_ref(), slot),
+                    Err(_) => Vec::new(),
+                })
+                .collect();
+            self.nodes.extend(choose(&of_runs, given));
+        }
+        let nodes: Vec<i64> = self.nodes.iter().map(|node| node.id).collect();
+        self.members = views
+            .iter()
+            .zip(explained)
+            .map(|(view, explained)| match explained {
+                Ok(explained) => view.has_nodes(explained.as_ref(), &nodes, are_given),
+                Err(reason) => Err(reason.clone()),
+            })
+            .collect();
+        self.residual = self.nodes.iter().map(|node| node.residual).fold(0.0, f64::max);
+    }
+}
+
+/// What explains a run best, with the force that the caller names if he does.
+fn best(survey: &Survey, given: &Given, kind: Option<StudyKind>) -> Option<Explanation> {
+    match &given.force {
+        Some(named) => {
+            let force = survey.force(&named.file, named.id)?;
+            explain::of_force(survey, force, kind)
+        }
+        None => explain::best_of(survey, kind),
+    }
+}
+
+fn key(view: &View<'_>) -> Key {
+    let direction = view.survey.direction.axis();
+    match &view.best {
+        Some(best) => {
+            let force = &view.survey.forces[best.force];
+            (best.kind == StudyKind::Pair, direction, Some((force.file, force.id)))
+        }
+        None => (false, direction, None),
+    }
+}
+
+impl View<'_> {
+    fn residual(&self) -> f64 {
+        self.best.as_ref().map_or(1.0, |best| best.residual)
+    }
+
+    /// What the recipe's force explains of the run, or why the run needs another recipe.
+    fn takes(
+        &self,
+        key: &Key,
+        kind: Option<StudyKind>,
+        given: &Given,
+    ) -> Result<Option<Explanation>, Reason> {
+        let other = |why: String| Err(Reason::OtherRecipe { why });
+        let (is_pair, direction, force) = *key;
+        if self.survey.direction.axis() != direction {
+            return other(format!("it moves along {}", self.survey.direction.axis()));
+        }
+        let Some((file, id)) = force else {
+            return match &self.best {
+                None => Ok(None),
+                Some(_) => other("it has a contact force, the others have none".into()),
+            };
+        };
+        let wanted = kind.unwrap_or(if is_pair { StudyKind::Pair } else { StudyKind::Wall });
+        let found = self
+            .survey
+            .force(file, id)
+            .and_then(|force| explain::of_force(self.survey, force, Some(wanted)))
+            .filter(|explained| explained.residual < RELATED || given.force.is_some())
+            .map(|explained| self.with_first(explained, given.node));
+        let own_kind = self.best.as_ref().is_some_and(|b| (b.kind == StudyKind::Pair) != is_pair);
+        match found {
+            Some(_) if own_kind => {
+                let (own, others) = if is_pair {
+                    ("one body moves", "two bodies do")
+                } else {
+                    ("two bodies move", "one does")
+                };
+                other(format!("{own} in it, {others} in the others"))
+            }
+            Some(found) => Ok(Some(found)),
+            None => other(match &self.best {
+                Some(best) => {
+                    let own = &self.survey.forces[best.force];
+                    format!("{file} {id} does not move its bodies, {} {} does", own.file, own.id)
+                }
+                None => format!("{file} {id} does not move its bodies"),
+            }),
+        }
+    }
+
+    /// The same with the body of the node that the caller names first.
+    fn with_first(&self, mut explained: Explanation, node: Option<i64>) -> Explanation {
+        let has = |body: &usize| {
+            self.survey.bodies[*body].nodes.iter().any(|candidate| Some(candidate.id) == node)
+        };
+        if let Some(slot) = explained.bodies.iter().position(has) {
+            explained.bodies.swap(0, slot);
+        }
+        explained
+    }
+
+    /// Whether the run has the recipe's nodes, and they follow the force.
+    fn has_nodes(
+        &self,
+        explained: Option<&Explanation>,
+        nodes: &[i64],
+        are_given: bool,
+    ) -> Result<(), Reason> {
+        for (slot, id) in nodes.iter().enumerate() {
+            let judged = judged(self.survey, explained, slot);
+            let is_there = judged.iter().find(|j| j.node.id == *id);
+            let best = judged.iter().min_by(|a, b| a.residual.total_cmp(&b.residual));
+            let own = best.map_or(String::new(), |best| {
+                format!("; there {} would be taken", named(best.node))
+            });
+            match is_there {
+                None => {
+                    return Err(Reason::OtherRecipe {
+                        why: format!("it has no moving node {id}{own}"),
+                    });
+                }
+                Some(found) if !are_given && found.residual >= RELATED => {
+                    let why = format!("node {id} does not follow the force{own}");
+                    return Err(Reason::OtherRecipe { why });
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A node of a body with what it leaves of the recipe's impulse.
+struct Judged<'a> {
+    node: &'a NodeCandidate,
+    residual: f64,
+}
+
+/// The nodes of one of the bodies that a force explains; without a force those of the body in
+/// that place.
+fn judged<'a>(survey: &'a Survey, explained: Option<&Explanation>, slot: usize) -> Vec<Judged<'a>> {
+    let (body, force) = match explained {
+        Some(explained) => (explained.bodies.get(slot).copied(), Some(explained.force)),
+        None => (Some(slot), None),
+    };
+    let body = body.and_then(|body| survey.bodies.get(body));
+    let nodes = body.map(|body| &body.nodes[..]).unwrap_or_default();
+    nodes
+        .iter()
+        .map(|node| Judged { node, residual: force.map_or(0.0, |force| node.fits[force].residual) })
+        .collect()
+}
+
+/// What all runs say of a node.
+struct Sum<'a> {
+    node: &'a NodeCandidate,
+    /// In which it can stand for the body.
+    runs: usize,
+    /// The largest of all runs.
+    residual: f64,
+    /// Of all runs together, and how many that are.
+    roughness: f64,
+    seen: f64,
+}
+
+/// The node that can stand for the body in most runs: a centre of gravity first, then the one
+/// with the smoothest velocity.
+fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>) -> Option<ChosenNode> {
+    let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
+    for run in of_runs {
+        let best = run.iter().map(|j| j.residual).fold(f64::INFINITY, f64::min);
+        for Judged { node, residual } in run {
+            let limit = match is_centre(node.title.as_deref()) {
+                true => best + CENTRE_AS_GOOD,
+                false => AS_GOOD.0 * best + AS_GOOD.1,
+            };
+            let empty = Sum { node, runs: 0, residual: 0.0, roughness: 0.0, seen: 0.0 };
+            let sum = sums.entry(node.id).or_insert(empty);
+            sum.runs += usize::from(*residual <= limit);
+            sum.residual = sum.residual.max(*residual);
+            sum.roughness += node.roughness;
+            sum.seen += 1.0;
+        }
+    }
+    let centre = |sum: &Sum<'_>| is_centre(sum.node.title.as_deref());
+    // Of equally smooth ones, such as the nodes of a rigid body, the one that follows best.
+    let roughness = |sum: &Sum<'_>| (sum.roughness / sum.seen * EVEN).round();
+    let mut sums: Vec<Sum<'_>> = sums.into_values().collect();
+    sums.sort_by(|a, b| {
+        (Some(b.node.id) == given)
+            .cmp(&(Some(a.node.id) == given))
+            .then(b.runs.cmp(&a.runs))
+            .then(centre(b).cmp(&centre(a)))
+            .then(roughness(a).total_cmp(&roughness(b)))
+            .then(a.residual.total_cmp(&b.residual))
+            .then(a.node.id.cmp(&b.node.id))
+    });
+    if let Some(id) = given
+        && sums.first().is_none_or(|first| first.node.id != id)
+    {
+        // Told of each run that does not have it.
+        return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
+    }
+    let (first, others) = sums.split_first()?;
+    let others = others
+        .iter()
+        .filter(|sum| sum.residual <= FOLLOWS.max(2.0 * first.residual))
+        .take(NAMED)
+        .map(|sum| Alternative {
+            id: sum.node.id.to_string(),
+            about: format!(
+                "{}follows the impulse within {} %",
+                sum.node.title.as_ref().map_or(String::new(), |title| format!("\"{title}\", ")),
+                percent(sum.residual)
+            ),
+        })
+        .collect();
+    let title = first.node.title.clone();
+    Some(ChosenNode { id: first.node.id, title, residual: first.residual, others })
+}
+
+/// The force that the members share, as the recipe names it.
+fn chosen_force(
+    views: &[View<'_>],
+    explained: &[Result<Option<Explanation>, Reason>],
+) -> ChosenForce {
+    let of_members: Vec<(&Survey, &Explanation)> = views
+        .iter()
+        .zip(explained)
+        .filter_map(|(view, e)| Some((view.survey, e.as_ref().ok()?.as_ref()?)))
+        .collect();
+    let (first, explanation) =
+        of_members.first().expect("the run that gave the force its vote has it");
+    let force = &first.forces[explanation.force];
+    let all = || of_members.iter().map(|(survey, e)| &survey.forces[e.force]);
+    // Where a wall's normal force is not that along the motion in one run, the latter is taken.
+    let along = all().find(|f| f.component != "normal_force").unwrap_or(force);
+    let named = |f: &ForceCandidate| (f.file, f.id);
+    let others = (0..first.forces.len())
+        .filter(|&k| named(&first.forces[k]) != named(force))
+        .filter_map(|k| explain::of_force(first, k, None))
+        .filter(|other| other.residual < RELATED)
+        .take(NAMED)
+        .map(|other| {
+            let candidate = &first.forces[other.force];
+            let title = candidate.title.as_ref();
+            Alternative {
+                id: format!("{} {}", candidate.file, candidate.id),
+                about: format!(
+                    "{}bodies follow it within {} %; its impulse is {} % of the chosen one's",
+                    title.map_or(String::new(), |title| format!("\"{title}\", ")),
+                    percent(other.residual),
+                    percent(size(candidate) / size(force))
+                ),
+            }
+        })
+        .collect();
+    ChosenForce {
+        file: force.file,
+        id: force.id,
+        side: force.side,
+        component: along.component.into(),
+        title: force.title.clone(),
+        other_side: all().all(|f| f.other_side),
+        others,
+    }
+}
+
+/// A share in percent, with one digit below ten.
+pub(super) fn percent(share: f64) -> String {
+    let percent = share * 100.0;
+    if percent < 9.95 { format!("{percent:.1}") } else { format!("{percent:.0}") }
+}
+
+fn named(node: &NodeCandidate) -> String {
+    match &node.title {
+        Some(title) => format!("{} \"{title}\"", node.id),
+        None => node.id.to_string(),
+    }
+}

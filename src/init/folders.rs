@@ -1,0 +1,199 @@
+//! The folders of a proposal: which hold runs, how they are called, where they are seen from the
+//! study.
+
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use super::error::InitError;
+use super::left_out::{LeftOut, Reason};
+use crate::solver::decks::{self, Search};
+use crate::solver::runs::{renamed_file, run_folders};
+use crate::study::files::shown_name;
+
+/// Folders of runs, and those that are none.
+pub(super) struct Folders {
+    pub runs: Vec<PathBuf>,
+    pub left_out: Vec<LeftOut>,
+}
+
+impl Folders {
+    /// All at or below the given ones, each once.
+    pub(super) fn find(given: &[PathBuf]) -> Result<Self, InitError> {
+        let mut found = Self { runs: Vec::new(), left_out: Vec::new() };
+        let mut seen = HashSet::new();
+        let mut is_new = |path: &PathBuf| seen.insert(real(path));
+        for root in given {
+            let below = run_folders(root)
+                .map_err(|source| InitError::Folder { path: root.clone(), source })?;
+            let shown = |path: PathBuf| match path.strip_prefix(".") {
+                Ok(below) if !below.as_os_str().is_empty() => below.to_path_buf(),
+                _ => path,
+            };
+            let runs = below.runs.into_iter().map(shown);
+            found.runs.extend(runs.filter(|path| is_new(path)));
+            let without = below.without_files.into_iter().map(shown);
+            for path in without.filter(|path| is_new(path)) {
+                let reason = without_files(&path);
+                found.left_out.push(LeftOut::new(path, reason));
+            }
+            for (path, why) in below.unreadable {
+                found.left_out.push(LeftOut::new(path, Reason::Unreadable { why }));
+            }
+        }
+        if found.runs.is_empty() {
+            let searched: Vec<String> = given.iter().map(|p| p.display().to_string()).collect();
+            let searched = searched.join(", ");
+            return Err(InitError::NoRuns { searched, left_out: found.left_out });
+        }
+        Ok(found)
+    }
+
+    /// Refuses folders that hold several runs each: they are groups of their own.
+    pub(super) fn refuse_groups(&self) -> Result<(), InitError> {
+        let mut groups: BTreeMap<PathBuf, usize> = BTreeMap::new();
+        for run in &self.runs {
+            let parent = run.parent().filter(|p| !p.as_os_str().is_empty());
+            *groups.entry(parent.unwrap_or(Path::new(".")).into()).or_default() += 1;
+        }
+        groups.retain(|_, runs| *runs > 1);
+        match groups.len() {
+            0 | 1 => Ok(()),
+            _ => Err(InitError::SeveralGroups { folders: groups.into_iter().collect() }),
+        }
+    }
+
+    /// Name of the folder that holds all runs: their group, if nobody names it.
+    pub(super) fn group(&self) -> String {
+        let mut common: Option<PathBuf> = None;
+        for run in &self.runs {
+            let parent = real(run).parent().map(Path::to_path_buf).unwrap_or_default();
+            common = Some(match common {
+                None => parent,
+                Some(common) => common
+                    .ancestors()
+                    .find(|above| parent.starts_with(above))
+                    .map(Path::to_path_buf)
+                    .unwrap_or_default(),
+            });
+        }
+        let name = common.and_then(|path| Some(clean(&path.file_name()?.to_string_lossy())));
+        name.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| "runs".into())
+    }
+}
+
+/// Why a folder holds no run.
+fn without_files(folder: &Path) -> Reason {
+    let is_empty = folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    if let Some((file, format)) = renamed_file(folder) {
+        return Reason::Renamed { file: shown_name(&file), format: format.into() };
+    }
+    match decks::find(folder) {
+        _ if is_empty => Reason::Empty,
+        Search::None => Reason::NoSolverFiles,
+        Search::One(_) | Search::Several(_) => Reason::OnlyDeck,
+    }
+}
+
+fn real(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.into())
+}
+
+/// A name that can stand in a study: without control characters.
+fn clean(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
+}
+
+/// Names of the runs: that of the folder, with as many of the folders above as tell them apart.
+pub(super) fn names(runs: &[PathBuf]) -> Vec<String> {
+    let parts: Vec<Vec<String>> = runs
+        .iter()
+        .map(|run| {
+            let normal = |part| match part {
+                Component::Normal(name) => Some(clean(&name.to_string_lossy())),
+                _ => None,
+            };
+            real(run).components().filter_map(normal).collect()
+        })
+        .collect();
+    let name = |of: &[String], count: usize| of[of.len().saturating_sub(count)..].join("_");
+    let deepest = parts.iter().map(Vec::len).max().unwrap_or(1);
+    let all = |count: usize| parts.iter().map(|of| name(of, count)).collect::<Vec<_>>();
+    let is_unique = |names: &Vec<String>| names.iter().collect::<HashSet<_>>().len() == names.len();
+    (1..=deepest).map(all).find(is_unique).unwrap_or_else(|| all(deepest))
+}
+
+/// How a path is written in a file of `folder`: from there on if one leads to the other.
+///
+/// `None` if it is not UTF-8, which no TOML file can hold.
+pub(super) fn seen_from(folder: &Path, path: &Path) -> Option<String> {
+    let (from, to) = (real(folder), real(path));
+    let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    let mut way: PathBuf = from.components().skip(shared).map(|_| "..").collect();
+    way.extend(to.components().skip(shared));
+    // Far from each other only the root is shared: the whole path says it better.
+    let way = if shared <= 1 && to.is_absolute() { to } else { way };
+    let text = way.to_str()?;
+    Some(if text.is_empty() { ".".into() } else { text.into() })
+}
+
+/// A speed in m/s that a folder's name carries with its unit: `36kmh`, `v_48_km_h`, `30mph`.
+pub(super) fn speed_in(name: &str) -> Option<f64> {
+    let name = name.to_ascii_lowercase();
+    for (at, _) in name.match_indices(|c: char| c.is_ascii_digit()) {
+        let before = name[..at].chars().next_back();
+        if before.is_some_and(|c| c.is_ascii_digit() || c == '.') {
+            continue;
+        }
+        let end = name[at..].find(|c: char| !c.is_ascii_digit() && c != '.');
+        let (number, unit) = name[at..].split_at(end.unwrap_or(name.len() - at));
+        let unit: String = unit.chars().filter(|c| !matches!(c, '_' | '-' | ' ' | '/')).collect();
+        let km_per_h = ["kmh", "kmph", "kph"].iter().any(|known| unit.starts_with(known));
+        let factor = match () {
+            () if km_per_h => 1.0 / 3.6,
+            () if unit.starts_with("mph") => 0.44704,
+            () => continue,
+        };
+        return number.parse::<f64>().ok().filter(|v| *v > 0.0).map(|v| v * factor);
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_runs_apart() {
+        let paths = |list: &[&str]| list.iter().map(PathBuf::from).collect::<Vec<_>>();
+        assert_eq!(names(&paths(&["/no/a/25", "/no/a/36"])), ["25", "36"]);
+        assert_eq!(names(&paths(&["/no/v25/job", "/no/v36/job"])), ["v25_job", "v36_job"]);
+    }
+
+    #[test]
+    fn speeds_stand_in_names() {
+        fn t(name: &str, km_per_h: Option<f64>) {
+            let found = speed_in(name).map(|v| (v * 3.6 * 1e6).round() / 1e6);
+            assert_eq!(found, km_per_h, "{name}");
+        }
+        t("36kmh", Some(36.0));
+        t("run2_v_48.5_km_h_b", Some(48.5));
+        t("60 KPH", Some(60.0));
+        t("100mph", Some(160.9344));
+        t("48thick", None);
+        t("run_0010", None);
+        t("25ms", None);
+    }
+
+    #[test]
+    fn paths_lead_from_the_study_to_the_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        fs::create_dir_all(root.join("a/36")).unwrap();
+        fs::create_dir_all(root.join("b")).unwrap();
+        let seen = |from: &str, to: &str| seen_from(&root.join(from), &root.join(to)).unwrap();
+        assert_eq!(seen("a", "a/36"), "36");
+        assert_eq!(seen("b", "a/36"), "../a/36");
+        assert_eq!(seen("a/36", "a/36"), ".");
+    }
+}

@@ -1,0 +1,97 @@
+//! What the caller of a proposal already knows.
+
+use std::str::FromStr;
+
+use super::sources::FORCES;
+use crate::history::Side;
+use crate::study::StudyKind;
+use crate::unit::UnitSystem;
+
+/// What the caller already knows: it stands above what is found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Given {
+    /// Units of the solver's files.
+    pub units: Option<UnitSystem>,
+    /// What hits what.
+    pub kind: Option<StudyKind>,
+    /// The runs are of one body against the symmetry plane of a pair.
+    pub half_model: bool,
+    /// Node of the (moving) body.
+    pub node: Option<i64>,
+    /// Node of the other body of a pair.
+    pub minus_node: Option<i64>,
+    /// The contact force.
+    pub force: Option<GivenForce>,
+    /// Mass of the body, in kg.
+    pub mass_kg: Option<f64>,
+    /// Mass of the other body of a pair, in kg.
+    pub other_mass_kg: Option<f64>,
+    /// Group of the curve database; it says as well that all runs belong to one group.
+    pub group: Option<String>,
+}
+
+/// A force as `FILE:ID[:SIDE][:COMPONENT]`, such as `rcforc:3:surfa`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenForce {
+    /// One of `rwforc`, `rcforc`, `secforc`.
+    pub file: String,
+    /// Number of the wall, interface or section.
+    pub id: i64,
+    /// Side of an interface.
+    pub side: Option<Side>,
+    /// Such as `normal_force`.
+    pub component: Option<String>,
+}
+
+/// A text that names no force.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "\"{text}\" is no force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
+    FORCES.join(", ")
+)]
+pub struct NoForce {
+    /// The text.
+    pub text: String,
+}
+
+impl FromStr for GivenForce {
+    type Err = NoForce;
+
+    fn from_str(text: &str) -> Result<Self, NoForce> {
+        let wrong = || NoForce { text: text.into() };
+        let mut parts = text.split(':');
+        let file = parts.next().filter(|file| FORCES.contains(file)).ok_or_else(wrong)?;
+        let id = parts.next().and_then(|id| id.parse().ok()).ok_or_else(wrong)?;
+        let mut given = Self { file: file.into(), id, side: None, component: None };
+        for part in parts {
+            match Side::parse(part) {
+                Some(side) if given.side.is_none() && given.component.is_none() => {
+                    given.side = Some(side);
+                }
+                None if given.component.is_none() && part.ends_with("_force") => {
+                    given.component = Some(part.into());
+                }
+                _ => return Err(wrong()),
+            }
+        }
+        Ok(given)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_are_read() {
+        let force: GivenForce = "rcforc:3:slave:x_force".parse().unwrap();
+        assert_eq!((&*force.file, force.id, force.side), ("rcforc", 3, Some(Side::SurfA)));
+        assert_eq!(force.component.as_deref(), Some("x_force"));
+        assert_eq!("rwforc:1".parse::<GivenForce>().unwrap().component, None);
+        for wrong in
+            ["rwforc", "nodout:1", "rcforc:x", "rcforc:3:left", "rcforc:3:x_force:surfa", ""]
+        {
+            assert!(wrong.parse::<GivenForce>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Proposals: a study from run folders, and a scenario from models, with where each value is from.
+//!
+//! Nothing is made up: a value is read, computed from what was read, or the likely one of several,
+//! and says so; what cannot be found is left to fill in.
+
+mod agree;
+mod batches;
+mod describe;
+mod error;
+mod evidence;
+mod explain;
+mod folders;
+mod given;
+mod left_out;
+mod masses;
+mod measure;
+mod proposal;
+mod propose;
+mod record;
+mod sampling;
+mod scenario;
+mod series;
+mod sources;
+mod survey;
+mod text;
+mod titles;
+mod trial;
+mod units;
+mod write;
+
+use std::path::Path;
+
+pub use agree::Alternative;
+pub use error::InitError;
+pub use evidence::{Evidence, Proposed};
+pub use given::{Given, GivenForce, NoForce};
+pub use left_out::{LeftOut, Reason};
+pub use proposal::{Proposal, ProposedRun};
+pub use propose::{Request, propose};
+pub use scenario::{
+    ProposedCurve, ProposedTrain, ProposedVehicle, ScenarioProposal, propose_scenario,
+};
+
+/// Refuses a file that is there already.
+///
+/// # Errors
+/// [`InitError::Exists`]; a device or a pipe may be written to.
+pub fn refuse_existing(path: &Path) -> Result<(), InitError> {
+    let is_there = std::fs::symlink_metadata(path)
+        .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
+    match is_there {
+        true => Err(InitError::Exists { path: path.into() }),
+        false => Ok(()),
+    }
+}

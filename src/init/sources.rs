@@ -1,0 +1,197 @@
+//! Which files of a run hold which histories: the one that a build takes, and the others.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::left_out::Reason;
+use crate::solver::decks::{self, Search};
+use crate::solver::lsdyna::deck::Deck;
+use crate::solver::{self, Entity, Selection, SolverFile};
+use crate::study::files::{content_hash, is_section_of, is_without_states, shown_name};
+
+/// Histories of nodes, named as a recipe's file is.
+pub(super) const MOTION: &str = "nodout";
+/// Forces that a recipe can name, what acts between bodies before what acts within one.
+pub(super) const FORCES: [&str; 3] = ["rwforc", "rcforc", "secforc"];
+/// Energies of the whole model.
+const ENERGY: &str = "glstat";
+/// What a text says that was made of a T01.
+const MADE_OF_T01: &str = "OpenRadioss";
+
+/// A file, or a section of one, with histories that a recipe can name.
+#[derive(Clone, Debug)]
+pub(super) struct Source {
+    /// As a recipe names it.
+    pub name: &'static str,
+    pub path: PathBuf,
+    /// Section of a binary file; `None` for a text file.
+    pub section: Option<String>,
+    pub entities: Vec<Entity>,
+    pub components: Vec<Arc<str>>,
+    pub states: usize,
+    /// Why its forces are means over their output intervals, if they are.
+    pub means: Option<String>,
+    /// Further files of the folder that hold the same section.
+    pub others: Vec<String>,
+    /// The first damage of the file.
+    pub damage: Option<String>,
+}
+
+/// The files of a run that matter to a proposal.
+#[derive(Clone, Debug)]
+pub(super) struct Sources {
+    pub motion: Source,
+    pub forces: Vec<Source>,
+    pub energy: Option<Source>,
+    pub deck: Option<(PathBuf, Box<Deck>)>,
+    /// Files that could not be read, each with the reason.
+    pub unread: Vec<String>,
+    /// BLAKE3 over the files of motion and forces, for runs that are there twice.
+    pub hash: String,
+}
+
+/// A file with its sections, without their histories.
+struct Listed {
+    path: PathBuf,
+    sections: Vec<SolverFile>,
+}
+
+impl Sources {
+    /// The files of the run in `folder`.
+    pub(super) fn of(folder: &Path) -> Result<Self, Reason> {
+        let unreadable = |why: String| Reason::Unreadable { why };
+        let files = solver::runs::output_files(folder).map_err(|e| unreadable(e.to_string()))?;
+        let (mut listed, mut unread) = (Vec::new(), Vec::new());
+        let names_only = Selection { audit: false, ..Selection::nothing() };
+        for path in files.iter().filter(|path| is_looked_at(path)) {
+            match solver::read_sections(path, None, &names_only) {
+                Ok(sections) => listed.push(Listed { path: path.clone(), sections }),
+                Err(error) => unread.push(error.to_string()),
+            }
+        }
+        let deck = deck_of(folder);
+        if let Some((_, deck)) = &deck {
+            for section in listed.iter_mut().flat_map(|file| &mut file.sections) {
+                decks::fill_titles(section, deck);
+            }
+        }
+        let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
+            let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
+            found.extend(unread.iter().map(|why| format!("({why})")));
+            Reason::NoMotion { found: found.join(", ") }
+        })?;
+        let forces: Vec<Source> =
+            FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed)).collect();
+        let mut parts = motion.parts();
+        for part in forces.iter().flat_map(Source::parts) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        let (_, hash) = content_hash(&parts).map_err(|e| unreadable(e.to_string()))?;
+        let energy = Source::choose(folder, ENERGY, &listed);
+        Ok(Self { motion, forces, energy, deck, unread, hash })
+    }
+
+    /// The source that a recipe calls `name`.
+    pub(super) fn force(&self, name: &str) -> Option<&Source> {
+        self.forces.iter().find(|source| source.name == name)
+    }
+}
+
+impl Source {
+    /// The file that a build takes for `name`: the text, else the first binary file that has it.
+    fn choose(folder: &Path, name: &'static str, listed: &[Listed]) -> Option<Self> {
+        let is_text = |file: &Listed| file.path == folder.join(name);
+        let holds = |file: &&Listed| {
+            is_text(file) || file.sections.iter().any(|s| is_section_of(&s.section, name))
+        };
+        let mut holders: Vec<&Listed> = listed.iter().filter(holds).collect();
+        holders.sort_by_key(|file| !is_text(file));
+        if holders.len() > 1 && is_text(holders[0]) && is_without_states(&holders[0].path) {
+            holders.remove(0);
+        }
+        let (chosen, others) = holders.split_first()?;
+        let is_wanted = |s: &&SolverFile| is_text(chosen) || is_section_of(&s.section, name);
+        let section = chosen.sections.iter().find(is_wanted)?;
+        Some(Self {
+            name,
+            path: chosen.path.clone(),
+            section: (!is_text(chosen)).then(|| section.section.clone()),
+            entities: section.entities.clone(),
+            components: section.components.clone(),
+            states: section.time.len(),
+            means: means(section),
+            others: others.iter().map(|file| shown_name(&file.path)).collect(),
+            damage: section.problems.first().map(ToString::to_string),
+        })
+    }
+
+    /// As it is called in messages: `nodout`, or `rwforc of crashT01`.
+    pub(super) fn shown(&self) -> String {
+        match &self.section {
+            Some(_) => format!("{} of {}", self.name, shown_name(&self.path)),
+            None => self.name.into(),
+        }
+    }
+
+    /// Whether it has a component.
+    pub(super) fn has(&self, component: &str) -> bool {
+        self.components.iter().any(|c| **c == *component)
+    }
+
+    /// Reads some of its histories; `ids` of `None` are all.
+    pub(super) fn read(
+        &self,
+        ids: Option<Vec<solver::WantedId>>,
+        components: &[&str],
+    ) -> Result<SolverFile, Reason> {
+        let selection = Selection {
+            ids,
+            components: Some(components.iter().map(ToString::to_string).collect()),
+            section: self.section.clone(),
+            ..Selection::all()
+        };
+        let read = solver::read_sections(&self.path, None, &selection);
+        let unreadable = |why: String| Reason::Unreadable { why };
+        let mut sections = read.map_err(|e| unreadable(e.to_string()))?;
+        sections.pop().ok_or_else(|| unreadable(format!("{} holds nothing", self.shown())))
+    }
+
+    fn parts(&self) -> Vec<PathBuf> {
+        match self.section {
+            Some(_) => solver::family(&self.path),
+            None => vec![self.path.clone()],
+        }
+    }
+}
+
+/// Whether a file may hold what a proposal looks at: large files of other kinds are not opened.
+fn is_looked_at(path: &Path) -> bool {
+    let name = shown_name(path);
+    let is_binary = name.starts_with("binout") || name.ends_with("T01");
+    is_binary || FORCES.contains(&&*name) || [MOTION, ENERGY].contains(&&*name)
+}
+
+/// Why the forces of a file are means over their output intervals, if they are.
+fn means(file: &SolverFile) -> Option<String> {
+    let version = file.version.as_deref().unwrap_or_default();
+    if file.format == "t01" {
+        return Some("a T01 holds impulses, so each force is a mean over two intervals".into());
+    }
+    version.contains(MADE_OF_T01).then(|| {
+        format!("its second line says \"{version}\": a mean over two intervals of a T01's impulse")
+    })
+}
+
+/// The deck of a run: in its folder, or else in the one above, which a group of runs may share.
+fn deck_of(folder: &Path) -> Option<(PathBuf, Box<Deck>)> {
+    let above = std::fs::canonicalize(folder).ok().and_then(|path| Some(path.parent()?.into()));
+    let folders = [Some(PathBuf::from(folder)), above];
+    let found = folders.into_iter().flatten().find_map(|folder| match decks::find(&folder) {
+        Search::One(path) => Some(path),
+        Search::None | Search::Several(_) => None,
+    })?;
+    let deck = decks::read(&found).ok()?;
+    Some((found, Box::new(deck)))
+}

@@ -1,0 +1,289 @@
+//! The unit system of a run: what its deck states, or the one in which its impact is possible.
+//!
+//! Momentum and energy balance in every consistent system, so only magnitudes tell: an impact
+//! has a speed, a crush, a time to the largest crush and a mass that vehicles have.
+
+use super::evidence::{Evidence, Proposed};
+use crate::unit::{UnitSystem, km_per_h};
+
+/// What of an impact depends on the units, in the file's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Magnitudes {
+    pub speed: f64,
+    pub crush: f64,
+    pub loading_time: f64,
+    pub mass: Option<f64>,
+}
+
+/// A quantity of an impact in SI: what is possible, and what is usual.
+struct Range {
+    low: f64,
+    high: f64,
+    usual: f64,
+    /// A factor from the usual value that is still quite usual.
+    spread: f64,
+}
+
+/// From a shunting impact against a symmetry plane to beyond the fastest train.
+const SPEED_M_PER_S: Range = Range { low: 0.05, high: 200.0, usual: 10.0, spread: 3.0 };
+const CRUSH_M: Range = Range { low: 3e-4, high: 30.0, usual: 0.3, spread: 4.0 };
+const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 };
+/// From a test body to a train.
+const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
+
+impl Range {
+    fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    /// How unusual a value is: 1 at `spread` times the usual one.
+    fn unusual(&self, value: f64) -> f64 {
+        ((value / self.usual).ln() / self.spread.ln()).powi(2)
+    }
+}
+
+impl Magnitudes {
+    /// The quantities in SI, each with its range and how it is said.
+    fn in_si(&self, units: &UnitSystem) -> Vec<(f64, &'static Range, String)> {
+        let speed = self.speed * units.speed();
+        let crush = self.crush * units.length_m;
+        let time = self.loading_time * units.time_s;
+        let mut all = vec![
+            (time, &LOADING_S, format!("a crush that takes {}", seconds(time))),
+            (speed, &SPEED_M_PER_S, format!("an impact at {}", shown_speed(speed))),
+            (crush, &CRUSH_M, format!("a crush of {} m", digits(crush))),
+        ];
+        if let Some(mass) = self.mass.map(|mass| mass * units.mass_kg) {
+            all.push((mass, &MASS_KG, format!("a body of {}", shown_mass(mass))));
+        }
+        all
+    }
+
+    /// Why the units are impossible, if they are.
+    pub(super) fn impossible(&self, units: &UnitSystem) -> Option<String> {
+        let all = self.in_si(units);
+        all.into_iter().find(|(value, range, _)| !range.holds(*value)).map(|(.., said)| said)
+    }
+
+    /// The quantity that is least usual, and how unusual all are together.
+    fn unusual(&self, units: &UnitSystem) -> (f64, String) {
+        let all = self.in_si(units);
+        let sum = all.iter().map(|(value, range, _)| range.unusual(*value)).sum();
+        let of = |(value, range, _): &(f64, &Range, String)| range.unusual(*value);
+        let most = all.into_iter().max_by(|a, b| of(a).total_cmp(&of(b)));
+        (sum, most.map_or(String::new(), |(.., said)| said))
+    }
+}
+
+/// The units of all runs, as far as they can be told.
+///
+/// `stated`: what a deck says, with its place.
+pub(super) fn choose(
+    runs: &[Magnitudes],
+    given: Option<UnitSystem>,
+    stated: Option<(UnitSystem, String)>,
+    warnings: &mut Vec<String>,
+) -> Proposed<UnitSystem> {
+    let refused = |units: &UnitSystem| runs.iter().find_map(|run| run.impossible(units));
+    if let Some(units) = given {
+        if let Some(why) = refused(&units) {
+            warnings.push(format!(
+                "units: {units} as given would make {why}, which is no crash; {}",
+                match guessed(runs) {
+                    Some((guess, _)) => format!("{guess} would fit"),
+                    None => "no usual system fits better".into(),
+                }
+            ));
+        }
+        return Proposed::found(units, Evidence::Given("by --units".into()));
+    }
+    if let Some((units, place)) = stated {
+        match refused(&units) {
+            None => {
+                let from = match guessed(runs) {
+                    Some((guess, evidence)) if guess == units => {
+                        format!("{place}; and {}", evidence.from())
+                    }
+                    _ => place,
+                };
+                return Proposed::found(units, Evidence::Read(from));
+            }
+            Some(why) => warnings.push(format!(
+                "units: {place} states {units}, which would make {why}; it is not taken"
+            )),
+        }
+    }
+    match guessed(runs) {
+        Some((units, evidence)) => Proposed::found(units, evidence),
+        None => Proposed::missing(match runs.first() {
+            Some(first) => format!(
+                "in none of the usual systems ({}) is this an impact: speed {}, crush {}, time to it {} in the file's units",
+                UnitSystem::USUAL.join(", "),
+                digits(first.speed),
+                digits(first.crush),
+                digits(first.loading_time)
+            ),
+            None => "no run tells them".into(),
+        }),
+    }
+}
+
+/// For each run whether it is possible in the usual system in which most runs are.
+pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
+    let systems = UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok());
+    let agreeing = systems.map(|units| {
+        let agree: Vec<bool> = runs.iter().map(|run| run.impossible(&units).is_none()).collect();
+        let unusual: f64 = runs
+            .iter()
+            .zip(&agree)
+            .filter(|(_, agrees)| **agrees)
+            .map(|(run, _)| run.unusual(&units).0)
+            .sum();
+        (agree.iter().filter(|agrees| **agrees).count(), unusual, agree)
+    });
+    let best = agreeing.reduce(|a, b| match b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() {
+        true => b,
+        false => a,
+    });
+    match best {
+        Some((count, _, agree)) if count > 0 => agree,
+        _ => vec![true; runs.len()],
+    }
+}
+
+/// The usual system in which all runs are possible; of several the most usual one.
+fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence)> {
+    let systems = UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok());
+    let (mut possible, mut others) = (Vec::new(), Vec::new());
+    for units in systems {
+        match runs.iter().find_map(|run| run.impossible(&units)) {
+            Some(why) => others.push(format!("{units} would make {why}")),
+            None => {
+                let mean = runs.iter().map(|run| run.unusual(&units).0).sum::<f64>();
+                possible.push((mean, units));
+            }
+        }
+    }
+    possible.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, units) = possible.first().copied().filter(|_| !runs.is_empty())?;
+    let others = others.join(", ");
+    if possible.len() == 1 {
+        let from = format!("the only usual system in which these impacts are possible: {others}");
+        return Some((units, Evidence::Computed(from)));
+    }
+    let less: Vec<String> = possible[1..]
+        .iter()
+        .map(|(_, units)| format!("{units} ({})", runs[0].unusual(units).1))
+        .collect();
+    let from = format!(
+        "the most usual impacts in it; also possible, but less usual: {}; impossible: {others}",
+        less.join(", ")
+    );
+    Some((units, Evidence::Guessed(from)))
+}
+
+fn shown_speed(m_per_s: f64) -> String {
+    match (0.3..SPEED_M_PER_S.high).contains(&m_per_s) {
+        true => km_per_h(m_per_s),
+        false => format!("{} m/s", digits(m_per_s)),
+    }
+}
+
+pub(super) fn shown_mass(kg: f64) -> String {
+    if kg >= 1e3 { format!("{} t", digits(kg / 1e3)) } else { format!("{} kg", digits(kg)) }
+}
+
+fn seconds(s: f64) -> String {
+    match s {
+        s if s >= 1.0 => format!("{} s", digits(s)),
+        s if s >= 1e-4 => format!("{} ms", digits(s * 1e3)),
+        s => format!("{} µs", digits(s * 1e6)),
+    }
+}
+
+/// Three significant digits, for messages.
+pub(super) fn digits(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let places = 2 - value.abs().log10().floor() as i32;
+    match places {
+        0..=9 => trimmed(&format!("{value:.*}", places as usize)),
+        -6..=-1 => format!("{value:.0}"),
+        _ => format!("{value:.2e}"),
+    }
+}
+
+/// A decimal number without zeros at its end.
+pub(super) fn trimmed(number: &str) -> String {
+    match number.contains('.') {
+        true => number.trim_end_matches('0').trim_end_matches('.').into(),
+        false => number.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A car of 1.2 t at 50 km/h in some units.
+    fn car(units: &UnitSystem) -> Magnitudes {
+        Magnitudes {
+            speed: 13.9 / units.speed(),
+            crush: 0.55 / units.length_m,
+            loading_time: 0.06 / units.time_s,
+            mass: Some(1200.0 / units.mass_kg),
+        }
+    }
+
+    #[test]
+    fn units_are_told_by_what_is_possible() {
+        for name in UnitSystem::USUAL {
+            let units = UnitSystem::parse(name).unwrap();
+            let found = choose(&[car(&units)], None, None, &mut Vec::new());
+            assert_eq!(found.value(), Some(&units), "{found}");
+        }
+    }
+
+    #[test]
+    fn a_light_body_in_kilogrammes_may_be_a_heavy_one_in_grammes() {
+        let units = UnitSystem::parse("mm-kg-ms").unwrap();
+        let train = Magnitudes { mass: Some(24e3), ..car(&units) };
+        let found = choose(&[train], None, None, &mut Vec::new());
+        assert_eq!(found.value(), Some(&units));
+        assert!(found.to_string().starts_with("guessed: "), "{found}");
+        assert!(found.to_string().contains("mm-g-ms (a body of 24 kg)"), "{found}");
+    }
+
+    #[test]
+    fn a_deck_that_cannot_be_is_not_believed() {
+        let units = UnitSystem::parse("mm-t-s").unwrap();
+        let mut warnings = Vec::new();
+        let stated = Some((UnitSystem::SI, "main.k, line 3".to_string()));
+        let found = choose(&[car(&units)], None, stated.clone(), &mut warnings);
+        assert_eq!(found.value(), Some(&units));
+        assert_eq!(
+            warnings,
+            [
+                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not taken"
+            ]
+        );
+        let found = choose(&[car(&UnitSystem::SI)], None, stated, &mut Vec::new());
+        let said = found.to_string();
+        assert!(said.starts_with("read: main.k, line 3; and the only usual system"), "{said}");
+    }
+
+    #[test]
+    fn what_is_no_impact_has_no_units() {
+        let slow = Magnitudes { speed: 1e-9, crush: 1e-9, loading_time: 1e-9, mass: None };
+        let found = choose(&[slow], None, None, &mut Vec::new());
+        assert!(found.value().is_none());
+        assert!(found.to_string().starts_with("fill in: in none of the usual systems"), "{found}");
+    }
+
+    #[test]
+    fn numbers_are_shown_with_three_digits() {
+        let shown = [24.0, 0.123456, 10000.0, 1.5e-9, 123456.0].map(digits);
+        assert_eq!(shown, ["24", "0.123", "10000", "1.50e-9", "123456"]);
+    }
+}

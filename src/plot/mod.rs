@@ -1,0 +1,34 @@
+//! Charts: axes, series, bands and a legend, as SVG and PNG of one drawing.
+//!
+//! A [`Chart`] says what is shown. [`Chart::drawing`] places it: every line, and every text with the size that its
+//! font gives it. The two writers only spell that drawing, so both pictures show the same. The font is part of the
+//! program; no font of the system and no function of the platform has a say, and the bytes are the same everywhere.
+//!
+//! ```
+//! use crumple::plot::{Axis, Chart, Panel, Series};
+//!
+//! let mut panel = Panel::new(Axis::new("deflection", "m", 1.0), Axis::new("force", "MN", 1e-6));
+//! panel.series.push(Series::line("FE at 36 km/h", 0, vec![0.0, 0.1, 0.2], vec![0.0, 3.1e6, 1.2e6]));
+//! let drawing = Chart::of("Lead car against a wall", panel).drawing();
+//! assert!(drawing.svg().starts_with("<svg"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod chart;
+mod clip;
+mod drawing;
+mod font;
+mod layout;
+mod legend;
+mod look;
+mod png;
+mod svg;
+mod thin;
+mod ticks;
+
+pub use chart::{Axis, Band, Chart, Mark, Panel, Series, Shown};
+pub use drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text, TextBox};
+pub use png::PngError;
+pub use svg::SvgFor;
+
+pub(crate) use look::looks_for_pages;

@@ -1,0 +1,254 @@
+//! A drawing as SVG.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use super::drawing::{Drawing, Paint, Shape, Shows, Stroke, Text};
+use super::font::{self, Piece};
+use super::look;
+
+/// Size of texts that say no other, in pixels: that of the numbers at ticks.
+const SIZE: f64 = 12.0;
+
+/// Where an SVG is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SvgFor {
+    /// A file: colours are written out, and texts are outlines, so that no font is needed.
+    File,
+    /// Within an HTML page: texts are texts, and colours are classes (`ink`, `grid`, `s0` to `s7`) of its styles.
+    Page,
+}
+
+impl Drawing {
+    /// The drawing as a file.
+    pub fn svg(&self) -> String {
+        self.svg_for(SvgFor::File)
+    }
+
+    /// The drawing as SVG 1.1; in a page without its namespace.
+    pub fn svg_for(&self, target: SvgFor) -> String {
+        let mut out = String::new();
+        let (width, height) = (number(self.width), number(self.height));
+        let namespaces = match target {
+            SvgFor::File => {
+                r#" xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink""#
+            }
+            SvgFor::Page => "",
+        };
+        let size = match target {
+            SvgFor::File => format!(r#" width="{width}" height="{height}""#),
+            SvgFor::Page => String::new(),
+        };
+        let title = escaped(&self.title);
+        let _ = writeln!(
+            out,
+            r#"<svg{namespaces} viewBox="0 0 {width} {height}"{size} fill="none" stroke-linejoin="round" font-size="12" role="img" aria-label="{title}">"#
+        );
+        if target == SvgFor::File {
+            let _ = writeln!(out, "<title>{title}</title>");
+            self.define_glyphs(&mut out);
+            let paper = colour(Paint::Paper);
+            let _ = writeln!(out, r#"<rect width="{width}" height="{height}" fill="{paper}"/>"#);
+        }
+        for shape in &self.shapes {
+            match shape {
+                Shape::Text(text) => write_text(&mut out, text, target),
+                Shape::Path { lines, is_closed, stroke, fill, shows } => {
+                    let data = path_data(lines, *is_closed);
+                    if !data.is_empty() {
+                        let looks = looks(stroke.as_ref(), *fill, target);
+                        let _ =
+                            writeln!(out, r#"<path{} d="{data}"{looks}/>"#, tag(*shows, target));
+                    }
+                }
+            }
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+
+    /// Outlines of all characters in use, once each.
+    fn define_glyphs(&self, out: &mut String) {
+        let texts = self.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text(text) => Some(&text.text),
+            Shape::Path { .. } => None,
+        });
+        let glyphs: BTreeSet<u16> =
+            texts.flat_map(|text| font::place(text).0).map(|placed| placed.glyph).collect();
+        out.push_str("<defs>\n");
+        for glyph in glyphs {
+            let mut data = String::new();
+            for piece in font::outline(glyph) {
+                let _ = match piece {
+                    Piece::Move(x, y) => write!(data, "M{x} {y}"),
+                    Piece::Line(x, y) => write!(data, "L{x} {y}"),
+                    Piece::Quad(a, b, x, y) => write!(data, "Q{a} {b} {x} {y}"),
+                    Piece::Close => write!(data, "Z"),
+                };
+            }
+            if !data.is_empty() {
+                let _ = writeln!(out, r#"<path id="g{glyph}" d="{data}"/>"#);
+            }
+        }
+        out.push_str("</defs>\n");
+    }
+}
+
+/// Digits behind the point: a tenth of a pixel.
+fn number(value: f64) -> String {
+    let text = format!("{value:.1}");
+    let text = text.strip_suffix(".0").unwrap_or(&text);
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// Lines with coordinates from point to point, in whole tenths of a pixel: half as long as places.
+fn path_data(lines: &[Vec<(f64, f64)>], is_closed: bool) -> String {
+    let tenths = |v: f64| (v * 10.0).round() as i64;
+    let mut data = String::new();
+    for line in lines.iter().filter(|line| line.len() > 1) {
+        let (mut x, mut y) = (tenths(line[0].0), tenths(line[0].1));
+        let _ = write!(data, "M{} {}l", number(line[0].0), number(line[0].1));
+        let mut needs_space = false;
+        for (px, py) in &line[1..] {
+            let (next_x, next_y) = (tenths(*px), tenths(*py));
+            for step in [next_x - x, next_y - y] {
+                if needs_space && step >= 0 {
+                    data.push(' ');
+                }
+                data.push_str(&short(step));
+                needs_space = true;
+            }
+            (x, y) = (next_x, next_y);
+        }
+        if is_closed {
+            data.push('Z');
+        }
+    }
+    data
+}
+
+/// Tenths as a number: `-.3`, `12`, `1.5`.
+fn short(tenths: i64) -> String {
+    let sign = if tenths < 0 { "-" } else { "" };
+    match (tenths.abs() / 10, tenths.abs() % 10) {
+        (whole, 0) => format!("{sign}{whole}"),
+        (0, part) => format!("{sign}.{part}"),
+        (whole, part) => format!("{sign}{whole}.{part}"),
+    }
+}
+
+/// Colour of a paint in a file, on white.
+pub(super) fn colour(paint: Paint) -> &'static str {
+    match paint {
+        Paint::Paper => "#ffffff",
+        Paint::Ink => "#222222",
+        Paint::Faint => "#595959",
+        Paint::Grid => "#dddddd",
+        Paint::Series(look) => look::colour(look),
+    }
+}
+
+/// Class of a paint in a page.
+fn class(paint: Paint) -> String {
+    match paint {
+        Paint::Paper => "paper".into(),
+        Paint::Ink => "ink".into(),
+        Paint::Faint => "faint".into(),
+        Paint::Grid => "grid".into(),
+        Paint::Series(look) => format!("s{}", look % 8),
+    }
+}
+
+fn looks(stroke: Option<&Stroke>, fill: Option<(Paint, f64)>, target: SvgFor) -> String {
+    let mut looks = String::new();
+    let in_page = target == SvgFor::Page;
+    let mut classes = Vec::new();
+    if let Some((paint, opacity)) = fill {
+        match in_page {
+            true => classes.push(format!("f-{}", class(paint))),
+            false => {
+                let _ = write!(looks, r#" fill="{}""#, colour(paint));
+            }
+        }
+        if opacity < 1.0 {
+            let _ = write!(looks, r#" fill-opacity="{opacity}""#);
+        }
+    }
+    if let Some(Stroke { paint, width, dash }) = stroke {
+        if in_page {
+            classes.push(format!("l-{}", class(*paint)));
+        } else {
+            let _ = write!(looks, r#" stroke="{}""#, colour(*paint));
+        }
+        if *width != 1.0 {
+            let _ = write!(looks, r#" stroke-width="{}""#, number(*width));
+        }
+        if !dash.is_empty() {
+            let lengths: Vec<String> = dash.iter().map(|l| number(*l)).collect();
+            let _ = write!(looks, r#" stroke-dasharray="{}""#, lengths.join(" "));
+        }
+    }
+    if !classes.is_empty() {
+        let _ = write!(looks, r#" class="{}""#, classes.join(" "));
+    }
+    looks
+}
+
+/// In a page: what a script finds a shape by.
+fn tag(shows: Option<Shows>, target: SvgFor) -> String {
+    match shows.filter(|_| target == SvgFor::Page) {
+        Some(Shows::Series(panel, k)) => format!(r#" data-series="{panel}.{k}""#),
+        Some(Shows::Band(panel, k)) => format!(r#" data-band="{panel}.{k}""#),
+        Some(Shows::Ticks(panel)) => format!(r#" data-ticks="{panel}""#),
+        Some(Shows::Legend) => r#" data-legend="""#.into(),
+        None => String::new(),
+    }
+}
+
+fn write_text(out: &mut String, text: &Text, target: SvgFor) {
+    let (x, y, said) = (number(text.x), number(text.y), escaped(&text.text));
+    let turned = if text.is_upright { " rotate(-90)" } else { "" };
+    if target == SvgFor::Page {
+        let place = match text.is_upright {
+            true => format!(r#"transform="translate({x} {y}){turned}""#),
+            false => format!(r#"x="{x}" y="{y}""#),
+        };
+        let size = match text.size {
+            SIZE => String::new(),
+            size => format!(r#" font-size="{}""#, number(size)),
+        };
+        let (tag, class) = (tag(text.shows, target), class(text.paint));
+        let _ = writeln!(out, r#"<text{tag} {place}{size} class="f-{class}">{said}</text>"#);
+        return;
+    }
+    // Outlines have y upwards.
+    let scale = format!("{:.6}", text.size / font::units_per_em());
+    let _ = write!(
+        out,
+        r#"<g transform="translate({x} {y}){turned} scale({scale} -{scale})" fill="{}" aria-label="{said}">"#,
+        colour(text.paint)
+    );
+    for placed in font::place(&text.text).0 {
+        if !font::outline(placed.glyph).is_empty() {
+            let _ = write!(out, r##"<use xlink:href="#g{}" x="{}"/>"##, placed.glyph, placed.x);
+        }
+    }
+    out.push_str("</g>\n");
+}
+
+/// A text as XML and HTML take it; control characters, which XML does not take at all, are replaced.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}

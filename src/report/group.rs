@@ -1,0 +1,389 @@
+//! What the report says of a group: its runs, how good predictions are, a prediction, the methods.
+
+use super::figure::Figure;
+use super::text::{energy, mega_newton, metres, percent, signed_percent, tonnes};
+use super::{
+    Cell, Content, KeyFigure, MethodSpeeds, Part, ReportError, ReportSettings, Section, Table,
+};
+use crate::assess::ComparisonSettings;
+use crate::assess::choose::next_run;
+use crate::assess::compare::{Comparison, compare, inner_speeds};
+use crate::assess::error::ValidateError;
+use crate::assess::validate::{Choice, train_chosen, validate};
+use crate::charts;
+use crate::curve::{Case, ForceKind};
+use crate::dataset::TrainingSet;
+use crate::plural::counted;
+use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
+use crate::unit::km_per_h;
+
+/// Adds the section of a group.
+///
+/// # Errors
+/// [`ReportError`] if its models cannot be fitted. A group too small to be validated shows its runs alone.
+pub(super) fn add(
+    content: &mut Content,
+    group: &str,
+    cases: &[Case],
+    models: &[Model],
+    settings: &ReportSettings,
+) -> Result<(), ReportError> {
+    let number = content.sections.len() + 1;
+    let mut parts = vec![
+        Part::Figure(Figure::new(
+            format!("g{number}-curves"),
+            charts::group_curves(group, cases, own_force(cases)),
+        )),
+        Part::Table(runs(group, cases)),
+    ];
+    for case in cases {
+        for warning in &case.warnings {
+            content.warn(format!("{group}, {}: {warning}", case.name));
+        }
+    }
+    match known_or_new(group, cases, models, settings) {
+        Ok(validation) => {
+            let validated = Validated { group, cases, validation, number };
+            validated.add_validation(content, &mut parts, settings);
+            validated.add_prediction(content, &mut parts, settings)?;
+            validated.add_methods(&mut parts, settings)?;
+        }
+        Err(error) => content.warn(format!("{group} cannot be validated: {error}")),
+    }
+    let id = format!("group-{number}");
+    content.sections.push(Section { id, title: group.into(), parts });
+    Ok(())
+}
+
+/// The validation that a model of these cases carries, or a new one.
+fn known_or_new(
+    group: &str,
+    cases: &[Case],
+    models: &[Model],
+    settings: &ReportSettings,
+) -> Result<Validation, ValidateError> {
+    let hash = TrainingSet::new(group, cases)?.hash();
+    let is_of_these = |model: &&Model| model.group == group && model.training_hash == hash;
+    match models.iter().find(is_of_these).and_then(|model| model.leave_one_out.clone()) {
+        Some(known) => Ok(known),
+        None => validate(group, cases, &ModelKind::candidates(settings.seed), None),
+    }
+}
+
+fn own_force(cases: &[Case]) -> ForceKind {
+    cases.first().map_or(ForceKind::Contact, |case| case.force_kind)
+}
+
+/// Speed, mass, peak, crush and audit of every run.
+fn runs(group: &str, cases: &[Case]) -> Table {
+    let kind = cases.first().map_or("impact", |case| case.speed.kind.name());
+    let heading = [
+        "run",
+        &format!("{kind} speed"),
+        "mass",
+        "largest force",
+        "largest crush",
+        "work",
+        "work / energy",
+        "warnings",
+    ];
+    let rows = cases.iter().map(|case| {
+        let warnings = case.warnings.len();
+        vec![
+            case.name.as_str().into(),
+            km_per_h(case.speed.m_per_s).into(),
+            masses(case).into(),
+            mega_newton(case.peak_force_n()).into(),
+            metres(case.max_deflection_m()).into(),
+            energy(case.audit.work_j).into(),
+            format!("{:.3}", case.audit.ratio()).into(),
+            Cell {
+                text: if warnings == 0 { "none".into() } else { warnings.to_string() },
+                title: case.warnings.join("; "),
+                is_chosen: false,
+            },
+        ]
+    });
+    Table {
+        caption: format!("FE runs of {group}"),
+        heading: heading.map(String::from).to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+fn masses(case: &Case) -> String {
+    let body = tonnes(case.masses.body_kg);
+    match case.masses.other_kg {
+        Some(other) => format!("{body} on {}", tonnes(other)),
+        None => body,
+    }
+}
+
+/// A group with the errors of its models at left-out speeds.
+struct Validated<'a> {
+    group: &'a str,
+    cases: &'a [Case],
+    validation: Validation,
+    number: usize,
+}
+
+impl Validated<'_> {
+    fn id(&self, what: &str) -> String {
+        format!("g{}-{what}", self.number)
+    }
+
+    /// The table of models, why one was chosen, and the left-out speed where it is worst.
+    fn add_validation(
+        &self,
+        content: &mut Content,
+        parts: &mut Vec<Part>,
+        settings: &ReportSettings,
+    ) {
+        let Self { group, cases, validation, .. } = self;
+        parts.push(Part::Heading("How far predictions lie from FE".into()));
+        let chosen = validation.means.iter().find(|means| means.model == validation.chosen);
+        if let Some(means) = chosen {
+            let value = percent(means.velocity_l1);
+            content.figures.push(KeyFigure { value, name: format!("velocity error, {group}") });
+        }
+        if !validation.means.is_empty() {
+            parts.push(Part::Table(self.models()));
+        }
+        parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
+        for note in &validation.notes {
+            content.warn(format!("{group}: {note}"));
+        }
+        let Some(worst) = self.worst() else { return };
+        let mut kinds = ModelKind::candidates(settings.seed).into_iter();
+        let Some(kind) = kinds.find(|kind| kind.name() == validation.chosen) else { return };
+        match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
+            Ok(chart) => {
+                parts.push(Part::Text(format!(
+                    "Of the inner speeds, {} has the largest force error, {}. Left out, it is predicted so:",
+                    km_per_h(worst.speed_m_per_s),
+                    percent(worst.force_l1)
+                )));
+                parts.push(Part::Figure(Figure::new(self.id("left-out"), chart)));
+            }
+            Err(error) => content.warn(format!("{group}: no picture of a left-out speed: {error}")),
+        }
+    }
+
+    /// The inner speed where the chosen model's force is farthest from FE.
+    fn worst(&self) -> Option<&LeftOut> {
+        let Validation { rows, chosen, .. } = &self.validation;
+        let inner = rows.iter().filter(|row| row.inner && row.model == *chosen);
+        inner.max_by(|a, b| a.force_l1.total_cmp(&b.force_l1))
+    }
+
+    fn models(&self) -> Table {
+        let Self { group, validation, .. } = self;
+        let speeds = validation.means.first().map_or(0, |means| means.speeds);
+        let heading =
+            ["model", "force", "energy", "largest crush", "velocity", "acceleration (CFC 60)"];
+        let row = |means: &Means| {
+            let is_chosen = means.model == validation.chosen;
+            let texts = [
+                means.model.clone(),
+                percent(means.force_l1),
+                percent(means.energy_error),
+                percent(means.max_crush_error),
+                percent(means.velocity_l1),
+                percent(means.acceleration_l1),
+            ];
+            let cell = |text| Cell { text, title: String::new(), is_chosen };
+            texts.map(cell).to_vec()
+        };
+        let left_out = counted(speeds, "inner speed");
+        Table {
+            caption: format!(
+                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body's force drives one mass)"
+            ),
+            heading: heading.map(String::from).to_vec(),
+            rows: validation.means.iter().map(row).collect(),
+        }
+    }
+
+    /// The curve at the asked speed, or in the middle of the widest gap.
+    fn add_prediction(
+        &self,
+        content: &mut Content,
+        parts: &mut Vec<Part>,
+        settings: &ReportSettings,
+    ) -> Result<(), ReportError> {
+        let Self { group, cases, validation, .. } = self;
+        let model = train_chosen(group, cases, &ModelKind::all(settings.seed), validation.clone())?;
+        let Some(speed) = settings.speed_m_per_s.or_else(|| middle_of_widest_gap(cases)) else {
+            return Ok(());
+        };
+        parts.push(Part::Heading(format!("Predicted curve at {}", km_per_h(speed))));
+        match predict(&model, &Query::at(speed)) {
+            Ok(curve) => {
+                self.add_curve(parts, &model, &curve);
+                for warning in &curve.warnings {
+                    content.warn(format!("{group}, prediction at {}: {warning}", km_per_h(speed)));
+                }
+            }
+            Err(error) => {
+                content.warn(format!("{group}: no curve at {}: {error}", km_per_h(speed)))
+            }
+        }
+        if let Ok(set) = TrainingSet::new(group, *cases)
+            && let Some(next) = next_run(&set, validation)
+        {
+            let advice =
+                format!("Next FE run: {}, as {}.", km_per_h(next.speed_m_per_s), next.reason);
+            parts.push(Part::Text(advice));
+        }
+        Ok(())
+    }
+
+    fn add_curve(&self, parts: &mut Vec<Part>, model: &Model, curve: &PredictedCurve) {
+        let chart = charts::prediction(curve, &model.cases);
+        parts.push(Part::Figure(Figure::new(self.id("prediction"), chart)));
+        let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
+        let mut rows = vec![
+            ("model".to_string(), curve.model.clone()),
+            ("largest force".into(), mega_newton(peak)),
+            ("largest crush".into(), metres(curve.max_deflection_m)),
+            ("energy of the curve".into(), energy(curve.energy_j)),
+            ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
+            ("nearest FE run".into(), km_per_h(curve.provenance.nearest_training_speed_m_per_s)),
+        ];
+        if let Some(band) = &curve.provenance.band {
+            rows.push((
+                format!(
+                    "band, empirical {:.0} % range from {}",
+                    100.0 * band.level,
+                    counted(band.curves, "curve")
+                ),
+                format!("±{} of the local force", percent(band.pointwise_share)),
+            ));
+        }
+        parts.push(Part::Table(Table {
+            caption: "The curve".into(),
+            heading: vec!["quantity".into(), "value".into()],
+            rows: rows.into_iter().map(|(name, value)| vec![name.into(), value.into()]).collect(),
+        }));
+    }
+
+    /// FE, FDRM, NSDM, DDTCM and the best model at the inner speeds, left out in turn.
+    fn add_methods(
+        &self,
+        parts: &mut Vec<Part>,
+        settings: &ReportSettings,
+    ) -> Result<(), ReportError> {
+        let Self { group, cases, .. } = self;
+        let speeds = match settings.methods {
+            MethodSpeeds::None => Vec::new(),
+            MethodSpeeds::Worst => self.worst().map(|row| row.speed_m_per_s).into_iter().collect(),
+            MethodSpeeds::All => inner_speeds(group, cases).unwrap_or_default(),
+        };
+        let asked = ComparisonSettings {
+            seed: settings.seed,
+            nsdm_seeds: settings.nsdm_seeds,
+            ..ComparisonSettings::default()
+        };
+        let comparisons = speeds
+            .iter()
+            .map(|speed| compare(group, cases, *speed, &asked))
+            .collect::<Result<Vec<Comparison>, _>>()?;
+        let Some(first) = comparisons.first() else { return Ok(()) };
+        let rows = first.rows.iter().map(|row| {
+            let all =
+                || comparisons.iter().flat_map(|c| &c.rows).filter(|r| r.method == row.method);
+            let mean = |of: fn(&crate::assess::Row) -> f64| {
+                all().map(of).sum::<f64>() / all().count() as f64
+            };
+            let texts = [
+                row.method.clone(),
+                row.driven_by.map_or("spring and damper", ForceKind::name).into(),
+                percent(mean(|r| r.velocity_l1)),
+                percent(mean(|r| r.acceleration_l1)),
+                signed_percent(mean(|r| r.max_crush_m) / mean_crush(&comparisons) - 1.0),
+            ];
+            texts
+                .map(|text| Cell { text, title: String::new(), is_chosen: row.method == "best" })
+                .to_vec()
+        });
+        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "largest crush"];
+        parts.push(Part::Heading("Methods".into()));
+        parts.push(Part::Table(Table {
+            caption: format!(
+                "{group}: each method in one multi-body model against FE, {}",
+                left_out_speeds(&speeds)
+            ),
+            heading: heading.map(String::from).to_vec(),
+            rows: rows.collect(),
+        }));
+        parts.push(Part::Text(methods_explained(settings.nsdm_seeds)));
+        Ok(())
+    }
+}
+
+fn left_out_speeds(speeds: &[f64]) -> String {
+    match speeds {
+        [one] => format!("with {} left out", km_per_h(*one)),
+        several => {
+            format!("means over {}, each left out in turn", counted(several.len(), "inner speed"))
+        }
+    }
+}
+
+fn mean_crush(comparisons: &[Comparison]) -> f64 {
+    comparisons.iter().map(|c| c.reference_max_crush_m).sum::<f64>() / comparisons.len() as f64
+}
+
+fn methods_explained(nsdm_seeds: u64) -> String {
+    let nsdm = match nsdm_seeds {
+        0 => {
+            " nsdm, the spring and damper fitted by a genetic algorithm, was left out; ask for it with --nsdm-seeds."
+        }
+        _ => " nsdm: a spring and damper fitted by a genetic algorithm to that run.",
+    };
+    format!(
+        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed.{nsdm} ddtcm: the reference method's forest. best: the model that leaving speeds out chooses."
+    )
+}
+
+/// The middle between the two neighbouring speeds that lie farthest apart.
+fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
+    let mut speeds: Vec<f64> = cases.iter().map(|case| case.speed.m_per_s).collect();
+    speeds.sort_by(f64::total_cmp);
+    let gaps = speeds.windows(2).map(|pair| (pair[1] - pair[0], 0.5 * (pair[0] + pair[1])));
+    gaps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|gap| gap.0 > 0.0).map(|gap| gap.1)
+}
+
+/// Characters of a hash that tell files apart at a glance; the whole stands where the pointer rests.
+const HASH: usize = 12;
+
+/// The section of files that the curves come from.
+pub(super) fn add_sources<'a>(content: &mut Content, cases: impl Iterator<Item = &'a Case>) {
+    let mut rows = Vec::new();
+    for case in cases {
+        for source in &case.sources {
+            let solver = [&source.solver, &source.version].into_iter().flatten();
+            let solver: Vec<&str> = solver.map(String::as_str).collect();
+            rows.push(vec![
+                format!("{}, {}", case.group, case.name).into(),
+                source.path.as_str().into(),
+                source.format.as_str().into(),
+                solver.join(" ").into(),
+                format!("{} kB", source.size_bytes.div_ceil(1000)).into(),
+                Cell {
+                    text: source.blake3.chars().take(HASH).collect(),
+                    title: format!("BLAKE3 {}", source.blake3),
+                    is_chosen: false,
+                },
+            ]);
+        }
+    }
+    if rows.is_empty() {
+        return;
+    }
+    let heading = ["run", "file", "format", "solver", "size", "BLAKE3"].map(String::from).to_vec();
+    let table = Table { caption: "Files that the curves were made from".into(), heading, rows };
+    let parts = vec![Part::Table(table)];
+    content.sections.push(Section { id: "sources".into(), title: "Sources".into(), parts });
+}

@@ -1,0 +1,174 @@
+//! The report: one HTML page about a database and the runs made with it.
+//!
+//! The page needs nothing else: styles, script and numbers are inside, and it may not reach anywhere (`default-src
+//! 'none'`). Every picture stands in it as SVG; the script gives it values under the pointer and zoom. Without the script,
+//! tables and pictures remain.
+
+mod error;
+mod figure;
+mod group;
+mod page;
+mod text;
+mod train;
+
+pub use error::ReportError;
+
+use std::path::{Path, PathBuf};
+
+use figure::Figure;
+use serde::Serialize;
+
+use crate::database::Database;
+use crate::surrogate::Model;
+
+/// What a report is about.
+#[derive(Clone, Debug)]
+pub struct ReportSettings {
+    /// Title of the page; the database's name if absent.
+    pub title: Option<String>,
+    /// Groups of the database; all if empty.
+    pub groups: Vec<String>,
+    /// Speed in m/s of the predicted curves; the middle of each group's widest gap if absent.
+    pub speed_m_per_s: Option<f64>,
+    /// At which left-out speeds the methods are compared.
+    pub methods: MethodSpeeds,
+    /// Fits of the spring and damper (NSDM) at each of them; 0 leaves that method out.
+    pub nsdm_seeds: u64,
+    /// Seed of the forests.
+    pub seed: u64,
+}
+
+/// At which left-out speeds the methods are compared: each takes about half a second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MethodSpeeds {
+    /// At none; trains are not held against FE either.
+    None,
+    /// Where the chosen model has its largest error.
+    Worst,
+    /// At every inner speed.
+    All,
+}
+
+/// A table of texts; the first column names, the others hold values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Table {
+    caption: String,
+    heading: Vec<String>,
+    rows: Vec<Vec<Cell>>,
+}
+
+/// A text, and what more there is to say about it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Cell {
+    text: String,
+    /// Shown where the pointer rests; empty for nothing.
+    title: String,
+    /// Whether its row is what was chosen.
+    is_chosen: bool,
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self { text, title: String::new(), is_chosen: false }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::from(text.to_string())
+    }
+}
+
+/// A number that stands out at the top, with its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct KeyFigure {
+    value: String,
+    name: String,
+}
+
+/// Part of a section.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Part {
+    /// A heading of the third level.
+    Heading(String),
+    /// A paragraph.
+    Text(String),
+    /// A picture.
+    Figure(Figure),
+    /// A table.
+    Table(Table),
+}
+
+/// A part of the page with a heading.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Section {
+    id: String,
+    title: String,
+    parts: Vec<Part>,
+}
+
+/// All that the page shows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Content {
+    title: String,
+    subtitle: String,
+    figures: Vec<KeyFigure>,
+    warnings: Vec<String>,
+    sections: Vec<Section>,
+}
+
+impl Content {
+    /// A warning, once.
+    fn warn(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+}
+
+/// The page about a database and scenarios, and how many warnings it shows.
+///
+/// Of `models`, those that `auto` chose for these very cases spare their validation; `step` is told what is being done.
+///
+/// # Errors
+/// [`ReportError`] for a group that is not there, one that makes no table, or a scenario that does not run.
+pub fn report(
+    path: &Path,
+    database: &Database,
+    scenarios: &[PathBuf],
+    models: &[Model],
+    settings: &ReportSettings,
+    mut step: impl FnMut(&str),
+) -> Result<(String, usize), ReportError> {
+    let mut content = Content {
+        title: settings.title.clone().unwrap_or_else(|| text::file_name(path)),
+        subtitle: format!(
+            "Curve database {}, crumple {}",
+            path.display(),
+            env!("CARGO_PKG_VERSION")
+        ),
+        ..Content::default()
+    };
+    let mut groups: Vec<&str> = Vec::new();
+    for group in &settings.groups {
+        database.group(path, group)?;
+        groups.push(group);
+    }
+    if groups.is_empty() {
+        groups.extend(database.groups());
+    }
+    let cases: usize = groups.iter().map(|group| database.cases(group).len()).sum();
+    content.figures.push(KeyFigure { value: cases.to_string(), name: "FE runs".into() });
+    for group in &groups {
+        step(&format!("reporting {group}"));
+        group::add(&mut content, group, database.cases(group), models, settings)?;
+    }
+    for scenario in scenarios {
+        step(&format!("running {}", scenario.display()));
+        train::add(&mut content, scenario, settings)?;
+    }
+    group::add_sources(&mut content, groups.iter().flat_map(|group| database.cases(group)));
+    let warnings = content.warnings.len();
+    Ok((page::html(&content), warnings))
+}

@@ -1,0 +1,238 @@
+//! Which key of the scenario an error is about.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    AssemblyError, CheckError, CheckedScenario, Prepared, Scenario, SourceError, SpringError,
+    StageError, TrainTable, VehicleTable,
+};
+use crate::manifest::{Document, KeyPath, Place};
+use crate::multibody::{ChainError, SimulationError};
+use crate::surrogate::predict::PredictError;
+
+impl CheckedScenario<'_> {
+    /// The place of a key; of a scenario that is not as its file has it only the file, at `path`.
+    pub(crate) fn place(&self, path: &Path, key: &KeyPath) -> Place {
+        match self.document() {
+            Some(document) => document.place(key),
+            None => Place::of_file(path),
+        }
+    }
+}
+
+/// Where a chain comes from, for the places of what only its run shows.
+#[derive(Clone, Debug)]
+pub(super) struct Origin {
+    path: PathBuf,
+    document: Option<Document>,
+}
+
+impl Origin {
+    pub(super) fn new(path: &Path, scenario: &CheckedScenario<'_>) -> Self {
+        Self { path: path.into(), document: scenario.document().cloned() }
+    }
+}
+
+impl Prepared {
+    /// The place of what made a run fail.
+    pub(super) fn place_of(&self, error: &SimulationError) -> Place {
+        match &self.origin.document {
+            Some(document) => document.place(&self.run_key(error)),
+            None => Place::of_file(&self.origin.path),
+        }
+    }
+
+    fn run_key(&self, error: &SimulationError) -> KeyPath {
+        match error {
+            SimulationError::Time { what, .. } => run(what),
+            SimulationError::Interval { .. } => run("output_interval"),
+            SimulationError::TooLong { .. } => run("duration"),
+            SimulationError::Rates { .. } | SimulationError::Stuck { .. } => run("method"),
+            SimulationError::CurveEnd { interface, .. } => {
+                let at = self.chain.interfaces().iter().position(|i| i.name == *interface);
+                at.map_or(KeyPath::of("curves"), |at| curve(&self.used[at].curve).key("end"))
+            }
+            SimulationError::Diverged { .. } => KeyPath::of("train"),
+        }
+    }
+}
+
+fn run(key: &str) -> KeyPath {
+    KeyPath::of("run").key(key)
+}
+
+/// The table of a curve.
+pub(super) fn curve(name: &str) -> KeyPath {
+    KeyPath::of("curves").key(name)
+}
+
+fn train(at: usize) -> KeyPath {
+    KeyPath::of("train").item(at)
+}
+
+impl Scenario {
+    /// The key that tells what is wrong.
+    pub(super) fn check_key(&self, error: &CheckError) -> KeyPath {
+        use CheckError as E;
+        match error {
+            E::WallTrains { trains } if *trains > 1 => train(1),
+            E::WallTrains { .. } => KeyPath::of("wall"),
+            E::Trains { trains } => train(if *trains > 2 { 2 } else { 0 }),
+            E::Limit { .. } => KeyPath::of("limits.mean_deceleration_g"),
+            E::TrainTwice { .. } => train(1).key("name"),
+            E::NoLimitedTrain => KeyPath::of("limits.trains"),
+            E::UnknownTrain { name, .. } => {
+                let mut limited = self.limits.iter().flat_map(|l| l.trains.iter().flatten());
+                let trains = KeyPath::of("limits.trains");
+                limited.position(|n| n == name).map_or(trains.clone(), |k| trains.item(k))
+            }
+            E::BodyTwice { name } => self.body_twice(name),
+            E::Name { name } if self.wall.as_ref().is_some_and(|wall| wall.name == *name) => {
+                KeyPath::of("wall.name")
+            }
+            E::Name { name } => self.vehicle(name).key("name"),
+            E::NoVehicles { train } => self.train_named(train).key("vehicles"),
+            E::NoInner { train, .. } => self.train_named(train),
+            E::NothingBehind { vehicle } => self.vehicle(vehicle).key("behind").itself(),
+            E::ZoneGap { end, vehicle, .. } => self.vehicle(vehicle).key(end).key("curve"),
+            E::NoBodyMass { vehicle } => self.vehicle(vehicle).key("mass"),
+            E::NoStages { curve: name } => curve(name).key("stages"),
+            E::ForeignKey { curve: name, key, .. } => curve(name).key(key).itself(),
+            E::UnknownTension { curve: name, .. }
+            | E::TensionOfTension { curve: name, .. }
+            | E::TensionModel { curve: name, .. } => curve(name).key("tension"),
+            E::NeverMeets { .. } => train(0).key("speed"),
+            E::UnknownCurve { curve, .. } => self.use_of(curve),
+        }
+    }
+
+    fn train_named(&self, name: &str) -> KeyPath {
+        train(self.train.iter().position(|t| t.name == name).unwrap_or(0))
+    }
+
+    /// Every vehicle with its path.
+    fn vehicles(&self) -> impl Iterator<Item = (KeyPath, &VehicleTable)> {
+        self.train.iter().enumerate().flat_map(|(t, table)| {
+            let vehicles = table.vehicles.iter().enumerate();
+            vehicles.map(move |(v, vehicle)| (train(t).key("vehicles").item(v), vehicle))
+        })
+    }
+
+    fn vehicle(&self, name: &str) -> KeyPath {
+        let found = self.vehicles().find(|(_, vehicle)| vehicle.name == name);
+        found.map_or(KeyPath::of("train"), |(path, _)| path)
+    }
+
+    /// The second body of that name, in the order in which names are checked.
+    fn body_twice(&self, name: &str) -> KeyPath {
+        let bodies = self.vehicles().flat_map(|(path, vehicle)| {
+            let body = (path.clone().key("name"), vehicle.name.clone());
+            let zones: Vec<(KeyPath, String)> = vehicle
+                .zones()
+                .map(|(end, _)| (path.clone().key(end).itself(), format!("{} {end}", vehicle.name)))
+                .collect();
+            [body].into_iter().chain(zones)
+        });
+        let wall = self.wall.iter().map(|wall| (KeyPath::of("wall.name"), wall.name.clone()));
+        let mut same = wall.chain(bodies).filter(|(_, body)| body == name);
+        same.nth(1).map_or(KeyPath::of("train"), |(path, _)| path)
+    }
+
+    /// The first place that names a curve.
+    fn use_of(&self, curve: &str) -> KeyPath {
+        let contact = (KeyPath::of("contact.curve"), &self.contact.curve);
+        let trains = self.train.iter().enumerate();
+        let inner =
+            trains.filter_map(|(t, table)| Some((train(t).key("inner"), table.inner.as_ref()?)));
+        let within = self.vehicles().flat_map(|(path, vehicle)| {
+            let behind = vehicle.behind.iter().map(|name| (path.clone().key("behind"), name));
+            let zones = vehicle
+                .zones()
+                .map(|(end, zone)| (path.clone().key(end).key("curve"), &zone.curve));
+            behind.chain(zones).collect::<Vec<_>>()
+        });
+        let mut uses = [contact].into_iter().chain(inner).chain(within);
+        uses.find(|(_, name)| *name == curve).map_or(KeyPath::of("curves"), |(path, _)| path)
+    }
+
+    /// The key that tells what is wrong with a chain.
+    pub(super) fn chain_key(&self, error: &ChainError) -> KeyPath {
+        match error {
+            ChainError::NoBodies | ChainError::Interfaces { .. } => KeyPath::of("train"),
+            ChainError::Mass { name, .. } => self.vehicle_of(name).key("mass"),
+            ChainError::Speed { .. } => KeyPath::of("train"),
+            ChainError::Length { .. } => KeyPath::of("contact.gap"),
+            ChainError::Resistance { .. } => self.resistance(),
+        }
+    }
+
+    /// The first resistance with a term that it may not have.
+    fn resistance(&self) -> KeyPath {
+        let wrong = |t: &TrainTable| {
+            let Some(r) = t.resistance else { return false };
+            let terms = [r.constant_m_per_s2, r.linear_per_s, r.quadratic_per_m, r.braking];
+            terms.iter().any(|term| !(*term >= 0.0 && term.is_finite()))
+        };
+        train(self.train.iter().position(wrong).unwrap_or(0)).key("resistance")
+    }
+
+    /// The vehicle that a body is, or is a crush zone of.
+    fn vehicle_of(&self, body: &str) -> KeyPath {
+        let is_of = |vehicle: &VehicleTable| {
+            let rest = body.strip_prefix(vehicle.name.as_str());
+            rest.is_some_and(|rest| ["", " front", " rear"].contains(&rest))
+        };
+        let found = self.vehicles().find(|(_, vehicle)| is_of(vehicle));
+        found.map_or(KeyPath::of("train"), |(path, _)| path)
+    }
+
+    /// The key that tells what is wrong with a curve's source.
+    pub(super) fn source_key(&self, error: &SourceError) -> KeyPath {
+        match error {
+            SourceError::NotOne { curve: name } => curve(name),
+            SourceError::NoCase { curve: name } => {
+                let has_case = self.curves.get(name).is_some_and(|table| table.case.is_some());
+                curve(name).key(if has_case { "case" } else { "database" })
+            }
+            SourceError::OtherForce { curve: name, .. } => curve(name).key("force"),
+            SourceError::Stages { curve: name, source: StageError::NoCurve(_) } => {
+                curve(name).key("stages")
+            }
+            SourceError::Stages { curve: name, source: StageError::Short { number, .. } } => {
+                curve(name).key("stages").item(number - 1).key("stroke")
+            }
+        }
+    }
+}
+
+/// The key that tells why a curve cannot stand where it is put.
+pub(super) fn assembly_key(error: &AssemblyError) -> KeyPath {
+    match error {
+        AssemblyError::NotRead { curve: name } | AssemblyError::Speeds { curve: name, .. } => {
+            curve(name)
+        }
+        AssemblyError::Damping { curve: name, .. } => curve(name).key("damping"),
+        AssemblyError::NoSpring { curve: name, source } => match source {
+            SpringError::NoBand => curve(name).key("band"),
+            SpringError::Scale { .. } => curve(name).key("scale"),
+            SpringError::CrushZoneTwice { .. } => curve(name).key("force"),
+            SpringError::StagesUnload => curve(name).key("stages"),
+            SpringError::Envelope(_) | SpringError::NoMotion | SpringError::NeverRises => {
+                curve(name)
+            }
+        },
+    }
+}
+
+/// The key that tells why a model gives no curve.
+pub(super) fn predict_key(name: &str, error: &PredictError) -> KeyPath {
+    match error {
+        PredictError::Parameters(_) => curve(name).key("parameters"),
+        PredictError::UnknownParameter { name: parameter, .. } => {
+            curve(name).key("parameters").key(parameter).itself()
+        }
+        PredictError::NoContactForce | PredictError::NoBodyForce => curve(name).key("force"),
+        PredictError::MaxCrush { .. } => curve(name).key("max_crush"),
+        _ => curve(name).key("model"),
+    }
+}

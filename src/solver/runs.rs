@@ -1,0 +1,185 @@
+//! Run folders: which folders below one hold solver files, and which files of a folder those are.
+
+use std::collections::HashSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::detect::{detect, is_named_like_output};
+use super::family::{family, is_continuation};
+use super::source::{self, Access};
+
+/// Folders deeper than this are not looked into.
+const DEEPEST: usize = 12;
+/// Folders that are looked into, so that a whole disk is not walked.
+const MOST_FOLDERS: usize = 20_000;
+/// Names of one folder that are looked at.
+const MOST_NAMES: usize = 100_000;
+
+/// What stands below a folder.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunFolders {
+    /// Folders with solver files, in order of their names; nothing below them is looked at.
+    pub runs: Vec<PathBuf>,
+    /// Folders that hold neither solver files nor folders, likewise.
+    pub without_files: Vec<PathBuf>,
+    /// Folders that cannot be looked into, each with the reason.
+    pub unreadable: Vec<(PathBuf, String)>,
+}
+
+/// The run folders at or below `root`: itself if it holds solver files, else all below that do.
+///
+/// Hidden folders are passed over; a folder that is reached by several links counts once.
+///
+/// # Errors
+/// If there is no such folder, or it cannot be read.
+pub fn run_folders(root: &Path) -> io::Result<RunFolders> {
+    if !fs::metadata(root)?.is_dir() {
+        let message = "this is no folder: give a run's folder, or one above runs";
+        return Err(io::Error::new(io::ErrorKind::NotADirectory, message));
+    }
+    root.read_dir()?;
+    let mut walk = Walk { found: RunFolders::default(), seen: HashSet::new() };
+    walk.look_into(root, 0);
+    Ok(walk.found)
+}
+
+/// The solver files of a folder in order of their names, each family of a binary file once.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = folder
+        .read_dir()?
+        .take(MOST_NAMES)
+        .filter_map(Result::ok)
+        .filter(|entry| is_named_like_output(&entry.file_name().to_string_lossy()))
+        .map(|entry| entry.path())
+        // A pipe would wait for its writer.
+        .filter(|path| path.is_file() && !is_continuation(path))
+        .collect();
+    files.sort();
+    let further: HashSet<PathBuf> =
+        files.iter().flat_map(|path| family(path).into_iter().skip(1)).collect();
+    files.retain(|path| !further.contains(path));
+    Ok(files)
+}
+
+/// Files of a folder that are opened to see what they are.
+const MOST_OPENED: usize = 50;
+
+/// The first file of a folder that holds what a solver writes under another name, and that name:
+/// a run whose files were renamed.
+pub fn renamed_file(folder: &Path) -> Option<(PathBuf, &'static str)> {
+    let mut files: Vec<PathBuf> = folder
+        .read_dir()
+        .ok()?
+        .take(MOST_NAMES)
+        .filter_map(Result::ok)
+        .map(|entry| entry.path())
+        .filter(|path| path.is_file())
+        .collect();
+    files.sort();
+    let mut opened = files.into_iter().take(MOST_OPENED);
+    opened.find_map(|path| {
+        let source = source::open(&path, Access::Plain).ok()?;
+        let format = detect(&path, &*source).ok()?;
+        Some((path, format.name))
+    })
+}
+
+struct Walk {
+    found: RunFolders,
+    /// Real places of the folders that were looked into: links may lead in circles.
+    seen: HashSet<PathBuf>,
+}
+
+impl Walk {
+    fn look_into(&mut self, folder: &Path, depth: usize) {
+        let place = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
+        if self.seen.len() >= MOST_FOLDERS || !self.seen.insert(place) {
+            return;
+        }
+        let files = output_files(folder).and_then(|files| Ok((files, folders_in(folder)?)));
+        match files {
+            Err(error) => self.found.unreadable.push((folder.into(), error.to_string())),
+            Ok((files, _)) if !files.is_empty() => self.found.runs.push(folder.into()),
+            Ok((_, below)) if below.is_empty() || depth == DEEPEST => {
+                self.found.without_files.push(folder.into());
+            }
+            Ok((_, below)) => below.iter().for_each(|path| self.look_into(path, depth + 1)),
+        }
+    }
+}
+
+/// The folders in a folder that are not hidden, in order of their names.
+fn folders_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut folders: Vec<PathBuf> = folder
+        .read_dir()?
+        .take(MOST_NAMES)
+        .filter_map(Result::ok)
+        .filter(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
+        .map(|entry| entry.path())
+        .filter(|path| path.is_dir())
+        .collect();
+    folders.sort();
+    Ok(folders)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(root: &Path, paths: &[PathBuf]) -> Vec<String> {
+        paths.iter().map(|p| p.strip_prefix(root).unwrap().display().to_string()).collect()
+    }
+
+    #[test]
+    fn finds_the_folders_that_hold_solver_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for path in ["b/36/old", "b/25", "a/deep/48", "empty", ".hidden/72", "c"] {
+            fs::create_dir_all(root.join(path)).unwrap();
+        }
+        for path in ["b/36/nodout", "b/25/crashT01", "a/deep/48/binout0000", ".hidden/72/nodout"] {
+            fs::write(root.join(path), "").unwrap();
+        }
+        fs::write(root.join("b/36/old/nodout"), "").unwrap();
+        fs::write(root.join("c/notes.txt"), "").unwrap();
+        let found = run_folders(root).unwrap();
+        assert_eq!(names(root, &found.runs), ["a/deep/48", "b/25", "b/36"]);
+        assert_eq!(names(root, &found.without_files), ["c", "empty"]);
+        assert_eq!(run_folders(&root.join("b/36")).unwrap().runs, [root.join("b/36")]);
+        assert!(run_folders(&root.join("c/notes.txt")).is_err());
+        assert!(run_folders(&root.join("none")).is_err());
+    }
+
+    #[test]
+    fn a_family_of_binary_files_is_one() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["binout0000", "binout0000%001", "binout0003", "nodout", "main.k", "d3plot"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let files = output_files(folder.path()).unwrap();
+        assert_eq!(names(folder.path(), &files), ["binout0000", "nodout"]);
+    }
+
+    #[test]
+    fn renamed_files_are_known_by_what_they_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("notes"), "nothing\n").unwrap();
+        assert_eq!(renamed_file(folder.path()), None);
+        let bytes = [8, 8, 8, 1, 1, 1, 0, 0];
+        fs::write(folder.path().join("other"), bytes).unwrap();
+        assert_eq!(renamed_file(folder.path()), Some((folder.path().join("other"), "binout")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_a_circle_end() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("a")).unwrap();
+        std::os::unix::fs::symlink(folder.path(), folder.path().join("a/up")).unwrap();
+        assert_eq!(run_folders(folder.path()).unwrap(), RunFolders::default());
+    }
+}

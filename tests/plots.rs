@@ -1,0 +1,323 @@
+//! Pictures: no text leaves one or overlaps another, series can be told apart, the bytes are always the same.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use crumple::assess::ComparisonSettings;
+use crumple::assess::train::compare_train;
+use crumple::assess::validate::Choice;
+use crumple::charts::{self, HistoryOptions, Motion, Quantity};
+use crumple::curve::ForceKind;
+use crumple::database::Database;
+use crumple::multibody::simulate;
+use crumple::plot::{Axis, Band, Chart, Drawing, Mark, Panel, Series, Shape, Shows, Stroke};
+use crumple::scenario;
+use crumple::solver::{self, Selection};
+use crumple::surrogate::{Model, Query, predict};
+use crumple::unit::UnitSystem;
+
+use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, root};
+
+/// Every text lies within the picture, and no two texts touch.
+fn assert_texts_are_free(drawing: &Drawing, what: &str) {
+    let boxes = drawing.text_boxes();
+    for (k, one) in boxes.iter().enumerate() {
+        let [left, top, right, bottom] = one.place;
+        assert!(
+            left >= 0.0 && top >= 0.0 && right <= drawing.width && bottom <= drawing.height,
+            "{what}: \"{}\" leaves the picture: {:?} of {} × {}",
+            one.text,
+            one.place,
+            drawing.width,
+            drawing.height
+        );
+        for other in &boxes[..k] {
+            let [l, t, r, b] = other.place;
+            let is_apart = right <= l || r <= left || bottom <= t || b <= top;
+            assert!(is_apart, "{what}: \"{}\" and \"{}\" overlap", one.text, other.text);
+        }
+    }
+}
+
+/// Colour, dash and markers of each series' line, which no two share.
+fn assert_series_differ(drawing: &Drawing, what: &str) {
+    let mut lines: BTreeMap<(usize, usize), Vec<String>> = BTreeMap::new();
+    for shape in &drawing.shapes {
+        if let Shape::Path { shows: Some(Shows::Series(panel, k)), stroke, lines: points, .. } =
+            shape
+        {
+            let Some(Stroke { paint, dash, width }) = stroke else { continue };
+            // Of markers, the form of the first; its place does not matter.
+            let form = match (points.first(), *width == 1.4) {
+                (Some(first), true) => {
+                    let steps = first
+                        .windows(2)
+                        .map(|p| format!("{:.1} {:.1}", p[1].0 - p[0].0, p[1].1 - p[0].1));
+                    steps.collect::<Vec<_>>().join(" ")
+                }
+                _ => String::new(),
+            };
+            lines
+                .entry((*panel, *k))
+                .or_default()
+                .push(format!("{paint:?} {dash:?} {width} {form}"));
+        }
+    }
+    let mut seen: BTreeMap<(usize, String), usize> = BTreeMap::new();
+    for ((panel, k), look) in lines {
+        let before = seen.insert((panel, look.join(";")), k);
+        assert!(before.is_none(), "{what}: series {k} of panel {panel} looks like {before:?}");
+    }
+}
+
+fn check(chart: &Chart, what: &str) {
+    for (width, height) in [(780.0, 320.0), (320.0, 80.0), (1600.0, 700.0), (420.0, 320.0)] {
+        let drawing = Chart { width, height, ..chart.clone() }.drawing();
+        let what = format!("{what} at {width} × {height}");
+        assert_texts_are_free(&drawing, &what);
+        assert_series_differ(&drawing, &what);
+    }
+    for axis in chart.panels.iter().flat_map(|panel| [&panel.x, &panel.y]) {
+        assert!(!axis.unit.is_empty(), "{what}: {} has no unit", axis.quantity);
+    }
+}
+
+#[test]
+fn texts_of_all_charts_are_free() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    let database = Database::read(&folder.join("curves.h5")).unwrap();
+    for group in database.groups() {
+        let cases = database.cases(group);
+        for force in [ForceKind::Contact, ForceKind::Body] {
+            check(&charts::group_curves(group, cases, force), group);
+        }
+    }
+    let cases = database.cases("lead-car-wall");
+    let chosen = Choice::Kind(crumple::surrogate::ModelKind::linear());
+    check(&charts::left_out_at("lead-car-wall", cases, 48.0 / 3.6, chosen).unwrap(), "left out");
+    let model = Model::read(&folder.join("lead.model")).unwrap();
+    for speed in [12.0, 50.0, 71.0, 80.0] {
+        let curve =
+            predict(&model, &Query { extrapolate: true, ..Query::at(speed / 3.6) }).unwrap();
+        check(&charts::prediction(&curve, &model.cases), "prediction");
+    }
+    for name in ["scenario.toml", "eight-on-eight.toml", "en15227-identical-units.toml"] {
+        let prepared = scenario::load(&folder.join(name)).unwrap();
+        let run = simulate(&prepared.chain, &prepared.settings).unwrap();
+        let motion = Motion::of_run(&prepared.chain, &run, &prepared.order);
+        use Quantity::{Acceleration, Crush, Energy, Force, Velocity};
+        for quantity in [Velocity, Acceleration, Force, Crush, Energy] {
+            check(&motion.chart(name, quantity).unwrap(), name);
+        }
+    }
+    let path = folder.join("train-set.toml");
+    let settings = ComparisonSettings { nsdm_seeds: 0, ..ComparisonSettings::default() };
+    let comparison = compare_train(&path, &scenario::read(&path).unwrap(), &settings).unwrap();
+    check(&charts::train_speeds("train", &comparison), "train");
+    for file in ["nodout", "rwforc"] {
+        let path = folder.join("fe/lead-car-wall/36kmh").join(file);
+        let read = solver::read(&path, None, &Selection::all()).unwrap();
+        let histories: Vec<_> = read.histories.iter().take(20).collect();
+        let units = Some(UnitSystem::parse("mm-t-s").unwrap());
+        for options in [HistoryOptions { units, filter_class: Some(60) }, HistoryOptions::default()]
+        {
+            check(&charts::histories(file, &histories, options).unwrap(), file);
+        }
+    }
+}
+
+/// Names that users give: long, with signs and in other letters, or none.
+const NAMES: [&str; 6] = [
+    "a title that is much longer than any picture is wide, as it comes out of decks in which somebody has described the whole vehicle, the date and the weather, and then some more",
+    "</svg><b>&\"'",
+    "Stoß gegen eine Wand, Δv = 36 km/h, Ω ≥ 3",
+    "列車の衝突",
+    "oneverylongwordwithoutanyblankinitthatcannotbebrokenanywhereatallandgoesonandonandonandonandon",
+    "",
+];
+
+#[test]
+fn names_of_any_length_have_their_place() {
+    let mut chart = Chart::row("", Vec::new());
+    check(&chart, "nothing");
+    for (k, name) in NAMES.into_iter().enumerate() {
+        chart.title = name.into();
+        let mut panel = Panel::new(Axis::new(name, "m", 1.0), Axis::new(name, "MN", 1e-6));
+        panel.title = name.into();
+        for (look, other) in NAMES.into_iter().enumerate() {
+            let x: Vec<f64> = (0..50).map(|i| 0.02 * f64::from(i)).collect();
+            let y: Vec<f64> = x.iter().map(|x| 1e6 * (x + look as f64)).collect();
+            panel.series.push(Series::line(other, look, x, y));
+        }
+        panel.bands.push(Band {
+            name: name.into(),
+            look: 1,
+            x: vec![0.0, 1.0],
+            low: vec![-1e300, f64::NAN],
+            high: vec![1e300, f64::INFINITY],
+        });
+        for i in 0..30 {
+            panel.marks.push(Mark { name: name.into(), x: 0.03 * f64::from(i) });
+        }
+        chart.panels.push(panel);
+        chart.notes.push(name.into());
+        check(&chart, &format!("{} panels", k + 1));
+    }
+}
+
+/// Values at the ends of what numbers can be make a picture all the same.
+#[test]
+fn extreme_values_are_drawn() {
+    let extremes = [0.0, -0.0, 1e-300, -1e300, 1e300, f64::MAX, f64::MIN, f64::NAN, f64::INFINITY];
+    for a in extremes {
+        for b in extremes {
+            let series = Series::line("line", 0, vec![a, b, 1.0], vec![b, a, 1.0]);
+            let empty = Panel::new(Axis::new("x", "m", 1.0), Axis::new("y", "N", 1.0));
+            let chart = Chart::of("extremes", Panel { series: vec![series], ..empty });
+            let drawing = chart.drawing();
+            assert_texts_are_free(&drawing, &format!("{a} and {b}"));
+            assert!(
+                !drawing.svg().contains("NaN") && !drawing.svg().contains("inf"),
+                "{a} and {b}"
+            );
+            drawing.png(1.0).unwrap();
+        }
+    }
+    let chart = Chart::of("large", Panel::new(Axis::new("x", "m", 1.0), Axis::new("y", "N", 1.0)));
+    assert!(chart.drawing().png(1e4).unwrap_err().to_string().contains("cannot be drawn"));
+}
+
+/// The commands that the help shows, their titles, and names of the legend.
+#[test]
+fn every_kind_of_file_is_drawn() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    crumple_ok(folder, &["simulate", "scenario.toml", "-o", "result.csv"]);
+    for (arguments, texts) in [
+        ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
+        (
+            "curves.h5 --group lead-car-wall --force body",
+            &["lead-car-wall: body force by wall speed"],
+        ),
+        (
+            "curves.h5 --group lead-car-pair --left-out 48km/h",
+            &["FE at 48 km/h", "closing speed [m/s]"],
+        ),
+        (
+            "lead.model --speed 50km/h",
+            &[
+                "FE at 48 km/h",
+                "FE at 60 km/h",
+                "maximal crush",
+                "empirical 90 % range from 5 left-out inner speeds",
+            ],
+        ),
+        ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model rate"]),
+        ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model rate"]),
+        ("scenario.toml --quantity energy", &["kinetic", "dissipated", "energy [MJ]", "time [ms]"]),
+        ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
+        ("train-set.toml --train", &["A1", "A3", "FE", "best_local", "speed [m/s]"]),
+        (
+            "fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60",
+            &["900001, CFC 60", "x_velocity [m/s]"],
+        ),
+        (
+            "fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force",
+            &["normal_force [unit of the file]"],
+        ),
+    ] {
+        let mut all = vec!["plot"];
+        all.extend(arguments.split(' '));
+        all.extend(["-o", "a.svg", "-o", "a.png"]);
+        if arguments.contains("crashT01")
+            && !folder.join("fe/lead-car-wall/36kmh/crashT01").exists()
+        {
+            continue;
+        }
+        crumple_ok(folder, &all);
+        let svg = fs::read_to_string(folder.join("a.svg")).unwrap();
+        for text in texts {
+            assert!(svg.contains(&format!("aria-label=\"{text}\"")), "{arguments}: no \"{text}\"");
+        }
+        assert!(!svg.contains("<text") && !svg.contains("font-family"), "texts are outlines");
+        let png = fs::read(folder.join("a.png")).unwrap();
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+        let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
+        assert_eq!(width, 1560, "two pixels for one");
+        // The same again has the same bytes.
+        crumple_ok(folder, &all);
+        assert_eq!(fs::read_to_string(folder.join("a.svg")).unwrap(), svg);
+        assert_eq!(fs::read(folder.join("a.png")).unwrap(), png);
+    }
+}
+
+#[test]
+fn wrong_wishes_are_refused() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    fs::write(folder.join("bad.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,x\n").unwrap();
+    fs::write(folder.join("other.csv"), "time_s,b\n0,1\n").unwrap();
+    let before = entries(folder);
+    for (code, arguments, says) in [
+        (1, "curves.h5 -o a.svg", "has several groups: choose one with --group"),
+        (1, "curves.h5 --group nothing -o a.svg", "nothing"),
+        (2, "curves.h5 --group lead-car-wall -o a.jpg", "pictures are written as .svg or .png"),
+        (
+            1,
+            "curves.h5 --group lead-car-wall --left-out 50km/h -o a.svg",
+            "has no run at 50 km/h: its speeds are 12 km/h",
+        ),
+        (2, "lead.model -o a.svg", "name the speed of the model's curve with --speed"),
+        (
+            2,
+            "lead50.json --speed 50km/h -o a.svg",
+            "--speed is for a model: lead50.json is a predicted curve",
+        ),
+        (2, "lead.model --speed 50km/h --id 3 -o a.svg", "--id is for a solver file"),
+        (1, "bad.csv -o a.svg", "bad.csv: line 3, column 2: expected a number, found \"x\""),
+        (1, "other.csv -o a.svg", "expected the columns of crumple simulate -o"),
+        (1, "nothing.csv -o a.svg", "nothing.csv"),
+        (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),
+        (2, "fe/lead-car-wall/36kmh/nodout --cfc 60 -o a.svg", "--units"),
+        (2, "lead50.json -o a.svg --width 10", "expected a number from 80 to 5000"),
+    ] {
+        let mut all = vec!["plot"];
+        all.extend(arguments.split(' '));
+        let error = crumple_fails(folder, code, &all);
+        assert!(error.contains(says), "{arguments}:\n{error}");
+    }
+    assert_eq!(entries(folder), before, "nothing was written");
+}
+
+/// Pictures of the repository are those that the program draws today, on this machine as on others.
+#[test]
+fn committed_pictures_are_drawn_again() {
+    let folder = demo_folder();
+    for (arguments, file) in [
+        ("curves.h5 --group vehicle-pair", "curves.png"),
+        ("lead.model --speed 50km/h", "prediction.png"),
+    ] {
+        let drawn = tempfile::tempdir().unwrap();
+        let path = drawn.path().join(file);
+        let mut all = vec!["plot"];
+        all.extend(arguments.split(' '));
+        all.extend(["--scale", "1", "-o", path.to_str().unwrap()]);
+        crumple_ok(folder.path(), &all);
+        let committed = root().join("docs/pictures").join(file);
+        if std::env::var_os("CRUMPLE_WRITE_DOCS").is_some() {
+            fs::create_dir_all(committed.parent().unwrap()).unwrap();
+            fs::copy(&path, &committed).unwrap();
+        }
+        assert!(
+            same_bytes(&path, &committed),
+            "{} differs: write it anew with CRUMPLE_WRITE_DOCS=1 and look at it",
+            committed.display()
+        );
+    }
+}
+
+fn same_bytes(a: &Path, b: &Path) -> bool {
+    fs::read(a).unwrap() == fs::read(b).unwrap_or_default()
+}

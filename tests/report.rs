@@ -1,0 +1,195 @@
+//! The report: what it holds, what it must not, and how a browser shows it.
+
+use std::fs;
+
+use crumple::database::Database;
+
+use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, python_of, root, run_python};
+
+fn report(arguments: &[&str]) -> (tempfile::TempDir, String) {
+    let folder = demo_folder();
+    let mut all = vec!["report", "curves.h5"];
+    all.extend(arguments);
+    all.extend(["-o", "report.html"]);
+    crumple_ok(folder.path(), &all);
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    (folder, page)
+}
+
+#[test]
+fn the_demo_ends_with_a_small_page_that_needs_nothing() {
+    let folder = demo_folder();
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.len() <= 400_000, "{} bytes", page.len());
+    assert!(page.contains(
+        "content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\""
+    ));
+    // Nothing is loaded: no address, and no attribute that could hold one.
+    for address in ["http:", "https:", " src=", "<link", "@import", "url(http", "//cdn"] {
+        assert!(!page.contains(address), "{address}");
+    }
+    for text in [
+        "Warnings",
+        "How far predictions lie from FE",
+        "Predicted curve at",
+        "Methods",
+        "Scenario scenario.toml",
+        "Mean deceleration over 5 g (EN 15227:2020)",
+        "energy lost",
+        "Next FE run:",
+        "BLAKE3",
+        // The template escapes the slash, too.
+        "work &#x2f; energy",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    // Without the script, pictures and tables stand there.
+    assert!(page.matches("<svg viewBox").count() >= 15 && page.matches("<table>").count() >= 15);
+}
+
+/// The tables have the numbers that the other commands give.
+#[test]
+fn its_numbers_are_those_of_the_commands() {
+    let (folder, page) =
+        report(&["--group", "lead-car-wall", "--speed", "50km/h", "scenario.toml"]);
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        serde_json::from_str(&crumple_ok(folder.path(), arguments)).unwrap()
+    };
+    let validation = json(&["validate", "curves.h5", "--group", "lead-car-wall", "--json"]);
+    for means in validation["groups"][0]["means"].as_array().unwrap() {
+        let percent = |key: &str| format!(">{:.1} %<", 100.0 * means[key].as_f64().unwrap());
+        let row = page
+            .lines()
+            .find(|l| l.contains(&format!(">{}</th>", means["model"].as_str().unwrap())));
+        let row = row.unwrap();
+        for key in ["force_l1", "energy_error", "max_crush_error", "velocity_l1", "acceleration_l1"]
+        {
+            assert!(row.contains(&percent(key)), "{key}: {row}");
+        }
+    }
+    let curve = json(&["predict", "lead.model", "--speed", "50km/h", "--json"]);
+    let crush = format!(">{:.3} m<", curve["max_deflection_m"].as_f64().unwrap());
+    assert!(page.contains(&crush), "{crush}");
+    let run = json(&["simulate", "scenario.toml", "--json"]);
+    let interface = &run["summary"]["interfaces"][0];
+    let peak = format!(">{:.3} MN<", interface["peak_force_N"].as_f64().unwrap() / 1e6);
+    assert!(page.contains(&peak), "{peak}");
+    let database = Database::read(&folder.path().join("curves.h5")).unwrap();
+    for case in database.cases("lead-car-wall") {
+        for source in &case.sources {
+            assert!(page.contains(&source.blake3), "{}", source.path);
+        }
+        assert!(page.contains(&format!(">{:.3}<", case.audit.ratio())), "{}", case.name);
+    }
+    assert!(!page.contains("vehicle-pair"), "only the group that was asked for");
+}
+
+#[test]
+fn names_of_users_are_text() {
+    let folder = demo_folder();
+    let name = "</script><b>\"'&";
+    let scenario = fs::read_to_string(folder.path().join("scenario.toml")).unwrap();
+    let scenario = scenario.replace("name = \"A1\"", "name = '</script><b>&'");
+    fs::write(folder.path().join("x.toml"), scenario).unwrap();
+    let arguments =
+        ["report", "curves.h5", "x.toml", "--title", name, "--methods", "none", "-o", "r.html"];
+    crumple_ok(folder.path(), &arguments);
+    let page = fs::read_to_string(folder.path().join("r.html")).unwrap();
+    assert!(!page.contains("<b>"));
+    assert_eq!(page.matches("</script>").count(), 2, "those of the data and of the script");
+}
+
+#[test]
+fn a_group_of_one_run_has_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = root().join("fixtures/fe/lead-car-wall");
+    let text = fs::read_to_string(study.join("study.toml")).unwrap();
+    let (head, _) = text.split_once("[[run]]").unwrap();
+    let run = format!("[[run]]\npath = '{}'\nmass = '24t'\n", study.join("36kmh").display());
+    fs::write(folder.path().join("study.toml"), format!("{head}{run}")).unwrap();
+    crumple_ok(folder.path(), &["build", "study.toml", "-o", "one.h5"]);
+    crumple_ok(folder.path(), &["report", "one.h5", "-o", "one.html"]);
+    let page = fs::read_to_string(folder.path().join("one.html")).unwrap();
+    assert!(page.contains("FE at 36 km/h"), "{page}");
+}
+
+#[test]
+fn wrong_wishes_are_refused() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    fs::write(folder.join("bad.toml"), "[run]\nduration = 3\n").unwrap();
+    let before = entries(folder);
+    for (code, arguments, says) in [
+        (1, "curves.h5 --group nothing -o a.html", "nothing"),
+        (1, "curves.h5 bad.toml -o a.html", "bad.toml"),
+        (1, "nothing.h5 -o a.html", "nothing.h5"),
+        (2, "curves.h5 -o curves.h5", "names the input itself"),
+        (2, "curves.h5 scenario.toml -o lead.model", "names the input itself"),
+        (2, "curves.h5", "--output"),
+    ] {
+        let mut all = vec!["report"];
+        all.extend(arguments.split(' '));
+        let error = crumple_fails(folder, code, &all);
+        assert!(error.contains(says), "{arguments}:\n{error}");
+    }
+    assert_eq!(entries(folder), before, "nothing was written");
+}
+
+/// Chromium: no message, no request, values under the pointer, zoom, keyboard, dark and light, print, no script.
+#[test]
+#[ignore = "needs chromium and Python's playwright, which tests/run installs"]
+fn browser_shows_the_page() {
+    let folder = demo_folder();
+    let page = folder.path().join("report.html");
+    let database = Database::read(&folder.path().join("curves.h5")).unwrap();
+    // The largest force of a run, and where it is: what the pointer must find.
+    let case = database.cases("lead-car-wall").iter().find(|c| c.name == "48kmh").unwrap();
+    let samples = case.sampled.force_n().iter().zip(case.sampled.deflection_m());
+    let (force_n, deflection_m) =
+        samples.max_by(|a, b| a.0.total_cmp(b.0)).map(|(f, d)| (*f, *d)).unwrap();
+    let picture = match std::env::var_os("CRUMPLE_WRITE_DOCS") {
+        Some(_) => root().join("docs/pictures/report.png"),
+        None => folder.path().join("report.png"),
+    };
+    let seen = run_python(
+        python_of("CRUMPLE_PYTHON_BROWSER"),
+        "report_browser.py",
+        &[
+            page.to_str().unwrap(),
+            "lead-car-wall: contact force by wall speed",
+            "FE at 48 km/h",
+            &deflection_m.to_string(),
+            &(force_n / 1e6).to_string(),
+            picture.to_str().unwrap(),
+        ],
+    );
+    for scheme in ["light", "dark"] {
+        let seen = &seen[scheme];
+        assert_eq!(seen["messages"].as_array().unwrap().len(), 0, "{seen}");
+        assert_eq!(seen["requests"], 1, "the page alone: {seen}");
+        let text = seen["hover"].as_str().unwrap();
+        let numbers: Vec<f64> =
+            text.split(' ').filter_map(|word| word.replace('\u{2212}', "-").parse().ok()).collect();
+        // "FE at 48 km/h: 4.1987 MN at 0.645 m": five digits of the database's own values.
+        let (force, deflection) = (numbers[numbers.len() - 2], numbers[numbers.len() - 1]);
+        assert!((force / (force_n / 1e6) - 1.0).abs() <= 5.1e-5, "{text}: {force_n} N");
+        assert!((deflection / deflection_m - 1.0).abs() <= 5.1e-5, "{text}: {deflection_m} m");
+        assert!(text.contains(" MN at ") && text.ends_with(" m"), "{text}");
+        assert_eq!(seen["keyboard_values"], true, "{seen}");
+        assert_eq!(seen["zoom_changes_axes"], true, "{seen}");
+        assert_eq!(seen["double_click_resets"], true, "{seen}");
+        assert_eq!(seen["button_hides"], true, "{seen}");
+        assert_eq!(seen["texts_overlap"], serde_json::json!([]), "{seen}");
+    }
+    assert_eq!(seen["light"]["background"], "rgb(255, 255, 255)");
+    assert_ne!(seen["dark"]["background"], "rgb(255, 255, 255)");
+    assert_eq!(
+        seen["print"]["background"], "rgb(255, 255, 255)",
+        "light although the screen is dark"
+    );
+    assert_eq!(seen["print"]["hidden_series"], 0, "print shows all series");
+    assert!(seen["print"]["pages"].as_u64().unwrap() > 3);
+    assert_eq!(seen["print"]["torn_headings"], serde_json::json!([]));
+    assert!(seen["without_script"]["pictures"].as_u64().unwrap() >= 15);
+    assert_eq!(seen["without_script"]["legend_is_drawn"], true);
+}
