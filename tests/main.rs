@@ -10,6 +10,7 @@ mod curating;
 mod damage;
 mod deck;
 mod documents;
+mod ends;
 mod engine;
 mod examples;
 mod exports;

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crumple::assess::compare::{self, Comparison, NsdmReport};
-use crumple::assess::train::{TrainComparison, compare_train};
+use crumple::assess::train::{TrainComparison, TrainRow, compare_train};
 use crumple::assess::{ComparisonSettings, Row};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
@@ -35,7 +35,9 @@ among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 
 largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
 those under velocity and acceleration are taken at 10 kHz, as crumple rate takes them.
 With --train, a scenario whose curves are cases of a database runs with the curves of each method,
-and the vehicles' speeds are compared with FE's, which its [reference] names.")]
+and the vehicles' speeds are compared with FE's, which its [reference] names. rate_live lets the
+crush force follow the speeds of the run; split_ends gives each vehicle two ends with the mass that
+they stop. Several trains are compared one by one and in their means.")]
 pub struct Args {
     /// Curve database
     #[arg(required_unless_present = "train", conflicts_with = "train")]
@@ -49,9 +51,9 @@ pub struct Args {
     /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent
     #[arg(long, value_parser = arguments::speed, conflicts_with = "train")]
     fixed_speed: Option<f64>,
-    /// Scenario of a train with FE's run as reference
+    /// Scenario of a train with FE's run as reference; may be repeated
     #[arg(long)]
-    train: Option<PathBuf>,
+    train: Vec<PathBuf>,
     /// Seed of the forest, and first seed of the genetic algorithm
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -101,8 +103,8 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         nsdm_seeds: args.nsdm_seeds,
         nsdm_start: args.nsdm_start,
     };
-    if let Some(path) = &args.train {
-        return train(path, &settings, options);
+    if !args.train.is_empty() {
+        return trains(&args.train, &settings, options);
     }
     let Some(path) = &args.database else {
         return Err(Failure::Usage("name a database, or --train".into()));
@@ -302,25 +304,133 @@ fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     output::table(out, &heading, &rows)
 }
 
+/// Comparisons in several trains.
+#[derive(Serialize)]
+struct Trains {
+    trains: Vec<OneTrain>,
+    /// By method, of those that every train has.
+    means: Vec<TrainMean>,
+}
+
+#[derive(Serialize)]
+struct OneTrain {
+    scenario: PathBuf,
+    #[serde(flatten)]
+    comparison: TrainComparison,
+}
+
+/// Means over the trains.
+#[derive(Serialize)]
+struct TrainMean {
+    method: String,
+    mean_velocity_l1: f64,
+    mean_velocity_difference_m_per_s: f64,
+    mean_velocity_share_of_initial: f64,
+    mean_acceleration_l1: f64,
+}
+
 /// `compare --train`.
-fn train(path: &Path, settings: &ComparisonSettings, options: GlobalOptions) -> CommandResult {
-    let scenario = scenario::read(path)?;
+fn trains(
+    paths: &[PathBuf],
+    settings: &ComparisonSettings,
+    options: GlobalOptions,
+) -> CommandResult {
     let bar = Bar::new(options, "comparing in the train");
-    let comparison = compare_train(path, &scenario, settings)?;
+    let mut trains = Vec::new();
+    for path in paths {
+        let scenario = scenario::read(path)?;
+        let comparison = compare_train(path, &scenario, settings)?;
+        trains.push(OneTrain { scenario: path.clone(), comparison });
+    }
     bar.end();
     let mut warned = false;
-    for row in &comparison.rows {
-        for warning in &row.warnings {
-            warned = true;
-            options.warn(&format!("{}: {warning}", row.method));
+    for train in &trains {
+        let of_train = match trains.len() {
+            1 => String::new(),
+            _ => format!("{}: ", train.scenario.display()),
+        };
+        for row in &train.comparison.rows {
+            for warning in &row.warnings {
+                warned = true;
+                options.warn(&format!("{of_train}{}: {warning}", row.method));
+            }
         }
     }
-    if options.json {
-        output::print_json(&comparison)?;
-    } else {
-        output::print(|out| print_train(out, &comparison))?;
+    let document = Trains { means: train_means(&trains), trains };
+    match (&document.trains[..], options.json) {
+        ([one], true) => output::print_json(&one.comparison)?,
+        (_, true) => output::print_json(&document)?,
+        ([one], false) => output::print(|out| print_train(out, &one.comparison))?,
+        (_, false) => output::print(|out| {
+            for train in &document.trains {
+                writeln!(out, "{}", train.scenario.display())?;
+                print_train(out, &train.comparison)?;
+                writeln!(out)?;
+            }
+            print_train_means(out, &document)
+        })?,
     }
     Ok(if warned { Outcome::Warned } else { Outcome::Clean })
+}
+
+fn train_means(trains: &[OneTrain]) -> Vec<TrainMean> {
+    let Some(first) = trains.first() else { return Vec::new() };
+    let mut means = Vec::new();
+    for row in &first.comparison.rows {
+        let all: Option<Vec<&TrainRow>> = trains
+            .iter()
+            .map(|t| t.comparison.rows.iter().find(|other| other.method == row.method))
+            .collect();
+        let Some(all) = all else { continue };
+        let mean = |of: fn(&TrainRow) -> f64| {
+            all.iter().map(|row| of(row)).sum::<f64>() / all.len() as f64
+        };
+        means.push(TrainMean {
+            method: row.method.clone(),
+            mean_velocity_l1: mean(|r| r.mean_velocity_l1),
+            mean_velocity_difference_m_per_s: mean(|r| r.mean_velocity_difference_m_per_s),
+            mean_velocity_share_of_initial: mean(|r| r.mean_velocity_share_of_initial),
+            mean_acceleration_l1: mean(|r| r.mean_acceleration_l1),
+        });
+    }
+    means
+}
+
+fn print_train_means(out: &mut dyn Write, document: &Trains) -> io::Result<()> {
+    writeln!(out, "means over {} trains", document.trains.len())?;
+    let row = |m: &TrainMean| {
+        vec![
+            m.method.clone(),
+            format!("{:.1} %", m.mean_velocity_l1 * 100.0),
+            format!("{:.3} m/s", m.mean_velocity_difference_m_per_s),
+            format!("{:.1} %", m.mean_velocity_share_of_initial * 100.0),
+            format!("{:.0} %", m.mean_acceleration_l1 * 100.0),
+        ]
+    };
+    let rows: Vec<Vec<String>> = document.means.iter().map(row).collect();
+    output::table(
+        out,
+        &["method", "velocity", "difference", "of the first speed", "acceleration"],
+        &rows,
+    )
+}
+
+/// Crush and work between the vehicles, by method.
+fn print_crush(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<()> {
+    let Some(first) = comparison.rows.first() else { return Ok(()) };
+    writeln!(out, "\nlargest crush between vehicles, work of the forces in brackets")?;
+    let metres = |m: Option<f64>| m.map_or("-".into(), |m| format!("{m:.4} m"));
+    let mut rows = vec![vec!["fe".to_string()]];
+    rows[0].extend(first.interfaces.iter().map(|i| metres(i.fe_crush_m)));
+    for row in &comparison.rows {
+        let mut cells = vec![row.method.clone()];
+        let cell = |crush_m: f64, work_j: f64| format!("{crush_m:.4} m ({:.3} MJ)", work_j / 1e6);
+        cells.extend(row.interfaces.iter().map(|i| cell(i.crush_m, i.work_j)));
+        rows.push(cells);
+    }
+    let mut heading = vec!["method"];
+    heading.extend(first.interfaces.iter().map(|i| i.interface.as_str()));
+    output::table(out, &heading, &rows)
 }
 
 /// Rows of the table of speeds.
@@ -343,6 +453,11 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
                 row.method.clone(),
                 row.driven_by.clone(),
                 cell(row.mean_velocity_l1, row.mean_acceleration_l1),
+                format!(
+                    "{:.3} m/s, {:.1} %",
+                    row.mean_velocity_difference_m_per_s,
+                    row.mean_velocity_share_of_initial * 100.0
+                ),
             ];
             cells.extend(row.vehicles.iter().map(|v| cell(v.velocity_l1, v.acceleration_l1)));
             let speeds: Vec<String> = row
@@ -354,10 +469,11 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
             cells
         })
         .collect();
-    let mut heading = vec!["method", "driven by", "mean"];
+    let mut heading = vec!["method", "driven by", "mean", "mean, of first speed"];
     heading.extend(vehicles.iter().map(|v| v.as_str()));
     heading.push("curves at");
     output::table(out, &heading, &rows)?;
+    print_crush(out, comparison)?;
     let times: Vec<String> = comparison
         .rows
         .iter()

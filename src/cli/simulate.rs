@@ -59,6 +59,9 @@ struct BodySummary {
     final_v_m_per_s: f64,
     mean_deceleration_m_per_s2: f64,
     mean_deceleration_g: f64,
+    /// Whether it is the crush zone of a vehicle's end, which stops at once: its decelerations are
+    /// no vehicle's.
+    is_crush_zone: bool,
     /// The run ended before the contact of that mean did: it is the mean of a part.
     still_loaded_at_end: bool,
     /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
@@ -198,11 +201,14 @@ fn document(
 }
 
 fn summary(prepared: &Prepared, run: &Run) -> Summary {
+    let stopping = prepared.chain.interfaces().iter().filter_map(|i| i.stopping.as_ref());
+    let zones: Vec<usize> = stopping.map(|stopping| stopping.zone).collect();
     let body = |&i: &usize| BodySummary {
         name: prepared.chain.bodies()[i].name.clone(),
         final_v_m_per_s: run.bodies[i].final_v_m_per_s,
         mean_deceleration_m_per_s2: run.bodies[i].mean_deceleration_m_per_s2,
         mean_deceleration_g: run.bodies[i].mean_deceleration_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
+        is_crush_zone: zones.contains(&i),
         still_loaded_at_end: run.bodies[i].is_loaded_at_end,
         moving_mean_deceleration_g: run.bodies[i]
             .moving_mean_deceleration_m_per_s2
@@ -275,6 +281,7 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
     let rows: Vec<Vec<String>> = summary
         .bodies
         .iter()
+        .filter(|b| !b.is_crush_zone)
         .map(|b| {
             vec![
                 b.name.clone(),

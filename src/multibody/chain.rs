@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::crush::{RateFactor, Stopping};
 use super::damping::Damping;
 use super::law::ForceLaw;
 
@@ -74,6 +75,10 @@ pub struct Interface {
     pub tension: Option<Tension>,
     /// Parallel to the law, while it is in contact.
     pub damping: Option<Damping>,
+    /// Factor on the law's force that follows speeds.
+    pub rate: Option<RateFactor>,
+    /// Mass that one side takes from the other while the interface is crushed.
+    pub stopping: Option<Stopping>,
 }
 
 /// A law on the extension beyond the distance at which the bodies stand at first.
@@ -88,12 +93,24 @@ pub struct Tension {
 impl Interface {
     /// An interface that only pushes.
     pub fn new(name: impl Into<String>, law: impl Into<Arc<ForceLaw>>, gap_m: f64) -> Self {
-        Self { name: name.into(), law: law.into(), gap_m, tension: None, damping: None }
+        let law = law.into();
+        let (tension, damping, rate, stopping) = (None, None, None, None);
+        Self { name: name.into(), law, gap_m, tension, damping, rate, stopping }
     }
 
     /// The same with a law that also pulls.
     pub fn with_tension(self, law: impl Into<Arc<ForceLaw>>, slack_m: f64) -> Self {
         Self { tension: Some(Tension { law: law.into(), slack_m }), ..self }
+    }
+
+    /// The same with a force that follows speeds.
+    pub fn with_rate(self, rate: RateFactor) -> Self {
+        Self { rate: Some(rate), ..self }
+    }
+
+    /// The same as a crush zone that stops mass.
+    pub fn with_stopping(self, stopping: Stopping) -> Self {
+        Self { stopping: Some(stopping), ..self }
     }
 
     /// The same with a damper.
@@ -157,6 +174,14 @@ pub enum ChainError {
         name: String,
         /// Length in m.
         length_m: f64,
+    },
+    /// A rate or a stopped mass that no crush zone has.
+    #[error("{name} has {what}")]
+    Crush {
+        /// Name of the interface.
+        name: String,
+        /// What is wrong, and what was expected.
+        what: &'static str,
     },
     /// A term of the resistance below 0.
     #[error("the resistance of {name} has the term {value}: expected 0 or more")]
@@ -231,6 +256,7 @@ impl Chain {
             }
         }
         for interface in &self.interfaces {
+            self.check_crush(interface)?;
             let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
             for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
                 if !(length_m >= 0.0 && length_m.is_finite()) {
@@ -243,6 +269,35 @@ impl Chain {
             }
         }
         Ok(())
+    }
+
+    fn check_crush(&self, interface: &Interface) -> Result<(), ChainError> {
+        let wrong = |what| Err(ChainError::Crush { name: interface.name.clone(), what });
+        let bodies = self.bodies.len();
+        if let Some(rate) = &interface.rate {
+            let values = [rate.sensitivity_sqrt_s_per_m, rate.share];
+            if !values.iter().all(|value| *value >= 0.0 && value.is_finite()) {
+                return wrong("a rate whose sensitivity or share is not 0 or more");
+            }
+            if rate.behind >= bodies || rate.ahead.is_some_and(|ahead| ahead >= bodies) {
+                return wrong("a rate that follows a body which is not there");
+            }
+            if interface.tension.is_some() {
+                return wrong("a rate and a coupling: a rate is that of compression");
+            }
+        }
+        let Some(stopping) = &interface.stopping else { return Ok(()) };
+        let (Some(body), Some(zone)) =
+            (self.bodies.get(stopping.body), self.bodies.get(stopping.zone))
+        else {
+            return wrong("a crush zone which is not there");
+        };
+        match stopping.is_sound(body.mass_kg + zone.mass_kg) {
+            true => Ok(()),
+            false => wrong(
+                "a stopped mass that falls with the deflection, or is not less than its vehicle's: expected that of a vehicle not much heavier than this one",
+            ),
+        }
     }
 
     /// From back to front.
@@ -260,9 +315,11 @@ impl Chain {
         self.interfaces.len() == self.bodies.len()
     }
 
-    /// Whether forces depend on speeds: dampers, resistance.
+    /// Whether forces depend on speeds: dampers, crush zones, resistance.
     pub fn has_rates(&self) -> bool {
-        self.interfaces.iter().any(|i| i.damping.is_some()) || self.has_resistance()
+        let depends =
+            |i: &Interface| i.damping.is_some() || i.rate.is_some() || i.stopping.is_some();
+        self.interfaces.iter().any(depends) || self.has_resistance()
     }
 
     /// Whether the track brakes any body.

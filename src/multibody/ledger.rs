@@ -24,7 +24,7 @@ pub struct Ledger {
     /// In all interfaces.
     #[serde(rename = "dissipated_J")]
     pub dissipated_j: f64,
-    /// By dampers.
+    /// By dampers, by the share of forces that follows speeds, and where mass is stopped.
     #[serde(rename = "damped_J")]
     pub damped_j: f64,
     /// By running and braking resistance.

@@ -22,6 +22,7 @@
 
 mod chain;
 mod contacts;
+mod crush;
 mod damping;
 mod driven;
 mod engine;
@@ -34,6 +35,7 @@ mod run;
 
 pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2};
 pub use chain::{ChainError, Tension};
+pub use crush::{RateFactor, Stopping};
 pub use damping::{Damping, DampingError};
 pub use driven::UnloadingChoice;
 pub use law::{EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingShape};
@@ -76,11 +78,13 @@ fn refuse_rates(chain: &Chain) -> Result<(), SimulationError> {
     if !chain.has_rates() {
         return Ok(());
     }
-    let damped = chain.interfaces().iter().find(|i| i.damping.is_some());
-    let what = match damped {
-        Some(interface) => format!("the damper of interface {}", interface.name),
-        None => "running or braking resistance".into(),
+    let named = |what: &str, has: fn(&Interface) -> bool| {
+        let interface = chain.interfaces().iter().find(|i| has(i))?;
+        Some(format!("{what} of interface {}", interface.name))
     };
+    let what = named("the damper", |i| i.damping.is_some())
+        .or_else(|| named("the force", |i| i.rate.is_some() || i.stopping.is_some()))
+        .unwrap_or_else(|| "running or braking resistance".into());
     Err(SimulationError::Rates { what })
 }
 

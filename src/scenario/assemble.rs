@@ -3,13 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::layout::{Layout, Role, Slot, layout};
+use super::end::{Crush, PlatesError, crush_between, crush_end, plates};
+use super::layout::{End, Joint, Layout, Role, Slot, layout};
 use super::place::{self, Origin};
-use super::spring::{NoSpring, SpringError, spring};
-use super::{CheckedScenario, CurveSource, LimitsTable, Prepared, ScenarioError, Sources, Used};
+use super::spring::{NoSpring, Spring, SpringError, spring};
+use super::{
+    CheckedScenario, CurveSource, LawName, LimitsTable, Prepared, ScenarioError, Sources, Used,
+};
 use crate::multibody::{
     Chain, ChainError, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
 };
+use crate::surrogate::Model;
 use crate::unit::SpeedKind;
 
 /// Why a curve cannot stand where the scenario puts it.
@@ -36,6 +40,12 @@ pub enum AssemblyError {
         curve: String,
         /// What is wrong with it.
         source: DampingError,
+    },
+    /// The plates of two ends.
+    #[error("between two plates: {source}")]
+    Plates {
+        /// What is wrong.
+        source: PlatesError,
     },
     /// It was measured at speeds of the other kind.
     #[error(
@@ -66,27 +76,21 @@ pub(super) fn assemble_at(
     sources: &Sources,
     speeds_m_per_s: &[f64],
 ) -> Result<Prepared, ScenarioError> {
-    let Layout { bodies, slots, order } = layout(scenario);
+    let Layout { bodies, slots, order, vehicles } = layout(scenario);
     let mut builder = Builder { path, scenario, sources, made: Vec::new(), warnings: Vec::new() };
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
-    for (slot, &speed) in slots.iter().zip(speeds_m_per_s) {
-        let made = builder.law(slot, slot.curve, speed)?;
-        let table = &scenario.curves[slot.curve];
-        let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
-        let mut interface = Interface::new(slot.name.clone(), made.law, gap_m);
-        if let Some(name) = &table.tension {
-            let slack_m = scenario.curves[name].gap.map_or(0.0, |g| g.0);
-            interface.tension = Some(Tension { law: builder.law(slot, name, speed)?.law, slack_m });
-        }
-        if let Some(damping) = &table.damping {
-            let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
-            let damping = Damping::new(points.0, points.1).map_err(|source| {
-                builder.failed(AssemblyError::Damping { curve: slot.curve.into(), source })
-            })?;
-            interface.damping = Some(damping);
-        }
+    for (k, (slot, &speed)) in slots.iter().zip(speeds_m_per_s).enumerate() {
+        let (interface, of_curve) = match &slot.joint {
+            Joint::Curve(curve) if scenario.curves[*curve].law == LawName::Rate => {
+                let ahead = (k + 1 < bodies.len()).then_some(k + 1);
+                builder.with_rate(slot, curve, (k, ahead), speed)?
+            }
+            Joint::Curve(curve) => builder.interface(slot, curve, speed)?,
+            Joint::End(end) => builder.end(slot, end, speed)?,
+            Joint::Plates => builder.plates(slot)?,
+        };
         interfaces.push(interface);
-        used.push(made.used);
+        used.push(of_curve);
     }
     let chain =
         Chain::new(bodies, interfaces).map_err(|source| no_chain(path, scenario, source))?;
@@ -109,28 +113,18 @@ pub(super) fn assemble_at(
     }
     let limits = scenario.limits.clone();
     let limited = match &limits {
-        Some(limits) => limited(scenario, &order, limits),
+        Some(limits) => limited(scenario, &vehicles, limits),
         None => Vec::new(),
     };
     let origin = Origin::new(path, scenario);
     Ok(Prepared { chain, settings, order, used, limits, limited, warnings, origin })
 }
 
-/// The bodies of the vehicles that limits hold for; `order` lists those of all trains, each vehicle
-/// before its crush zones.
-fn limited(scenario: &CheckedScenario<'_>, order: &[usize], limits: &LimitsTable) -> Vec<usize> {
-    let mut bodies = order.iter();
-    let mut limited = Vec::new();
-    for train in &scenario.train {
-        let counts = limits.trains.as_ref().is_none_or(|trains| trains.contains(&train.name));
-        for vehicle in &train.vehicles {
-            limited.extend(bodies.next().filter(|_| counts));
-            for _zone in vehicle.front.iter().chain(&vehicle.rear) {
-                bodies.next();
-            }
-        }
-    }
-    limited
+/// The bodies of the vehicles that limits hold for; `vehicles` lists those of all trains.
+fn limited(scenario: &CheckedScenario<'_>, vehicles: &[usize], limits: &LimitsTable) -> Vec<usize> {
+    let counts = |train: &str| limits.trains.as_ref().is_none_or(|t| t.iter().any(|t| t == train));
+    let trains = scenario.train.iter().flat_map(|t| t.vehicles.iter().map(|_| t.name.as_str()));
+    trains.zip(vehicles).filter(|(train, _)| counts(train)).map(|(_, body)| *body).collect()
 }
 
 /// Gives a chain put together by [`assemble`](super::assemble) the masses, speeds and gaps of `scenario`, which
@@ -148,11 +142,13 @@ pub(crate) fn adjust(
     let Layout { bodies, slots, .. } = layout(scenario);
     let motions: Vec<(f64, f64)> = bodies.iter().map(|b| (b.mass_kg, b.speed_m_per_s)).collect();
     let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
-    let gaps: Vec<f64> =
-        slots.iter().map(|slot| slot.gap_m.unwrap_or_else(|| own(slot.curve))).collect();
+    let gaps: Vec<f64> = slots
+        .iter()
+        .map(|slot| slot.gap_m.or(slot.joint.curve().map(own)).unwrap_or(0.0))
+        .collect();
     let slacks: Vec<f64> = slots
         .iter()
-        .map(|slot| scenario.curves.get(slot.curve).and_then(|c| c.tension.as_ref()))
+        .map(|slot| scenario.curves.get(slot.joint.curve()?).and_then(|c| c.tension.as_ref()))
         .map(|tension| tension.map_or(0.0, |curve| own(curve)))
         .collect();
     let adjusted = prepared.chain.adjust(&motions, &gaps, &slacks);
@@ -162,6 +158,9 @@ pub(crate) fn adjust(
 fn no_chain(path: &Path, scenario: &CheckedScenario<'_>, source: ChainError) -> ScenarioError {
     ScenarioError::Chain { place: scenario.place(path, &scenario.chain_key(&source)), source }
 }
+
+/// What results name as the curve where plates meet.
+pub(crate) const PLATES: &str = "plates";
 
 /// A law that has been made, and for what.
 #[derive(Clone)]
@@ -181,7 +180,7 @@ struct Builder<'a> {
     warnings: Vec<String>,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
     fn failed(&self, source: AssemblyError) -> ScenarioError {
         let place = self.scenario.place(self.path, &place::assembly_key(&source));
         ScenarioError::Assembly { place, source: source.into() }
@@ -189,6 +188,125 @@ impl Builder<'_> {
 
     fn no_spring(&self, curve: &str, source: SpringError) -> ScenarioError {
         self.failed(AssemblyError::NoSpring { curve: curve.into(), source })
+    }
+
+    /// An interface that a curve of the scenario tells.
+    fn interface(
+        &mut self,
+        slot: &Slot<'_>,
+        curve: &str,
+        speed: f64,
+    ) -> Result<(Interface, Used), ScenarioError> {
+        let made = self.law(slot, curve, speed)?;
+        let table = &self.scenario.curves[curve];
+        let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
+        let mut interface = Interface::new(slot.name.clone(), made.law, gap_m);
+        if let Some(name) = &table.tension {
+            let slack_m = self.scenario.curves[name].gap.map_or(0.0, |g| g.0);
+            interface.tension = Some(Tension { law: self.law(slot, name, speed)?.law, slack_m });
+        }
+        if let Some(damping) = &table.damping {
+            let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
+            let damping = Damping::new(points.0, points.1).map_err(|source| {
+                self.failed(AssemblyError::Damping { curve: curve.into(), source })
+            })?;
+            interface.damping = Some(damping);
+        }
+        Ok((interface, made.used))
+    }
+
+    /// The crush zone of a vehicle whose end a model tells.
+    fn end(
+        &mut self,
+        slot: &Slot<'_>,
+        end: &End<'_>,
+        speed: f64,
+    ) -> Result<(Interface, Used), ScenarioError> {
+        let (model, scale) = self.model(end.curve)?;
+        let crush = crush_end(model, end, speed, scale)
+            .map_err(|source| self.no_spring(end.curve, source))?;
+        let (stopping, (interface, used)) =
+            (crush.stopping.clone(), self.crushed(slot, end.curve, crush)?);
+        Ok((Interface { stopping, ..interface }, used))
+    }
+
+    /// An interface between vehicles of one mass whose crush force follows the run's own speeds;
+    /// `sides` are the bodies behind and ahead.
+    fn with_rate(
+        &mut self,
+        slot: &Slot<'_>,
+        curve: &str,
+        sides: (usize, Option<usize>),
+        speed: f64,
+    ) -> Result<(Interface, Used), ScenarioError> {
+        let (model, scale) = self.model(curve)?;
+        self.check_kind(slot, curve, Some(model.speed_kind))?;
+        let crush = crush_between(model, slot, sides, speed, scale)
+            .map_err(|source| self.no_spring(curve, source))?;
+        let (interface, used) = self.crushed(slot, curve, crush)?;
+        let own_m = self.scenario.curves[curve].gap.map(|g| g.0);
+        Ok((Interface { gap_m: slot.gap_m.or(own_m).unwrap_or(0.0), ..interface }, used))
+    }
+
+    /// The model of a curve, and the factor on its forces.
+    fn model(&self, curve: &str) -> Result<(&'a Model, f64), ScenarioError> {
+        let Some(CurveSource::Model(model)) = self.sources.curves.get(curve) else {
+            return Err(self.failed(AssemblyError::NotRead { curve: curve.into() }));
+        };
+        let factor = self.scenario.curves[curve].scale.unwrap_or(1.0);
+        match factor > 0.0 && factor.is_finite() {
+            true => Ok((model, factor)),
+            false => Err(self.no_spring(curve, SpringError::Scale { factor })),
+        }
+    }
+
+    /// The interface of a crush force.
+    fn crushed(
+        &mut self,
+        slot: &Slot<'_>,
+        curve: &str,
+        crush: Crush,
+    ) -> Result<(Interface, Used), ScenarioError> {
+        let table = &self.scenario.curves[curve];
+        let spring = |source| self.no_spring(curve, source);
+        let (law, of_law) = Spring { curve: crush.curve, warnings: crush.warnings }
+            .law_with_warnings(table)
+            .map_err(spring)?;
+        self.warnings.extend(of_law.iter().map(|w| format!("curve \"{curve}\": {w}")));
+        let interface = Interface::new(slot.name.clone(), law, 0.0).with_rate(crush.rate);
+        let used = Used {
+            curve: curve.into(),
+            force: Some("crush"),
+            speed_m_per_s: Some(crush.speed_m_per_s),
+        };
+        Ok((interface, used))
+    }
+
+    /// Fails if a curve of one kind of speed stands where the other is meant.
+    fn check_kind(
+        &self,
+        slot: &Slot<'_>,
+        curve: &str,
+        kind: Option<SpeedKind>,
+    ) -> Result<(), ScenarioError> {
+        let expected = match slot.role {
+            Role::Wall => Some(SpeedKind::Wall),
+            Role::Noses | Role::Vehicles => Some(SpeedKind::Closing),
+            Role::Within => None,
+        };
+        let (Some(kind), Some(expected)) = (kind, expected) else { return Ok(()) };
+        let (curve, interface) = (curve.into(), slot.name.clone());
+        match kind == expected {
+            true => Ok(()),
+            false => Err(self.failed(AssemblyError::Speeds { curve, kind, interface, expected })),
+        }
+    }
+
+    /// Where the plates of two ends meet.
+    fn plates(&mut self, slot: &Slot<'_>) -> Result<(Interface, Used), ScenarioError> {
+        let interface = plates(&slot.name, slot.gap_m.unwrap_or(0.0))
+            .map_err(|source| self.failed(AssemblyError::Plates { source }))?;
+        Ok((interface, Used { curve: PLATES.into(), force: Some("contact"), speed_m_per_s: None }))
     }
 
     /// The law of a curve at a slot: made once for all slots that need the same.
@@ -216,26 +334,13 @@ impl Builder<'_> {
                 ScenarioError::Predict { place, curve: curve.into(), source }
             }
         })?;
-        let expected = match slot.role {
-            Role::Wall => Some(SpeedKind::Wall),
-            Role::Noses | Role::Vehicles => Some(SpeedKind::Closing),
-            Role::Within => None,
-        };
-        if let (Some(kind), Some(expected)) = (spring.curve.speed_kind, expected)
-            && kind != expected
-        {
-            let (curve, interface) = (curve.into(), slot.name.clone());
-            return Err(self.failed(AssemblyError::Speeds { curve, kind, interface, expected }));
-        }
-        let (law, of_law) = spring.law(table).map_err(|source| self.no_spring(curve, source))?;
-        let used = Used {
-            curve: curve.into(),
-            force: spring.curve.force.map(|f| f.name()),
-            speed_m_per_s: spring.curve.speed_m_per_s,
-        };
-        self.warnings.extend(
-            spring.warnings.iter().chain(&of_law).map(|w| format!("curve \"{curve}\": {w}")),
-        );
+        self.check_kind(slot, curve, spring.curve.speed_kind)?;
+        let speed_m_per_s = spring.curve.speed_m_per_s;
+        let force = spring.curve.force.map(|f| f.name());
+        let (law, said) =
+            spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;
+        let used = Used { curve: curve.into(), force, speed_m_per_s };
+        self.warnings.extend(said.iter().map(|w| format!("curve \"{curve}\": {w}")));
         let made = Made { curve: curve.into(), key, law: Arc::new(law), used };
         self.made.push(made.clone());
         Ok(made)

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::ops::Deref;
 
 use super::layout::layout;
-use super::{CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
+use super::{CrushZone, CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
 use crate::guess;
 use crate::manifest::Document;
 use crate::unit::km_per_h;
@@ -14,7 +14,7 @@ use crate::unit::km_per_h;
 ///
 /// Invariants: one train and a wall, or two trains, the first faster than what it meets; every
 /// train has vehicles, and between any two of them, at the contact and in every crush zone a
-/// curve of `[curves]`; names of bodies are unique; a vehicle has more mass than its crush zones.
+/// curve of `[curves]`, or at the first two the plates of ends that come from models; names of bodies are unique; a vehicle has more mass than its crush zones.
 #[derive(Clone, Debug)]
 pub struct CheckedScenario<'a> {
     tables: Cow<'a, Scenario>,
@@ -99,6 +99,39 @@ pub enum CheckError {
         train: String,
         /// How many vehicles it has.
         vehicles: usize,
+    },
+    /// A contact without a curve between what has no ends of a model.
+    #[error(
+        "[contact] needs curve = \"…\": it can be left out only where the noses that meet come from models (front or ends)"
+    )]
+    NoContact,
+    /// One of two facing ends comes from a model.
+    #[error(
+        "{end} of vehicle \"{vehicle}\" comes from a model and the end that it meets does not: give both, or neither"
+    )]
+    OneEnd {
+        /// The vehicle whose end comes from a model.
+        vehicle: String,
+        /// `front` or `rear`.
+        end: &'static str,
+    },
+    /// A curve where the ends of models meet.
+    #[error(
+        "curve \"{curve}\" stands between ends that come from models, where plates meet: remove it"
+    )]
+    BetweenEnds {
+        /// The curve.
+        curve: String,
+    },
+    /// An end without a mass whose curve is no model.
+    #[error(
+        "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which tells the mass that is stopped"
+    )]
+    EndNeedsModel {
+        /// The vehicle.
+        vehicle: String,
+        /// `front`, `rear` or `ends`.
+        end: &'static str,
     },
     /// A curve behind the last vehicle.
     #[error("there is nothing behind the last vehicle \"{vehicle}\"")]
@@ -207,16 +240,18 @@ impl Scenario {
             check_limits(limits, &self.train)?;
         }
         check_names(self)?;
+        check_contact(self)?;
         for (name, table) in &self.curves {
             check_keys(name, table)?;
         }
         let checked = check_values(self)?;
-        for slot in layout(&checked).slots {
-            if !self.curves.contains_key(slot.curve) {
-                let (curve, known) = (slot.curve.into(), curve_names(self));
+        for curve in layout(&checked).slots.iter().filter_map(|slot| slot.joint.curve()) {
+            if !self.curves.contains_key(curve) {
+                let (curve, known) = (curve.into(), curve_names(self));
                 return Err(CheckError::UnknownCurve { curve, known });
             }
         }
+        check_ends(self)?;
         Ok(checked)
     }
 }
@@ -299,8 +334,8 @@ fn check_names(scenario: &Scenario) -> Result<(), CheckError> {
         for vehicle in &train.vehicles {
             check_name(&vehicle.name)?;
             take(vehicle.name.clone())?;
-            for (end, _) in vehicle.zones() {
-                take(format!("{} {end}", vehicle.name))?;
+            for zone in vehicle.zones() {
+                take(format!("{} {}", vehicle.name, zone.end))?;
             }
         }
     }
@@ -309,16 +344,59 @@ fn check_names(scenario: &Scenario) -> Result<(), CheckError> {
 
 fn check_vehicles(train: &TrainTable) -> Result<(), CheckError> {
     let (name, vehicles) = (train.name.clone(), train.vehicles.len());
-    let Some((last, others)) = train.vehicles.split_last() else {
+    let Some(last) = train.vehicles.last() else {
         return Err(CheckError::NoVehicles { train: name });
     };
-    if others.iter().any(|v| v.behind.is_none()) && train.inner.is_none() {
-        return Err(CheckError::NoInner { train: name, vehicles });
+    for pair in train.vehicles.windows(2) {
+        let plates = facing(
+            (&pair[0].name, pair[0].rear_zone()),
+            Some((&pair[1].name, pair[1].front_zone())),
+        )?;
+        match (plates, &pair[0].behind) {
+            (true, Some(curve)) => {
+                return Err(CheckError::BetweenEnds { curve: curve.clone() });
+            }
+            (false, None) if train.inner.is_none() => {
+                return Err(CheckError::NoInner { train: name, vehicles });
+            }
+            _ => {}
+        }
     }
     if last.behind.is_some() {
         return Err(CheckError::NothingBehind { vehicle: last.name.clone() });
     }
     Ok(())
+}
+
+/// Whether two facing ends, or an end and the wall, meet as plates: both come from models.
+fn facing(
+    (name, end): (&str, Option<CrushZone<'_>>),
+    other: Option<(&str, Option<CrushZone<'_>>)>,
+) -> Result<bool, CheckError> {
+    let one = |vehicle: &str, end: CrushZone<'_>| {
+        Err(CheckError::OneEnd { vehicle: vehicle.into(), end: end.end })
+    };
+    let other = other.map(|(name, end)| (name, end.filter(CrushZone::is_of_model)));
+    match (end.filter(CrushZone::is_of_model), other) {
+        (Some(_), None | Some((_, Some(_)))) => Ok(true),
+        (Some(end), Some((_, None))) => one(name, end),
+        (None, Some((other, Some(end)))) => one(other, end),
+        (None, _) => Ok(false),
+    }
+}
+
+/// The curve between the noses, or between plates none.
+fn check_contact(scenario: &Scenario) -> Result<(), CheckError> {
+    let nose = |train: usize| {
+        let vehicle = scenario.train.get(train)?.vehicles.first()?;
+        Some((vehicle.name.as_str(), vehicle.front_zone()))
+    };
+    let Some(first) = nose(0) else { return Ok(()) };
+    match (facing(first, nose(1))?, &scenario.contact.curve) {
+        (true, Some(curve)) => Err(CheckError::BetweenEnds { curve: curve.clone() }),
+        (false, None) => Err(CheckError::NoContact),
+        _ => Ok(()),
+    }
 }
 
 /// Names stand in the columns of the result.
@@ -351,7 +429,15 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), CheckError> {
             table.law == LawName::Elastic && table.unloading.is_some(),
         ),
     ];
-    match foreign.into_iter().find(|(.., is_foreign)| *is_foreign) {
+    let rate = table.law == LawName::Rate;
+    let of_rate = [
+        ("law", "a model, which has a rate", rate && no_model),
+        ("band", "law = \"memory\"", rate && table.band.is_some()),
+        ("max_crush", "law = \"memory\"", rate && table.max_crush.is_some()),
+        ("force", "law = \"memory\"", rate && table.force.is_some()),
+        ("tension", "law = \"memory\"", rate && table.tension.is_some()),
+    ];
+    match foreign.into_iter().chain(of_rate).find(|(.., is_foreign)| *is_foreign) {
         Some((key, of, _)) => Err(CheckError::ForeignKey { curve: name.into(), key, of }),
         None => Ok(()),
     }
@@ -381,17 +467,43 @@ fn curve_names(scenario: &Scenario) -> String {
 }
 
 fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), CheckError> {
-    for (end, zone) in vehicle.zones() {
-        let gap = scenario.curves.get(&zone.curve).and_then(|curve| curve.gap);
+    for zone in vehicle.zones() {
+        let gap = scenario.curves.get(zone.curve).and_then(|curve| curve.gap);
         if gap.is_some_and(|gap| gap.0 > 0.0) {
-            let (curve, vehicle) = (zone.curve.clone(), vehicle.name.clone());
-            return Err(CheckError::ZoneGap { curve, end, vehicle });
+            let (curve, vehicle) = (zone.curve.into(), vehicle.name.clone());
+            return Err(CheckError::ZoneGap { curve, end: zone.end, vehicle });
         }
     }
     match vehicle.zones().next().is_some() && vehicle.body_mass_kg() <= 0.0 {
         true => Err(CheckError::NoBodyMass { vehicle: vehicle.name.clone() }),
         false => Ok(()),
     }
+}
+
+/// Ends without a mass of their own come from models.
+fn check_ends(scenario: &Scenario) -> Result<(), CheckError> {
+    for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
+        for zone in vehicle.zones().filter(CrushZone::is_of_model) {
+            let Some(table) = scenario.curves.get(zone.curve) else { continue };
+            let between = "a curve between bodies, and this one is the end of a vehicle";
+            let foreign = [
+                ("band", table.band.is_some()),
+                ("max_crush", table.max_crush.is_some()),
+                ("force", table.force.is_some()),
+                ("tension", table.tension.is_some()),
+                ("damping", table.damping.is_some()),
+            ];
+            if let Some((key, _)) = foreign.into_iter().find(|(_, given)| *given) {
+                return Err(CheckError::ForeignKey { curve: zone.curve.into(), key, of: between });
+            }
+            if table.model.is_none() {
+                let by_both = vehicle.ends.as_deref() == Some(zone.curve);
+                let end = if by_both { "ends" } else { zone.end };
+                return Err(CheckError::EndNeedsModel { vehicle: vehicle.name.clone(), end });
+            }
+        }
+    }
+    Ok(())
 }
 
 fn check_tension(name: &str, tension: &str, scenario: &Scenario) -> Result<(), CheckError> {

@@ -1,21 +1,24 @@
 //! Layout: the bodies of a scenario in their row, and the places between them.
 
-use super::{CheckedScenario, TrainTable, VehicleTable};
+use super::{CheckedScenario, CrushZone, TrainTable, VehicleTable};
 use crate::multibody::{Body, Resistance};
 
 /// Bodies from the back of the first train to its nose and on, and what lies between them.
+#[derive(Default)]
 pub(super) struct Layout<'a> {
     pub bodies: Vec<Body>,
     pub slots: Vec<Slot<'a>>,
     /// Bodies as the scenario lists them: vehicle, its front, its rear.
     pub order: Vec<usize>,
+    /// The body of each vehicle, as the scenario lists them.
+    pub vehicles: Vec<usize>,
 }
 
 /// A place for an interface.
 pub(super) struct Slot<'a> {
     /// `A1|A2`, the one nearer to the nose first.
     pub name: String,
-    pub curve: &'a str,
+    pub joint: Joint<'a>,
     /// Free distance, if the curve's own does not hold.
     pub gap_m: Option<f64>,
     pub role: Role,
@@ -24,6 +27,44 @@ pub(super) struct Slot<'a> {
     /// Whether a vehicle's crush zone at this place is a body of its own.
     pub split: bool,
 }
+
+/// What acts at a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Joint<'a> {
+    /// A curve of the scenario.
+    Curve(&'a str),
+    /// The crush law of a model, between body and crush zone.
+    End(End<'a>),
+    /// The plates of two such ends, or of one and the wall.
+    Plates,
+}
+
+/// The end of a vehicle that a model tells, by its bodies in the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct End<'a> {
+    pub curve: &'a str,
+    pub body: usize,
+    pub zone: usize,
+    /// The vehicle behind the interface at which the end is crushed, and that ahead of it: `None`
+    /// for the wall.
+    pub behind: usize,
+    pub ahead: Option<usize>,
+    /// What that interface lies between.
+    pub at: Role,
+}
+
+impl<'a> Joint<'a> {
+    /// The curve of the scenario that it needs.
+    pub(super) fn curve(&self) -> Option<&'a str> {
+        match self {
+            Self::Curve(curve) | Self::End(End { curve, .. }) => Some(curve),
+            Self::Plates => None,
+        }
+    }
+}
+
+/// Share of a vehicle's mass that the plate of an end has at first, until more is stopped.
+const PLATE: f64 = 0.002;
 
 /// What a slot lies between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,11 +79,12 @@ pub(super) enum Role {
 
 /// The row of a scenario.
 pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
-    let mut layout = Layout { bodies: Vec::new(), slots: Vec::new(), order: Vec::new() };
+    let mut layout = Layout::default();
     let first = &scenario.train[0];
     let mut places = vec![[None; 3]; first.vehicles.len()];
     for (i, vehicle) in first.vehicles.iter().enumerate().rev() {
-        places[i] = layout.vehicle(first, vehicle, true);
+        let is_last = i + 1 == first.vehicles.len();
+        places[i] = layout.vehicle(first, vehicle, true, is_last);
         if i > 0 {
             layout.between(first, i - 1);
         }
@@ -52,28 +94,41 @@ pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
     let (name, role, mass_kg, split) = match (&scenario.wall, scenario.train.get(1)) {
         (None, Some(second)) => {
             let other = &second.vehicles[0];
-            let split = nose.front.is_some() || other.front.is_some();
+            let split = nose.front_zone().or(other.front_zone()).is_some();
             let name = format!("{}|{}", nose.name, other.name);
             (name, Role::Noses, equal_mass_kg(nose, other), split)
         }
         (wall, _) => {
             let wall = wall.as_ref().map_or("wall", |w| &w.name);
             let name = format!("{}|{wall}", nose.name);
-            (name, Role::Wall, nose.mass.0, nose.front.is_some())
+            (name, Role::Wall, nose.mass.0, nose.front_zone().is_some())
         }
     };
     let gap_m = contact.gap.map(|g| g.0);
-    layout.slots.push(Slot { name, curve: &contact.curve, gap_m, role, mass_kg, split });
+    let joint = joint(nose.front_zone(), contact.curve.as_deref());
+    layout.slots.push(Slot { name, joint, gap_m, role, mass_kg, split });
     if let Some(second) = scenario.train.get(1) {
         for (i, vehicle) in second.vehicles.iter().enumerate() {
-            places.push(layout.vehicle(second, vehicle, false));
+            let is_last = i + 1 == second.vehicles.len();
+            places.push(layout.vehicle(second, vehicle, false, is_last));
             if i + 1 < second.vehicles.len() {
                 layout.between(second, i);
             }
         }
     }
+    layout.vehicles = places.iter().filter_map(|place| place[0]).collect();
     layout.order = places.into_iter().flatten().flatten().collect();
+    layout.join_ends();
     layout
+}
+
+/// What acts between two ends, or an end and the wall: plates if `end` comes from a model, as the
+/// other one then does.
+fn joint<'a>(end: Option<CrushZone<'a>>, curve: Option<&'a str>) -> Joint<'a> {
+    match end.is_some_and(|end| end.is_of_model()) {
+        true => Joint::Plates,
+        false => Joint::Curve(curve.unwrap_or_default()),
+    }
 }
 
 fn equal_mass_kg(a: &VehicleTable, b: &VehicleTable) -> f64 {
@@ -88,6 +143,7 @@ impl<'a> Layout<'a> {
         train: &TrainTable,
         vehicle: &'a VehicleTable,
         rear_first: bool,
+        is_last: bool,
     ) -> [Option<usize>; 3] {
         let mut places = [None; 3];
         let resistance = train.resistance.map_or(Resistance::default(), |r| Resistance {
@@ -97,12 +153,29 @@ impl<'a> Layout<'a> {
             braking: r.braking,
         });
         let name = &vehicle.name;
-        let front = vehicle.front.as_ref().map(|zone| (1, format!("{name} front"), zone));
-        let rear = vehicle.rear.as_ref().map(|zone| (2, format!("{name} rear"), zone));
+        // Nothing meets the last end of a train: a model's stays part of its body.
+        let free = |zone: &CrushZone<'_>| is_last && zone.is_of_model();
+        let (front, rear) = (vehicle.front_zone(), vehicle.rear_zone().filter(|z| !free(z)));
+        let front = front.map(|zone| (1, format!("{name} front"), zone));
+        let rear = rear.map(|zone| (2, format!("{name} rear"), zone));
         let (before, after) = if rear_first { (rear, front) } else { (front, rear) };
-        let within = |zone: &str, curve: &'a str| Slot {
-            name: format!("{zone}|{name}"),
-            curve,
+        let plate_kg = PLATE * vehicle.mass.0;
+        let plates = [&before, &after].into_iter().flatten().filter(|z| z.2.is_of_model());
+        let plates_kg = plate_kg * plates.count() as f64;
+        let within = |zone_name: &str, zone: &CrushZone<'a>, body: usize, zone_body: usize| Slot {
+            name: format!("{zone_name}|{name}"),
+            joint: match zone.is_of_model() {
+                false => Joint::Curve(zone.curve),
+                // Which vehicles meet there is known when all stand in their row.
+                true => Joint::End(End {
+                    curve: zone.curve,
+                    body,
+                    zone: zone_body,
+                    behind: body,
+                    ahead: None,
+                    at: Role::Wall,
+                }),
+            },
             gap_m: Some(0.0),
             role: Role::Within,
             mass_kg: vehicle.mass.0,
@@ -112,15 +185,16 @@ impl<'a> Layout<'a> {
             places[place] = Some(self.bodies.len());
             let body = Body::new(name, mass_kg, train.speed.0);
             self.bodies.push(Body { resistance, ..body });
+            self.bodies.len() - 1
         };
         if let Some((place, zone_name, zone)) = before {
-            body(place, &zone_name, zone.mass.0);
-            self.slots.push(within(&zone_name, &zone.curve));
+            let at = body(place, &zone_name, zone.mass_kg.unwrap_or(plate_kg));
+            self.slots.push(within(&zone_name, &zone, at + 1, at));
         }
-        body(0, name, vehicle.body_mass_kg());
+        let at = body(0, name, vehicle.body_mass_kg() - plates_kg);
         if let Some((place, zone_name, zone)) = after {
-            body(place, &zone_name, zone.mass.0);
-            self.slots.push(within(&zone_name, &zone.curve));
+            body(place, &zone_name, zone.mass_kg.unwrap_or(plate_kg));
+            self.slots.push(within(&zone_name, &zone, at, at + 1));
         }
         places
     }
@@ -128,13 +202,34 @@ impl<'a> Layout<'a> {
     /// The place behind vehicle `i` of a train.
     fn between(&mut self, train: &'a TrainTable, i: usize) {
         let (ahead, behind) = (&train.vehicles[i], &train.vehicles[i + 1]);
+        let curve = ahead.behind.as_deref().or(train.inner.as_deref());
+        let joint = joint(ahead.rear_zone(), curve);
         self.slots.push(Slot {
             name: format!("{}|{}", ahead.name, behind.name),
-            curve: ahead.behind.as_deref().or(train.inner.as_deref()).unwrap_or_default(),
-            gap_m: None,
+            gap_m: ahead.gap.or(train.gap).map(|gap| gap.0),
+            joint,
             role: Role::Vehicles,
             mass_kg: equal_mass_kg(ahead, behind),
-            split: ahead.rear.is_some() || behind.front.is_some(),
+            split: ahead.rear_zone().or(behind.front_zone()).is_some(),
         });
+    }
+
+    /// Tells every end of a model which vehicles meet at its plates. Slot `k` lies between the
+    /// bodies `k` and `k + 1`.
+    fn join_ends(&mut self) {
+        for k in 0..self.slots.len() {
+            if self.slots[k].joint != Joint::Plates {
+                continue;
+            }
+            // The plates are bodies k and k + 1, their vehicles one further.
+            let at = self.slots[k].role;
+            let behind = k.saturating_sub(1);
+            let ahead = (at != Role::Wall).then_some(k + 2);
+            for end in [k.checked_sub(1), Some(k + 1)].into_iter().flatten() {
+                if let Some(Joint::End(end)) = self.slots.get_mut(end).map(|slot| &mut slot.joint) {
+                    (end.behind, end.ahead, end.at) = (behind, ahead, at);
+                }
+            }
+        }
     }
 }

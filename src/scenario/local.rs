@@ -10,7 +10,7 @@
 use std::path::Path;
 
 use super::assemble::assemble_at;
-use super::layout::{Role, Slot, layout};
+use super::layout::{Joint, Role, layout};
 use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, ScenarioError, Sources};
 use crate::multibody::{Chain, Method, Run, simulate};
 use crate::signal::peaks::peaks;
@@ -41,8 +41,11 @@ pub(crate) fn assemble(
     scenario: &CheckedScenario<'_>,
     sources: &Sources,
 ) -> Result<Prepared, ScenarioError> {
-    let own: Vec<bool> =
-        layout(scenario).slots.iter().map(|slot| is_local(slot, sources)).collect();
+    let own: Vec<bool> = layout(scenario)
+        .slots
+        .iter()
+        .map(|slot| is_local(&slot.joint, slot.role, sources))
+        .collect();
     let mut speeds_m_per_s = vec![scenario.meeting_m_per_s(); own.len()];
     let mut prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
     if scenario.run.interface_speed != InterfaceSpeed::Local || !own.contains(&true) {
@@ -98,9 +101,15 @@ pub(crate) fn assemble(
 }
 
 /// Whether a slot's curve depends on its own closing speed: between vehicles, from a model.
-fn is_local(slot: &Slot<'_>, sources: &Sources) -> bool {
-    slot.role == Role::Vehicles
-        && matches!(sources.curves.get(slot.curve), Some(CurveSource::Model(_)))
+fn is_local(joint: &Joint<'_>, role: Role, sources: &Sources) -> bool {
+    match joint {
+        Joint::Curve(curve) => {
+            role == Role::Vehicles
+                && matches!(sources.curves.get(*curve), Some(CurveSource::Model(_)))
+        }
+        Joint::End(end) => end.at == Role::Vehicles,
+        Joint::Plates => false,
+    }
 }
 
 /// Largest closing speed of interface `k` from its contact to the first maximum of its force;
@@ -111,11 +120,12 @@ fn closing_speed(chain: &Chain, run: &Run, k: usize) -> Option<f64> {
     let forces = &interface.force_n[begin..];
     let most = forces.iter().copied().fold(0.0, f64::max);
     let until = peaks(forces, PROMINENCE * most).first().map_or(forces.len(), |&peak| peak + 1);
-    let ahead = |row: usize| match k + 1 < chain.bodies().len() {
-        true => run.bodies[k + 1].v_m_per_s[row],
-        false => 0.0,
-    };
+    let ahead = (k + 1 < chain.bodies().len()).then_some(k + 1);
+    // An end follows its vehicles.
+    let rate = chain.interfaces()[k].rate.as_ref();
+    let (behind, ahead) = rate.map_or((k, ahead), |rate| (rate.behind, rate.ahead));
+    let speed = |i: usize, row: usize| run.bodies[i].v_m_per_s[row];
     // The state before the contact still has the whole speed.
     let rows = begin.saturating_sub(1)..begin + until;
-    rows.map(|row| run.bodies[k].v_m_per_s[row] - ahead(row)).reduce(f64::max)
+    rows.map(|row| speed(behind, row) - ahead.map_or(0.0, |i| speed(i, row))).reduce(f64::max)
 }

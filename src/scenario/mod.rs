@@ -30,6 +30,7 @@
 
 mod assemble;
 mod check;
+mod end;
 mod layout;
 mod local;
 mod place;
@@ -40,8 +41,9 @@ mod tables;
 use std::path::Path;
 
 pub use assemble::AssemblyError;
-pub(crate) use assemble::adjust;
+pub(crate) use assemble::{PLATES, adjust};
 pub use check::{CheckError, CheckedScenario};
+pub use end::PlatesError;
 pub(crate) use local::assemble;
 pub(crate) use sources::{CurveSource, Sources};
 pub use sources::{SourceError, StageError};

@@ -93,8 +93,12 @@ impl Scenario {
             E::Name { name } => self.vehicle(name).key("name"),
             E::NoVehicles { train } => self.train_named(train).key("vehicles"),
             E::NoInner { train, .. } => self.train_named(train),
+            E::NoContact => KeyPath::of("contact"),
+            E::OneEnd { vehicle, end } => self.end_of(vehicle, end),
+            E::EndNeedsModel { vehicle, end } => self.vehicle(vehicle).key(end),
+            E::BetweenEnds { curve } => self.use_of(curve),
             E::NothingBehind { vehicle } => self.vehicle(vehicle).key("behind").itself(),
-            E::ZoneGap { end, vehicle, .. } => self.vehicle(vehicle).key(end).key("curve"),
+            E::ZoneGap { end, vehicle, .. } => self.end_of(vehicle, end),
             E::NoBodyMass { vehicle } => self.vehicle(vehicle).key("mass"),
             E::NoStages { curve: name } => curve(name).key("stages"),
             E::ForeignKey { curve: name, key, .. } => curve(name).key(key).itself(),
@@ -123,13 +127,28 @@ impl Scenario {
         found.map_or(KeyPath::of("train"), |(path, _)| path)
     }
 
+    /// Where a vehicle says what its end is: the curve of `front` or `rear`, or `ends`.
+    fn end_of(&self, vehicle: &str, end: &str) -> KeyPath {
+        let has_own = self.vehicles().any(|(_, table)| {
+            let own = if end == "front" { &table.front } else { &table.rear };
+            table.name == vehicle && own.is_some()
+        });
+        match has_own {
+            true => self.vehicle(vehicle).key(end).key("curve"),
+            false => self.vehicle(vehicle).key("ends"),
+        }
+    }
+
     /// The second body of that name, in the order in which names are checked.
     fn body_twice(&self, name: &str) -> KeyPath {
         let bodies = self.vehicles().flat_map(|(path, vehicle)| {
             let body = (path.clone().key("name"), vehicle.name.clone());
             let zones: Vec<(KeyPath, String)> = vehicle
                 .zones()
-                .map(|(end, _)| (path.clone().key(end).itself(), format!("{} {end}", vehicle.name)))
+                .map(|zone| {
+                    let key = self.end_of(&vehicle.name, zone.end);
+                    (key.itself(), format!("{} {}", vehicle.name, zone.end))
+                })
                 .collect();
             [body].into_iter().chain(zones)
         });
@@ -140,18 +159,19 @@ impl Scenario {
 
     /// The first place that names a curve.
     fn use_of(&self, curve: &str) -> KeyPath {
-        let contact = (KeyPath::of("contact.curve"), &self.contact.curve);
+        let contact = self.contact.curve.iter();
+        let contact = contact.map(|name| (KeyPath::of("contact.curve"), name.as_str()));
         let trains = self.train.iter().enumerate();
         let inner =
-            trains.filter_map(|(t, table)| Some((train(t).key("inner"), table.inner.as_ref()?)));
+            trains.filter_map(|(t, table)| Some((train(t).key("inner"), table.inner.as_deref()?)));
         let within = self.vehicles().flat_map(|(path, vehicle)| {
-            let behind = vehicle.behind.iter().map(|name| (path.clone().key("behind"), name));
-            let zones = vehicle
-                .zones()
-                .map(|(end, zone)| (path.clone().key(end).key("curve"), &zone.curve));
+            let behind =
+                vehicle.behind.iter().map(|name| (path.clone().key("behind"), name.as_str()));
+            let zones =
+                vehicle.zones().map(|zone| (self.end_of(&vehicle.name, zone.end), zone.curve));
             behind.chain(zones).collect::<Vec<_>>()
         });
-        let mut uses = [contact].into_iter().chain(inner).chain(within);
+        let mut uses = contact.chain(inner).chain(within);
         uses.find(|(_, name)| *name == curve).map_or(KeyPath::of("curves"), |(path, _)| path)
     }
 
@@ -162,6 +182,10 @@ impl Scenario {
             ChainError::Mass { name, .. } => self.vehicle_of(name).key("mass"),
             ChainError::Speed { .. } => KeyPath::of("train"),
             ChainError::Length { .. } => KeyPath::of("contact.gap"),
+            ChainError::Crush { name, .. } => {
+                let body = name.split('|').find_map(|body| body.rsplit_once(' ').map(|b| b.0));
+                self.vehicle(body.unwrap_or_default())
+            }
             ChainError::Resistance { .. } => self.resistance(),
         }
     }
@@ -211,12 +235,14 @@ pub(super) fn assembly_key(error: &AssemblyError) -> KeyPath {
         AssemblyError::NotRead { curve: name } | AssemblyError::Speeds { curve: name, .. } => {
             curve(name)
         }
+        AssemblyError::Plates { .. } => KeyPath::of("contact"),
         AssemblyError::Damping { curve: name, .. } => curve(name).key("damping"),
         AssemblyError::NoSpring { curve: name, source } => match source {
             SpringError::NoBand => curve(name).key("band"),
             SpringError::Scale { .. } => curve(name).key("scale"),
             SpringError::CrushZoneTwice { .. } => curve(name).key("force"),
             SpringError::StagesUnload => curve(name).key("stages"),
+            SpringError::NoCrushLaw { .. } => curve(name).key("model"),
             SpringError::Envelope(_) | SpringError::NoMotion | SpringError::NeverRises => {
                 curve(name)
             }

@@ -35,13 +35,14 @@ impl Scenario {
     /// Every place that names a curve, in a fixed order: the contact, the trains' inner curves, those
     /// behind vehicles, of crush zones, of tension.
     pub(crate) fn curve_names_mut(&mut self) -> Vec<&mut String> {
-        let mut names = vec![&mut self.contact.curve];
+        let mut names: Vec<&mut String> = self.contact.curve.iter_mut().collect();
         for train in &mut self.train {
             if train.vehicles.len() > 1 {
                 names.extend(&mut train.inner);
             }
             for vehicle in &mut train.vehicles {
                 names.extend(&mut vehicle.behind);
+                names.extend(&mut vehicle.ends);
                 let zones = [&mut vehicle.front, &mut vehicle.rear].into_iter().flatten();
                 names.extend(zones.map(|zone| &mut zone.curve));
             }
@@ -80,6 +81,14 @@ impl Sources {
             curves.insert(name.clone(), source);
         }
         Ok(Self { curves })
+    }
+
+    /// The model of a curve, if it comes from one.
+    pub(crate) fn model(&self, curve: &str) -> Option<&Model> {
+        match self.curves.get(curve)? {
+            CurveSource::Model(model) => Some(model),
+            _ => None,
+        }
     }
 
     /// Puts another source in place of a curve's.

@@ -40,6 +40,14 @@ pub enum SpringError {
         /// Name of the interface.
         interface: String,
     },
+    /// The runs of the group do not tell stopped mass and crush force.
+    #[error(
+        "its group \"{group}\" tells no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve"
+    )]
+    NoCrushLaw {
+        /// The group.
+        group: String,
+    },
     /// It has stages, and its unloading stiffness is not stated.
     #[error(
         "it has stages, which do not say how they unload, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
@@ -194,8 +202,11 @@ fn which_force(
 }
 
 impl Spring {
-    /// The force law that the curve's table asks for, with what must be said of it.
-    pub(crate) fn law(&self, table: &Table) -> Result<(ForceLaw, Vec<String>), SpringError> {
+    /// The force law that the curve's table asks for, with all that must be said of it.
+    pub(crate) fn law_with_warnings(
+        mut self,
+        table: &Table,
+    ) -> Result<(ForceLaw, Vec<String>), SpringError> {
         let end = match table.end {
             EndName::Hold => EnvelopeEnd::Hold,
             EndName::Slope => EnvelopeEnd::Slope,
@@ -203,9 +214,10 @@ impl Spring {
         };
         let (unloading, warnings) = match table.law {
             LawName::Elastic => (UnloadingChoice::Elastic, Vec::new()),
-            LawName::Memory => self.memory(table)?,
+            LawName::Memory | LawName::Rate => self.memory(table)?,
         };
-        Ok((ForceLaw::of_curve(&self.curve, unloading, end), warnings))
+        self.warnings.extend(warnings);
+        Ok((ForceLaw::of_curve(&self.curve, unloading, end), self.warnings))
     }
 
     fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), SpringError> {

@@ -221,6 +221,9 @@ pub enum LawName {
     Memory,
     /// Follows the curve back, as the reference model.
     Elastic,
+    /// Of a model: its crush force `Q(d; v) (1 + β√u)`, which follows the closing speed `u` in the
+    /// run, and unloads like `memory`.
+    Rate,
 }
 
 /// What the force does beyond the curve.
@@ -244,8 +247,13 @@ pub struct TrainTable {
     pub name: String,
     /// In the direction in which the first train moves; below 0 if it comes against it.
     pub speed: SignedSpeedText,
-    /// Curve of the interfaces between its vehicles.
+    /// Curve of the interfaces between its vehicles; needless where both facing ends come from a
+    /// model.
     pub inner: Option<String>,
+    /// Clear distance between its vehicles before contact: between the surfaces that meet, so
+    /// between mid-surfaces of meshed plates less half of both thicknesses; the curve's own if
+    /// absent.
+    pub gap: Option<LengthText>,
     /// Running and braking resistance of its vehicles; none if absent.
     pub resistance: Option<ResistanceTable>,
     /// From the nose back.
@@ -262,23 +270,64 @@ pub struct VehicleTable {
     pub mass: MassText,
     /// Curve of the interface behind it, in place of the train's `inner`.
     pub behind: Option<String>,
-    /// Mass of the crush zone at its front (the end towards the train's nose), as a body of its
-    /// own.
+    /// Clear distance behind it, in place of the train's `gap`.
+    pub gap: Option<LengthText>,
+    /// Model of both of its ends, in place of `front` and `rear`: the crush force between crush zone
+    /// and body, and the mass that is stopped.
+    pub ends: Option<String>,
+    /// The crush zone at its front (the end towards the train's nose), as a body of its own.
     pub front: Option<CrushZoneTable>,
     /// The same at its rear.
     pub rear: Option<CrushZoneTable>,
 }
 
 impl VehicleTable {
-    /// Its crush zones by the end at which they are, `front` before `rear`.
-    pub(crate) fn zones(&self) -> impl Iterator<Item = (&'static str, &CrushZoneTable)> {
-        let front = self.front.as_ref().map(|zone| ("front", zone));
-        front.into_iter().chain(self.rear.as_ref().map(|zone| ("rear", zone)))
+    /// Its ends that are crush zones, `front` before `rear`.
+    pub(crate) fn zones(&self) -> impl Iterator<Item = CrushZone<'_>> {
+        self.front_zone().into_iter().chain(self.rear_zone())
     }
 
-    /// Mass without the crush zones, in kg.
+    /// The end towards the train's nose, if it is a crush zone.
+    pub(crate) fn front_zone(&self) -> Option<CrushZone<'_>> {
+        self.zone("front", self.front.as_ref())
+    }
+
+    /// The other end.
+    pub(crate) fn rear_zone(&self) -> Option<CrushZone<'_>> {
+        self.zone("rear", self.rear.as_ref())
+    }
+
+    fn zone<'a>(
+        &'a self,
+        end: &'static str,
+        table: Option<&'a CrushZoneTable>,
+    ) -> Option<CrushZone<'a>> {
+        let of_table = |t: &'a CrushZoneTable| (t.curve.as_str(), t.mass.map(|m| m.0));
+        let (curve, mass_kg) = table.map(of_table).or(self.ends.as_deref().map(|c| (c, None)))?;
+        Some(CrushZone { end, curve, mass_kg })
+    }
+
+    /// Mass without the crush zones that have one of their own, in kg.
     pub(crate) fn body_mass_kg(&self) -> f64 {
-        self.mass.0 - self.zones().map(|(_, zone)| zone.mass.0).sum::<f64>()
+        self.mass.0 - self.zones().filter_map(|zone| zone.mass_kg).sum::<f64>()
+    }
+}
+
+/// An end of a vehicle whose crush zone is a body of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CrushZone<'a> {
+    /// `front` or `rear`.
+    pub end: &'static str,
+    /// Curve between it and the body.
+    pub curve: &'a str,
+    /// `None` if a model tells what is stopped.
+    pub mass_kg: Option<f64>,
+}
+
+impl CrushZone<'_> {
+    /// Whether a model tells its mass.
+    pub(crate) fn is_of_model(&self) -> bool {
+        self.mass_kg.is_none()
     }
 }
 
@@ -286,8 +335,9 @@ impl VehicleTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrushZoneTable {
-    /// Part of the vehicle's mass.
-    pub mass: MassText,
+    /// Part of the vehicle's mass. If absent, the curve is a model, which tells how much mass the
+    /// crush zone stops.
+    pub mass: Option<MassText>,
     /// Curve between it and the body.
     pub curve: String,
 }
@@ -324,8 +374,8 @@ fn wall_name() -> String {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactTable {
-    /// Name of its curve.
-    pub curve: String,
+    /// Name of its curve; needless where the noses come from models.
+    pub curve: Option<String>,
     /// Free distance between the surfaces before contact; the curve's own if absent.
     pub gap: Option<LengthText>,
 }

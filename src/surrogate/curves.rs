@@ -35,6 +35,20 @@ impl CaseCurve {
         &self.envelope
     }
 
+    /// Whether its closing speeds are known.
+    pub(crate) fn knows_closing(&self) -> bool {
+        self.closing.is_some()
+    }
+
+    /// The same curve with forces in N made of its deflections and forces, which are finite.
+    pub(crate) fn map_forces(&self, force_n: impl Fn(f64, f64) -> f64) -> Self {
+        let (d, f) = (self.envelope.deflection_m(), self.envelope.force_n());
+        let mapped = d.iter().zip(f).map(|(&d, &f)| force_n(d, f)).collect();
+        // Deflections are those of an envelope already.
+        let envelope = Envelope::new(d.to_vec(), mapped).unwrap_or_else(|_| self.envelope.clone());
+        Self { envelope, ..self.clone() }
+    }
+
     /// Force in N; the last one beyond the end.
     pub(crate) fn force_at(&self, deflection_m: f64) -> f64 {
         self.envelope.force_at(deflection_m)

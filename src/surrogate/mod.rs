@@ -7,6 +7,7 @@
 pub mod band;
 mod cached;
 mod cases;
+pub mod crush_law;
 pub(crate) mod curves;
 mod entry;
 mod extra;

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use super::band::{self, Band};
 use super::cases::{Curves, Kink, ModelCase};
+use super::crush_law::{CrushCurve, CrushLaw};
+use super::curves::interpolate_held;
 use super::entry::FitInput;
 use super::forest::ForestSurrogate;
 use super::landmarks::Landmarks;
@@ -13,12 +15,15 @@ use super::max_crush::MaxCrushRule;
 use super::model_file::VERSION;
 use super::models::{MODELS, ModelKind};
 use super::{CaseCurve, QueryPoint, Surrogate, Warning};
+use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};
 use crate::file::WriteError;
 use crate::forest::ForestError;
 use crate::unit::{SpeedKind, UnitSystem};
 
+/// Masses of a pair that differ by no more are those of equal bodies, as a share.
+const EVEN: f64 = 0.01;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR: f64 = 0.25;
 
@@ -57,6 +62,8 @@ pub struct Model {
     pub(super) fitted: Arc<dyn Surrogate>,
     /// For the force of the body's motion, where that is another.
     pub(super) fitted_body: Option<Arc<dyn Surrogate>>,
+    /// Stopped mass and crush force behind both forces; `None` where the runs do not tell them.
+    pub crush_law: Option<CrushLaw>,
     /// The curves of `cases`, made when the model is fitted or read.
     pub(super) curves: Curves,
 }
@@ -177,6 +184,7 @@ impl Model {
             },
             mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
             leave_one_out: None,
+            crush_law: crush_law(set, &curves.declared),
             fitted: fitted(&curves.declared, set.force_kind)?,
             fitted_body: match set.force_kind {
                 ForceKind::Contact => Some(fitted(&curves.body, ForceKind::Body)?),
@@ -288,6 +296,30 @@ impl Model {
         self.fitted_body.is_some()
     }
 
+    /// The crush law and its curve at a speed of the model's kind.
+    pub(crate) fn crush_curve(&self, speed_m_per_s: f64) -> Option<(&CrushLaw, CrushCurve)> {
+        let law = self.crush_law.as_ref()?;
+        Some((law, law.at(&self.curves.declared, speed_m_per_s)?))
+    }
+
+    /// Stiffness in N/m of the line on which a body leaves the crush force at a speed, linear
+    /// between the runs: that with which it rebounds as fast as it did, or else the recorded one of
+    /// the declared force.
+    pub(crate) fn unloading_n_per_m(&self, speed_m_per_s: f64) -> Option<f64> {
+        let moved_kg = self.masses().effective_kg();
+        let of = |(case, curve): (&ModelCase, &CaseCurve)| {
+            let top_n = curve.force_at(curve.end_m());
+            let law = self.crush_law.as_ref();
+            let free_kg = moved_kg - law.map_or(0.0, |law| law.stopped_at(curve.end_m()));
+            let rebound = case.rebound_speed_m_per_s;
+            let stiffness = rebound.and_then(|v| rebound_stiffness_n_per_m(top_n, free_kg, v));
+            Some((case.speed_m_per_s, stiffness.or(case.unloading_stiffness_n_per_m)?))
+        };
+        let known: Vec<(f64, f64)> =
+            self.cases.iter().zip(&self.curves.declared).filter_map(of).collect();
+        interpolate_held(&known, speed_m_per_s)
+    }
+
     /// The training curves: of the declared force, and of the body's where it is another.
     pub(crate) fn curves(&self) -> (&[CaseCurve], &[CaseCurve]) {
         (&self.curves.declared, &self.curves.body)
@@ -338,4 +370,13 @@ impl Model {
         warnings.extend(truncated.map(|c| Warning::truncated_training_run(&c.name)));
         warnings
     }
+}
+
+/// The crush law of a group whose runs differ in speed alone: a contact force on one body, or
+/// between two of the same mass.
+fn crush_law(set: &TrainingSet, contact: &[CaseCurve]) -> Option<CrushLaw> {
+    let is_even =
+        set.masses.other_kg.is_none_or(|other| (other / set.masses.body_kg - 1.0).abs() <= EVEN);
+    let is_told = set.force_kind == ForceKind::Contact && set.features.is_empty() && is_even;
+    is_told.then(|| CrushLaw::fit(contact, set.masses.effective_kg()))?
 }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::cases::{Curves, ModelCase};
+use super::crush_law::CrushLaw;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::ModelKind;
@@ -56,6 +57,8 @@ struct ModelFile<'a> {
     mode_switches_m_per_s: Vec<(f64, f64)>,
     #[serde(default)]
     leave_one_out: Option<Validation>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    crush_law: Option<CrushLaw>,
     /// The model's name, or `{ name: parameters }` where it has parameters.
     #[serde(borrow)]
     fitted: &'a RawValue,
@@ -123,6 +126,7 @@ impl Model {
             max_crush_rule: file.max_crush_rule,
             mode_switches_m_per_s: file.mode_switches_m_per_s,
             leave_one_out: file.leave_one_out,
+            crush_law: file.crush_law,
         };
         model.check().map_err(damaged)?;
         Ok(model)
@@ -169,6 +173,7 @@ impl Model {
         {
             return Err("it lacks the curves of its cases".into());
         }
+        self.crush_law.as_ref().map_or(Ok(()), CrushLaw::check)?;
         self.fitted.check(self.features.len())?;
         body.map_or(Ok(()), |b| b.check(self.features.len()))
     }
@@ -201,6 +206,7 @@ impl Model {
             max_crush_rule: self.max_crush_rule,
             mode_switches_m_per_s: self.mode_switches_m_per_s.clone(),
             leave_one_out: self.leave_one_out.clone(),
+            crush_law: self.crush_law.clone(),
             fitted: &fitted,
             fitted_body: fitted_body.as_deref(),
         };

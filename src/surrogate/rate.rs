@@ -83,11 +83,21 @@ impl Rate {
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
     /// curves cannot tell the two causes apart.
     pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
+        Self::of(0.5 * Self::best_sensitivity(cases))
+    }
+
+    /// With a known β in (s/m)^½.
+    pub(super) fn of(sensitivity: f64) -> Self {
+        Self { sensitivity, levels: Cached::default() }
+    }
+
+    /// The β in (s/m)^½ that makes the quotients of neighbouring curves most alike.
+    pub(super) fn best_sensitivity(cases: &[CaseCurve]) -> f64 {
         let trial = |k: usize| MOST * k as f64 / STEPS as f64;
         let best = (0..=STEPS)
             .map(|k| (k, disagreement(cases, trial(k))))
             .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
-        Self { sensitivity: 0.5 * trial(best.0), levels: Cached::default() }
+        trial(best.0)
     }
 
     fn factor(&self, closing_m_per_s: f64) -> f64 {
@@ -104,6 +114,32 @@ impl Rate {
         let end = case.end_m();
         let fading = (-(d - end) / (FADES * end)).exp();
         self.quotient(cases, levels, i + 1, d) * (1.0 + (levels[i] - 1.0) * fading)
+    }
+
+    /// `Q(d; v)` in N at an impact speed: the force of a body that stands still. `cases`: one at
+    /// least.
+    pub(super) fn standing_n(
+        &self,
+        cases: &[CaseCurve],
+        speed_m_per_s: f64,
+        deflection_m: &[f64],
+    ) -> Vec<f64> {
+        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
+        let (low, high, share) = neighbours(&speeds, speed_m_per_s);
+        let levels = self.levels(cases);
+        let standing_n = |d: f64| {
+            let of = |i| self.quotient(cases, &levels, i, d);
+            if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
+        };
+        deflection_m.iter().map(|&d| standing_n(d)).collect()
+    }
+
+    /// Whether β is one that a fit gives.
+    pub(super) fn check_sensitivity(&self) -> Result<(), String> {
+        match (0.0..=MOST).contains(&self.sensitivity) {
+            true => Ok(()),
+            false => Err(format!("its rate sensitivity is {}", self.sensitivity)),
+        }
     }
 
     /// The levels, kept for the first curves that are asked for.
@@ -166,32 +202,21 @@ impl Surrogate for Rate {
     }
 
     fn check(&self, _: usize) -> Result<(), String> {
-        match (0.0..=MOST).contains(&self.sensitivity) {
-            true => Ok(()),
-            false => Err(format!("its rate sensitivity is {}", self.sensitivity)),
-        }
+        self.check_sensitivity()
     }
 
     fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
-        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
-        if speeds.is_empty() {
+        if cases.is_empty() {
             return vec![f64::NAN; deflection_m.len()];
         }
-        let (low, high, share) = neighbours(&speeds, at.speed_m_per_s);
-        let levels = self.levels(cases);
-        let quotient = |d: f64| {
-            let of = |i| self.quotient(cases, &levels, i, d);
-            if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
-        };
+        let standing_n = self.standing_n(cases, at.speed_m_per_s, deflection_m);
         if let Some(closing) = at.closing_m_per_s {
-            let force = |(&d, &u): (&f64, &f64)| quotient(d) * self.factor(u);
-            return deflection_m.iter().zip(closing).map(force).collect();
+            return standing_n.iter().zip(closing).map(|(q, &u)| q * self.factor(u)).collect();
         }
         let mut force_n = Vec::with_capacity(deflection_m.len());
         let mut squared = at.speed_m_per_s * at.speed_m_per_s;
         let mut before: Option<(f64, f64)> = None;
-        for &d in deflection_m {
-            let q = quotient(d);
+        for (&d, &q) in deflection_m.iter().zip(&standing_n) {
             if let Some((d0, f0)) = before {
                 // Trapezoid over the step; the end's force with the speed reached by the
                 // start's force, once corrected.

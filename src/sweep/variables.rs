@@ -250,16 +250,20 @@ impl Binder<'_> {
             (Some(curve), None) => {
                 self.check_curve(curve)?;
                 let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
-                if vehicles.any(|v| v.front.iter().chain(&v.rear).any(|z| z.curve == *curve)) {
+                if vehicles.any(|v| v.zones().any(|zone| zone.curve == *curve)) {
                     return Err(VariableError::ZoneGap { curve: curve.clone() });
                 }
                 if vary.factor && self.scenario.curves[curve].gap.is_none() {
                     return Err(VariableError::NoGap { curve: curve.clone() });
                 }
                 if self.scenario.contact.gap.is_some()
-                    && !self.scenario.clone().curve_names_mut()[1..]
-                        .iter()
-                        .any(|name| *name == curve)
+                    && !self
+                        .scenario
+                        .clone()
+                        .curve_names_mut()
+                        .into_iter()
+                        .skip(usize::from(self.scenario.contact.curve.is_some()))
+                        .any(|name| name == curve)
                 {
                     return Err(VariableError::GapUnused { curve: curve.clone() });
                 }

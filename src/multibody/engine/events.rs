@@ -112,7 +112,11 @@ impl Engine<'_> {
                 None => self.missed_along(crossing),
             };
             let sign = direction.sign();
-            self.push_apart(k, sign * impulse, sign * moment);
+            let factor = self.rate_factors.get(k).copied().unwrap_or(1.0);
+            if factor != 1.0 {
+                self.losses.damped_j += (factor - 1.0) * impulse * self.closing(k);
+            }
+            self.push_apart(k, factor * sign * impulse, factor * sign * moment);
             if what != Move::default() {
                 happened = true;
                 self.damp_part_of_step(crossing);

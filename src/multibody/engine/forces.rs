@@ -31,7 +31,7 @@ impl Engine<'_> {
         }
         let n = self.fixed.layout.known::<N>();
         let forces = self.push.forces_n(at).values(n);
-        let per_kg = self.fixed.per_kg.values(n);
+        let per_kg = self.per_kg.values(n);
         let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
         for c in 0..n {
             let behind = behind(forces, c);
@@ -52,13 +52,63 @@ impl Engine<'_> {
                 *net = each(|j| net[j] - pull[j]);
             }
         }
+        self.add_rates(&mut net, at, lag_s);
         self.add_dampers(&mut net, at, lag_s);
         self.accelerate_against_resistance(&net, lag_s);
         self.net_n = Some(net);
     }
 
-    fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
+    /// Multiplies the forces of crush zones by what the speeds of their vehicles make of them.
+    fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         self.losses.power.damper_w = 0.0;
+        if self.rate_factors.is_empty() {
+            return;
+        }
+        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
+            let Some(rate) = &interface.rate else { continue };
+            let speed = |i: usize| {
+                let slot = self.fixed.layout.of(i);
+                self.v[slot] + lag_s * self.a_start[slot]
+            };
+            let factor = rate.at(rate.closing_m_per_s(speed));
+            let extra_n = (factor - 1.0) * self.push.force_n(at, k);
+            let slot = self.fixed.layout.of(k);
+            let closing = self.closing(k) + lag_s * self.between(&self.a_start, k);
+            net_n[slot] += extra_n;
+            self.rate_factors[k] = factor;
+            self.losses.power.damper_w += extra_n * closing;
+            self.events.pressed(k, net_n[slot]);
+        }
+    }
+
+    /// Crush zones take the mass that has been stopped in the step; their speed and that of what
+    /// they take become one, which loses energy and no momentum.
+    pub(super) fn stop_mass(&mut self) {
+        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
+            let Some(stopping) = &interface.stopping else { continue };
+            let largest_m = self.push.largest_m(StepPoint::End, k);
+            let least_kg = self.fixed.chain.bodies()[stopping.zone].mass_kg;
+            let body = self.fixed.layout.of(stopping.body);
+            let zone = self.fixed.layout.of(stopping.zone);
+            let before_kg = self.mass_kg[zone];
+            let now_kg = stopping.zone_kg(largest_m, least_kg);
+            let taken_kg = now_kg - before_kg;
+            if taken_kg <= 0.0 {
+                continue;
+            }
+            let difference = self.v[body] - self.v[zone];
+            self.losses.damped_j += 0.5 * before_kg * taken_kg / now_kg * difference * difference;
+            self.v[zone] += taken_kg / now_kg * difference;
+            for (slot, mass_kg) in [(zone, now_kg), (body, self.mass_kg[body] - taken_kg)] {
+                // The forces stay, and so does the momentum that the next half step takes back.
+                self.a[slot] *= self.mass_kg[slot] / mass_kg;
+                self.mass_kg[slot] = mass_kg;
+                self.per_kg[slot] = 1.0 / mass_kg;
+            }
+        }
+    }
+
+    fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
             let Some(damping) = &interface.damping else { continue };
             // At 0 only where bodies meet at the start.
@@ -90,7 +140,7 @@ impl Engine<'_> {
         let mut behind = 0.0;
         for (i, body) in self.fixed.chain.bodies().iter().enumerate() {
             let slot = self.fixed.layout.of(i);
-            let (per_kg, net) = (self.fixed.per_kg[slot], net_n[slot]);
+            let (per_kg, net) = (self.per_kg[slot], net_n[slot]);
             let mut resistance = 0.0;
             if !body.resistance.is_none() {
                 let v = self.v[slot] + lag_s * self.a_start[slot];
@@ -130,7 +180,7 @@ impl Engine<'_> {
         let gradient = gradient.values(n);
         let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
         let x = self.x_m.values_mut(n);
-        let per_kg = self.fixed.per_kg.values(n);
+        let per_kg = self.per_kg.values(n);
         for c in 0..n {
             let behind = behind(gradient, c);
             a[c] = each(|j| a[c][j] + (behind[j] - gradient[c][j]) * per_kg[c][j]);

@@ -79,6 +79,7 @@ fn all_outputs<'a, const N: usize>(
     let scheme = engine.fixed.scheme;
     let ahead_s = engine.fixed.ahead_s();
     let steps_per_look = (LOOK_S / h).max(1.0) as usize;
+    let stops = engine.fixed.chain.interfaces().iter().any(|i| i.stopping.is_some());
     let (mut done, mut until_look) = (0, steps_per_look);
     for output in 1..=grid.outputs {
         engine.kick::<N>(ahead_s);
@@ -92,6 +93,9 @@ fn all_outputs<'a, const N: usize>(
             }
             if !engine.crossings.is_empty() {
                 engine.finish()?;
+            }
+            if stops {
+                engine.stop_mass();
             }
             until_look -= 1;
             if until_look == 0 || step == grid.steps_per_output {

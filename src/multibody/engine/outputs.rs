@@ -112,7 +112,7 @@ impl Engine<'_> {
     ) -> Result<(), SimulationError> {
         let n = self.fixed.layout.known::<N>();
         let (mut twice_kinetic, mut momentum) = ([0.0; LANES], [0.0; LANES]);
-        let (m, v) = (self.fixed.mass_kg.values(n), self.v.values(n));
+        let (m, v) = (self.mass_kg.values(n), self.v.values(n));
         for c in 0..n {
             let of_row = each(|j| m[c][j] * v[c][j]);
             momentum = each(|j| momentum[j] + of_row[j]);

@@ -21,7 +21,11 @@ impl<'a> Engine<'a> {
         });
         let of = |value: &dyn Fn(usize) -> f64| Rows::of(&layout, bodies.len(), value);
         let has_net = couples || chain.has_rates();
+        let rates = if interfaces.iter().any(|i| i.rate.is_some()) { interfaces.len() } else { 0 };
         let mut engine = Self {
+            mass_kg: of(&|i| bodies[i].mass_kg),
+            per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
+            rate_factors: vec![1.0; rates],
             x_m: of(&|_| 0.0),
             v: of(&|i| bodies[i].speed_m_per_s),
             a: of(&|_| 0.0),
@@ -36,14 +40,7 @@ impl<'a> Engine<'a> {
             losses: Losses::default(),
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
-            fixed: Fixed {
-                chain,
-                scheme,
-                step_s,
-                mass_kg: of(&|i| bodies[i].mass_kg),
-                per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
-                layout,
-            },
+            fixed: Fixed { chain, scheme, step_s, layout },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);

@@ -20,8 +20,6 @@ pub(super) struct Fixed<'a> {
     pub layout: Layout,
     pub scheme: Scheme,
     pub step_s: f64,
-    pub mass_kg: Rows,
-    pub per_kg: Rows,
 }
 
 impl Fixed<'_> {
@@ -39,6 +37,9 @@ impl Fixed<'_> {
 /// A run: what stays, and everything that changes from step to step.
 pub(super) struct Engine<'a> {
     pub fixed: Fixed<'a>,
+    /// A crush zone takes mass from its body; all others stay as they are.
+    pub mass_kg: Rows,
+    pub per_kg: Rows,
     pub x_m: Rows,
     /// Ahead of `x_m` between the outputs: see [`Fixed::ahead_s`].
     pub v: Rows,
@@ -51,6 +52,8 @@ pub(super) struct Engine<'a> {
     pub pull: Option<Contacts<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     pub net_n: Option<Rows>,
+    /// What the speeds multiply the force of each interface by; empty if none has a rate.
+    pub rate_factors: Vec<f64>,
     /// What has happened in the step.
     pub crossings: Vec<Crossing>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
@@ -66,6 +69,7 @@ pub(super) struct Engine<'a> {
 /// Work and impulse of what depends on speeds, so far.
 #[derive(Default)]
 pub(super) struct Losses {
+    /// By dampers, by the share of forces that depends on speeds, and where mass is stopped.
     pub damped_j: f64,
     pub resisted_j: f64,
     /// Of the resistance.
@@ -173,7 +177,8 @@ impl<'a> Engine<'a> {
 
     /// An impulse between the bodies at interface `k`, and its moment about the step's end.
     pub(crate) fn push_apart(&mut self, k: usize, impulse: f64, moment: f64) {
-        let Fixed { chain, layout, per_kg, .. } = &self.fixed;
+        let Fixed { chain, layout, .. } = &self.fixed;
+        let per_kg = &self.per_kg;
         let (behind, ahead) = (layout.of(k), layout.of(k + 1));
         self.v[behind] -= impulse * per_kg[behind];
         self.v[ahead] += impulse * per_kg[ahead];

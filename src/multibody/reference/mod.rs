@@ -173,12 +173,13 @@ impl<'a> Reference<'a> {
         let n = bodies.len();
         let (stored_j, dissipated_j) = self.output_interfaces(time_s, run);
         let rates = self.motion.rates(&self.y);
+        let masses_kg = self.motion.masses_kg(&self.y);
         let (x, rest) = self.y.split_at(n);
         let (v, [impulse, damped_j, resisted_j]) =
             (&rest[..n], [rest[n], rest[n + 1], rest[n + 2]]);
         let (mut kinetic_j, mut momentum) = (0.0, 0.0);
         for (i, history) in run.bodies.iter_mut().enumerate() {
-            let mass_kg = bodies[i].mass_kg;
+            let mass_kg = masses_kg[i];
             kinetic_j += 0.5 * mass_kg * v[i] * v[i];
             momentum += mass_kg * v[i];
             history.v_m_per_s.push(v[i]);

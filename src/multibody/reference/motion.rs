@@ -1,6 +1,6 @@
 //! Forces and rates at any state of a chain, straight from the force laws.
 
-use super::super::chain::{Body, Chain, Interface};
+use super::super::chain::{Chain, Interface};
 use super::super::law::ForceLaw;
 
 /// A chain with the memory of its interfaces.
@@ -61,7 +61,10 @@ impl<'a> Motion<'a> {
             in_contact |= touches(&tension.law, extension_m, self.pulled_m[k], pulls, -closing);
         }
         let spring_n = pushes - pulls;
-        let damper_n = if in_contact { damper_n(interface, closing, spring_n) } else { 0.0 };
+        let mut damper_n = if in_contact { damper_n(interface, closing, spring_n) } else { 0.0 };
+        if let Some(rate) = &interface.rate {
+            damper_n += (rate.at(rate.closing_m_per_s(|i| of(&y[n..], i))) - 1.0) * pushes;
+        }
         Contact { deflection_m, extension_m, spring_n, damper_n, closing }
     }
 
@@ -71,6 +74,7 @@ impl<'a> Motion<'a> {
         let bodies = self.chain.bodies();
         let n = bodies.len();
         let mut rates = vec![0.0; 2 * n + 3];
+        let masses_kg = self.masses_kg(y);
         let mut behind = 0.0;
         for (i, body) in bodies.iter().enumerate() {
             let mut ahead = 0.0;
@@ -82,7 +86,7 @@ impl<'a> Motion<'a> {
             let v = y[n + i];
             let resistance = body.resistance.force_n(body.mass_kg, v);
             rates[i] = v;
-            rates[n + i] = (behind - ahead - resistance) / body.mass_kg;
+            rates[n + i] = (behind - ahead - resistance) / masses_kg[i];
             rates[2 * n] += resistance;
             rates[2 * n + 2] += resistance * v;
             behind = ahead;
@@ -90,23 +94,55 @@ impl<'a> Motion<'a> {
         if self.chain.has_wall() {
             rates[2 * n] += behind;
         }
+        self.add_stopping(y, &masses_kg, &mut rates);
         rates
+    }
+
+    /// Masses of the bodies in kg, with what crush zones have taken.
+    pub(crate) fn masses_kg(&self, y: &[f64]) -> Vec<f64> {
+        let mut masses_kg: Vec<f64> = self.chain.bodies().iter().map(|b| b.mass_kg).collect();
+        for (k, interface) in self.chain.interfaces().iter().enumerate() {
+            let Some(stopping) = &interface.stopping else { continue };
+            let largest_m = self.contact(y, k).deflection_m.max(self.pushed_m[k]);
+            let least_kg = self.chain.bodies()[stopping.zone].mass_kg;
+            let taken_kg = stopping.zone_kg(largest_m, least_kg) - least_kg;
+            masses_kg[stopping.zone] += taken_kg;
+            masses_kg[stopping.body] -= taken_kg;
+        }
+        masses_kg
+    }
+
+    /// What the mass that is being stopped does to its crush zone, and the energy that it loses.
+    fn add_stopping(&self, y: &[f64], masses_kg: &[f64], rates: &mut [f64]) {
+        let n = masses_kg.len();
+        for (k, interface) in self.chain.interfaces().iter().enumerate() {
+            let Some(stopping) = &interface.stopping else { continue };
+            let contact = self.contact(y, k);
+            if contact.deflection_m < self.pushed_m[k] || contact.closing <= 0.0 {
+                continue;
+            }
+            let least_kg = self.chain.bodies()[stopping.zone].mass_kg;
+            let per_s = stopping.rate_kg_per_m(contact.deflection_m, least_kg) * contact.closing;
+            let difference = y[n + stopping.body] - y[n + stopping.zone];
+            rates[n + stopping.zone] += per_s * difference / masses_kg[stopping.zone];
+            rates[2 * n + 1] += 0.5 * per_s * difference * difference;
+        }
     }
 
     /// Accelerations of the bodies by the forces between them.
     pub(crate) fn by_contacts(&self, y: &[f64]) -> Vec<f64> {
         let mut behind_n = 0.0;
-        let of = |(i, body): (usize, &Body)| {
+        let of = |(i, mass_kg): (usize, &f64)| {
             let mut ahead_n = 0.0;
             if i < self.chain.interfaces().len() {
                 let contact = self.contact(y, i);
                 ahead_n = contact.force_n();
             }
-            let a = (behind_n - ahead_n) / body.mass_kg;
+            let a = (behind_n - ahead_n) / mass_kg;
             behind_n = ahead_n;
             a
         };
-        self.chain.bodies().iter().enumerate().map(of).collect()
+        self.masses_kg(y).iter().enumerate().map(of).collect()
     }
 
     /// The share of a step from `y` to `next` up to the first turn of a law with memory at its

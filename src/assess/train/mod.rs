@@ -1,0 +1,192 @@
+//! Trains: every method's curves in one scenario, against FE's run of the whole train.
+
+mod fe;
+mod methods;
+mod row;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::error::{CompareError, TrainError};
+use super::settings::ComparisonSettings;
+use crate::manifest::KeyPath;
+use crate::scenario::{CheckedScenario, Scenario, Sources};
+use crate::solver::ReadError;
+use fe::FeTrain;
+use methods::methods;
+use row::row;
+
+/// Every method in one train.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TrainComparison {
+    /// Compared from 0 to here.
+    pub until_s: f64,
+    /// Times of the comparison, in s.
+    pub time_s: Vec<f64>,
+    /// FE's speeds in m/s.
+    pub fe: BTreeMap<String, Vec<f64>>,
+    /// Time by the clock that FE took for the train, in s, if the run's folder tells.
+    pub fe_time_s: Option<f64>,
+    /// One row per method.
+    pub rows: Vec<TrainRow>,
+}
+
+/// One method in the train.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TrainRow {
+    /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
+    /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
+    /// each interface's own), `rate_live` (the force follows the run's closing speeds), `split_ends`
+    /// (each vehicle with two ends of the models). The last two only where every group tells its
+    /// crush law.
+    pub method: String,
+    /// What drives its interfaces: `body force`, `recipe's force`, `spring and damper`, `crush
+    /// force`.
+    pub driven_by: String,
+    /// Means over the vehicles of the errors below.
+    pub mean_velocity_l1: f64,
+    /// Of the mean difference, in m/s.
+    pub mean_velocity_difference_m_per_s: f64,
+    /// The same as a share of the fastest vehicle's first speed.
+    pub mean_velocity_share_of_initial: f64,
+    /// Of the acceleration, filtered with CFC 60.
+    pub mean_acceleration_l1: f64,
+    /// Errors of each vehicle.
+    pub vehicles: Vec<VehicleErrors>,
+    /// Crush and energy between vehicles, and before the wall.
+    pub interfaces: Vec<InterfaceCrush>,
+    /// Speed each interface's curve is for, in m/s; null where no speed belongs to it.
+    pub interface_speeds_m_per_s: BTreeMap<String, Option<f64>>,
+    /// Time to fit, in s.
+    pub fit_time_s: f64,
+    /// Curves and run.
+    pub simulation_time_s: f64,
+    /// What a user should know about its curves.
+    pub warnings: Vec<String>,
+    /// Speeds in m/s at the times of the comparison.
+    pub velocities: BTreeMap<String, Vec<f64>>,
+}
+
+/// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct VehicleErrors {
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Of the velocity.
+    pub velocity_l1: f64,
+    /// Mean `|p − r|` of the velocity, in m/s: where FE's speed is near zero a ratio says more than
+    /// there is.
+    pub velocity_difference_m_per_s: f64,
+    /// The same as a share of the fastest vehicle's first speed.
+    pub velocity_share_of_initial: f64,
+    /// CFC 60 on both sides.
+    pub acceleration_l1: f64,
+}
+
+/// What is crushed between two vehicles, or a vehicle and the wall, up to the end of the comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InterfaceCrush {
+    /// `A1|A2`.
+    pub interface: String,
+    /// Largest approach of the two vehicles less the gap, in m: both ends together.
+    pub crush_m: f64,
+    /// FE's, from the speeds of its nodes; null where the reference does not name both vehicles.
+    pub fe_crush_m: Option<f64>,
+    /// Work of the forces between the two vehicles, in J.
+    #[serde(rename = "work_J")]
+    pub work_j: f64,
+}
+
+/// FE's vehicles begin at the scenario's speeds, but for this share.
+const SAME_SPEED: f64 = 0.02;
+
+/// Runs `scenario`, whose curves are cases of a database, by every method, and compares the
+/// vehicles' speeds with its reference.
+///
+/// # Errors
+/// [`CompareError`] names the curve, vehicle or method.
+pub fn compare_train(
+    path: &Path,
+    scenario: &CheckedScenario<'_>,
+    settings: &ComparisonSettings,
+) -> Result<TrainComparison, CompareError> {
+    compared(path, scenario, settings).map_err(|error| match error {
+        CompareError::Train(source) => match key(&source, scenario) {
+            Some(key) => {
+                let place = scenario.place(path, &key);
+                TrainError::InScenario { place, source: source.into() }.into()
+            }
+            None => source.into(),
+        },
+        other => other,
+    })
+}
+
+/// The key of the scenario that an error is about.
+fn key(error: &TrainError, scenario: &Scenario) -> Option<KeyPath> {
+    let reference = |key: &str| KeyPath::of("reference").key(key);
+    let of_node = |id: i64| {
+        let mut nodes = scenario.reference.iter().flat_map(|r| &r.nodes);
+        let (name, _) = nodes.find(|(_, node)| **node == id)?;
+        Some(reference("nodes").key(name))
+    };
+    Some(match error {
+        TrainError::NotACase { curve } => KeyPath::of("curves").key(curve),
+        TrainError::NoVehicle { name, .. } => reference("nodes").key(name).itself(),
+        TrainError::OtherSpeed { vehicle, .. } => reference("nodes").key(vehicle),
+        TrainError::NoHistory { node, .. } => of_node(*node)?,
+        TrainError::TooShort { .. } => reference("until"),
+        TrainError::RunTooShort { .. } => KeyPath::of("run.duration"),
+        TrainError::NoNodes => reference("nodes"),
+        TrainError::NoReference => KeyPath::default(),
+        TrainError::Read(ReadError::NoSuchEntity { id, .. }) => of_node(id.id)?,
+        TrainError::Read(ReadError::NoSuchComponent { .. }) => reference("component"),
+        TrainError::Read(_) => reference("file"),
+        TrainError::InScenario { .. } | TrainError::Scenario(_) | TrainError::Database(_) => {
+            return None;
+        }
+    })
+}
+
+fn compared(
+    path: &Path,
+    scenario: &CheckedScenario<'_>,
+    settings: &ComparisonSettings,
+) -> Result<TrainComparison, CompareError> {
+    let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
+    if reference.nodes.is_empty() {
+        return Err(TrainError::NoNodes.into());
+    }
+    let fe = &FeTrain::read(path, reference).map_err(CompareError::from)?;
+    for (name, speeds) in &fe.velocities {
+        let train = scenario.train.iter().find(|t| t.vehicles.iter().any(|v| v.name == *name));
+        if let (Some(train), Some(&fe_m_per_s)) = (train, speeds.first()) {
+            let m_per_s = train.speed.0;
+            if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
+                let vehicle = name.clone();
+                return Err(TrainError::OtherSpeed { vehicle, fe_m_per_s, m_per_s }.into());
+            }
+        }
+    }
+    let until_s = reference.until.map_or(f64::MAX, |t| t.0);
+    let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
+    if states < 3 {
+        return Err(TrainError::TooShort { states, until_s }.into());
+    }
+    let time_s = &fe.time_s[..states];
+    let sources = Sources::read(path, scenario)?;
+    let mut rows = Vec::new();
+    for method in methods(path, scenario, &sources, settings)? {
+        rows.push(row(path, method, fe, time_s)?);
+    }
+    Ok(TrainComparison {
+        until_s: time_s[states - 1],
+        time_s: time_s.to_vec(),
+        fe: fe.velocities.iter().map(|(n, v)| (n.clone(), v[..states].to_vec())).collect(),
+        fe_time_s: fe.wall_time_s,
+        rows,
+    })
+}

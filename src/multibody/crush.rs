@@ -1,0 +1,73 @@
+//! Crush zones: forces that follow the speed of the vehicles, and mass that is stopped on the way.
+
+use std::sync::Arc;
+
+use crate::curve::Envelope;
+use crate::piecewise;
+
+/// A factor `1 + β √u` on the force of an interface, with `u` the share `share` of the speed at
+/// which the body `behind` closes on the body `ahead`.
+///
+/// The two need not be the interface's own sides: both ends of neighbouring vehicles follow the
+/// closing speed of the vehicles. If each followed its own rate, an end that slows down would
+/// weaken at once and take all further crush.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RateFactor {
+    /// β in (s/m)^½, 0 at least.
+    pub sensitivity_sqrt_s_per_m: f64,
+    /// Of the closing speed, above 0: ½ where a curve counts the speed of one vehicle only.
+    pub share: f64,
+    /// Index of a body of the chain.
+    pub behind: usize,
+    /// The same; `None` for the wall.
+    pub ahead: Option<usize>,
+}
+
+impl RateFactor {
+    /// At a closing speed of the two bodies in m/s; 1 while they separate.
+    pub(super) fn at(&self, closing_m_per_s: f64) -> f64 {
+        1.0 + self.sensitivity_sqrt_s_per_m * (self.share * closing_m_per_s).max(0.0).sqrt()
+    }
+
+    /// Closing speed in m/s of its two bodies, of which `speed_m_per_s` tells the speeds.
+    pub(super) fn closing_m_per_s(&self, speed_m_per_s: impl Fn(usize) -> f64) -> f64 {
+        speed_m_per_s(self.behind) - self.ahead.map_or(0.0, speed_m_per_s)
+    }
+}
+
+/// A crush zone that stops part of its body's mass while it is crushed: one side of an interface
+/// takes mass from the other, `m(δ) = max(m₀, m_s(δ))` at the largest deflection δ so far, with
+/// `m₀` its mass at first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stopping {
+    /// Index of the body that loses mass.
+    pub body: usize,
+    /// Index of the body that takes it.
+    pub zone: usize,
+    /// Stopped mass in kg over the deflection in m of the interface, never falling: an envelope
+    /// by its shape, not a force. Held beyond its end.
+    pub stopped_kg: Arc<Envelope>,
+}
+
+impl Stopping {
+    /// Mass of the zone in kg once its largest deflection was `largest_m`; `least_kg` at first.
+    pub(super) fn zone_kg(&self, largest_m: f64, least_kg: f64) -> f64 {
+        self.stopped_kg.force_at(largest_m.max(0.0)).max(least_kg)
+    }
+
+    /// Mass that is stopped per deflection, in kg/m.
+    pub(super) fn rate_kg_per_m(&self, deflection_m: f64, least_kg: f64) -> f64 {
+        let (d, m) = (self.stopped_kg.deflection_m(), self.stopped_kg.force_n());
+        if deflection_m >= self.stopped_kg.end_m() || self.zone_kg(deflection_m, 0.0) < least_kg {
+            return 0.0;
+        }
+        let i = piecewise::segment(d, deflection_m);
+        (m[i + 1] - m[i]) / (d[i + 1] - d[i])
+    }
+
+    /// Whether the mass never falls and stays between 0 and `most_kg`.
+    pub(super) fn is_sound(&self, most_kg: f64) -> bool {
+        let m = self.stopped_kg.force_n();
+        m[0] >= 0.0 && m.windows(2).all(|w| w[0] <= w[1]) && m[m.len() - 1] < most_kg
+    }
+}

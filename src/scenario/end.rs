@@ -1,0 +1,181 @@
+//! Ends of vehicles from models: crush force, rate and stopped mass at one end, and the plates
+//! that meet.
+//!
+//! Models count speed and deflection against a wall, or of two equal ends together. An end takes
+//! half of the deflection of two, twice their reduced stopped mass, and twice their stiffness.
+
+use std::sync::Arc;
+
+use super::layout::{End, Role, Slot};
+use super::spring::SpringError;
+use crate::curve::{CurveUnloading, DrivingCurve, Envelope};
+use crate::multibody::{
+    Damping, DampingError, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
+};
+use crate::surrogate::crush_law::{CrushCurve, CrushLaw};
+use crate::surrogate::{Model, QueryPoint};
+use crate::unit::SpeedKind;
+
+/// Stiffness and damping between two plates, or a plate and the wall: stiff against every end, and
+/// damped enough not to ring. The motion hardly depends on either (`tests/ends.rs`).
+const PLATES_N_PER_M: f64 = 1e10;
+const PLATES_N_S_PER_M: f64 = 3e5;
+
+/// A crush force as the chain takes it, with what must be said of it.
+pub(super) struct Crush {
+    /// Loads from (0, 0); of an end over its own deflection.
+    pub curve: DrivingCurve,
+    pub rate: RateFactor,
+    /// Of an end; between vehicles of one mass the curve contains it.
+    pub stopping: Option<Stopping>,
+    /// Speed that the model was asked for, in m/s of its kind.
+    pub speed_m_per_s: f64,
+    pub warnings: Vec<String>,
+}
+
+/// How an end counts what its model counts: two ends together, or one.
+struct Coordinates {
+    /// Model's deflection per deflection of the end.
+    deflection: f64,
+    /// Model's speed per closing speed of the two vehicles.
+    speed: f64,
+}
+
+impl Coordinates {
+    fn of(kind: SpeedKind, at: Role) -> Self {
+        let against_wall = at == Role::Wall;
+        match kind {
+            SpeedKind::Wall => {
+                Self { deflection: 1.0, speed: if against_wall { 1.0 } else { 0.5 } }
+            }
+            SpeedKind::Closing => {
+                Self { deflection: 2.0, speed: if against_wall { 2.0 } else { 1.0 } }
+            }
+        }
+    }
+
+    /// The envelope over the deflection of the end, with values times `factor`.
+    fn per_end(&self, of_model: &Envelope, factor: f64) -> Result<Envelope, SpringError> {
+        let d = of_model.deflection_m().iter().map(|d| d / self.deflection).collect();
+        let f = of_model.force_n().iter().map(|f| f * factor).collect();
+        Ok(Envelope::new(d, f)?)
+    }
+}
+
+/// Least share of the give of end and plates together that is the end's.
+const LEAST_OF_END: f64 = 0.1;
+/// Least share of a vehicle's mass that is never stopped: lighter vehicles than the model's have
+/// no crush zones as heavy.
+const LEAST_FREE: f64 = 0.5;
+
+/// The end of a vehicle whose neighbours close at `closing_m_per_s`.
+///
+/// # Errors
+/// [`SpringError::NoCrushLaw`] if the model's runs do not tell stopped mass and crush force.
+pub(super) fn crush_end(
+    model: &Model,
+    end: &End<'_>,
+    closing_m_per_s: f64,
+    scale: f64,
+) -> Result<Crush, SpringError> {
+    let coordinates = Coordinates::of(model.speed_kind, end.at);
+    let speed_m_per_s = coordinates.speed * closing_m_per_s;
+    let (law, at) = crush_curve(model, speed_m_per_s)?;
+    let loading = coordinates.per_end(&at.standing_n, scale)?;
+    let stopped_kg = coordinates.per_end(&at.stopped_kg, coordinates.deflection)?;
+    let stiffness = model.unloading_n_per_m(speed_m_per_s);
+    // The plates give way, too: half as much for each of two ends.
+    let plates_m_per_n = if end.at == Role::Wall { 1.0 } else { 0.5 } / PLATES_N_PER_M;
+    let of_end = |k: f64| {
+        let m_per_n = 1.0 / (k * coordinates.deflection * scale);
+        1.0 / (m_per_n - plates_m_per_n).max(LEAST_OF_END * m_per_n)
+    };
+    let unloading = CurveUnloading::of(stiffness.map(of_end));
+    let mut warnings = warnings(model, speed_m_per_s);
+    if model.speed_kind == SpeedKind::Wall && end.at != Role::Wall {
+        warnings.push(
+            "its runs hit a wall: between two vehicles each end is taken to load as against a wall at half their closing speed".into(),
+        );
+    }
+    Ok(Crush {
+        curve: DrivingCurve { unloading, ..DrivingCurve::bare(loading) },
+        rate: RateFactor {
+            sensitivity_sqrt_s_per_m: law.sensitivity,
+            share: coordinates.speed,
+            behind: end.behind,
+            ahead: end.ahead,
+        },
+        stopping: Some(Stopping {
+            body: end.body,
+            zone: end.zone,
+            stopped_kg: Arc::new(stopped_kg),
+        }),
+        speed_m_per_s,
+        warnings,
+    })
+}
+
+/// The crush force between two vehicles of one mass, or one and the wall, that close at
+/// `speed_m_per_s`: each is moved by `F_f M/(M − m_s)`.
+///
+/// # Errors
+/// As of [`crush_end`].
+pub(super) fn crush_between(
+    model: &Model,
+    slot: &Slot<'_>,
+    (behind, ahead): (usize, Option<usize>),
+    speed_m_per_s: f64,
+    scale: f64,
+) -> Result<Crush, SpringError> {
+    let (law, at) = crush_curve(model, speed_m_per_s)?;
+    // Of two equal masses half is what moves along their deflection.
+    let moved_kg = if slot.role == Role::Wall { slot.mass_kg } else { 0.5 * slot.mass_kg };
+    let free_kg = |d: f64| (moved_kg - at.stopped_kg.force_at(d)).max(LEAST_FREE * moved_kg);
+    let deflection_m = at.standing_n.deflection_m().to_vec();
+    let points = deflection_m.iter().zip(at.standing_n.force_n());
+    let force_n = points.map(|(&d, f)| f * scale * moved_kg / free_kg(d)).collect();
+    let stiffness = model.unloading_n_per_m(speed_m_per_s).map(|k| k * scale);
+    let unloading = CurveUnloading::of(stiffness);
+    let curve = DrivingCurve::bare(Envelope::new(deflection_m, force_n)?);
+    let sensitivity_sqrt_s_per_m = law.sensitivity;
+    Ok(Crush {
+        curve: DrivingCurve { unloading, ..curve },
+        rate: RateFactor { sensitivity_sqrt_s_per_m, share: 1.0, behind, ahead },
+        stopping: None,
+        speed_m_per_s,
+        warnings: warnings(model, speed_m_per_s),
+    })
+}
+
+fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCurve), SpringError> {
+    let no_law = || SpringError::NoCrushLaw { group: model.group.clone() };
+    model.crush_curve(speed_m_per_s).ok_or_else(no_law)
+}
+
+fn warnings(model: &Model, speed_m_per_s: f64) -> Vec<String> {
+    let mass_kg = model.mass_kg;
+    let point = QueryPoint { speed_m_per_s, features: &[], mass_kg, closing_m_per_s: None };
+    model.warnings(&point).iter().map(|w| w.to_string()).collect()
+}
+
+/// The interface of two plates that meet after `gap_m`.
+///
+/// # Errors
+/// None that the constants cause.
+pub(super) fn plates(name: &str, gap_m: f64) -> Result<Interface, PlatesError> {
+    let spring = Envelope::new(vec![0.0, 1.0], vec![0.0, PLATES_N_PER_M])?;
+    let law = ForceLaw::new(spring, Unloading::Elastic, EnvelopeEnd::Slope);
+    let damping = Damping::constant(PLATES_N_S_PER_M)?;
+    Ok(Interface::new(name, law, gap_m).with_damping(damping))
+}
+
+/// What could be wrong with the constants of plates.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlatesError {
+    /// Their spring.
+    #[error("{0}")]
+    Spring(#[from] crate::curve::EnvelopeError),
+    /// Their damper.
+    #[error("{0}")]
+    Damper(#[from] DampingError),
+}

@@ -1,0 +1,241 @@
+//! Crush law: one law behind the contact force and the body force of a group.
+//!
+//! A crush zone is stopped from its tip on. With `m_s(d)` the mass that has been stopped,
+//! `λ = dm_s/dd` and `u` the speed of the body against what has been stopped,
+//! - the crush force `F_f = Q(d; v) (1 + β√u)` acts between crush zone and body,
+//! - the contact feels `F_c = F_f + λ u²`, by the momentum of what is being stopped,
+//! - the body moves by `(M − m_s) dv/dt = −F_f`.
+//!
+//! Identified from contact force and body speed alone: momentum tells `m_s = M − (M v₀ − J)/v`
+//! with the impulse `J = ∫F_c dt` at each deflection, as long as `v` is not small. All runs of a
+//! group share one `λ ≥ 0`, constant between nodes, by least squares with smoothing. `F_f` follows
+//! from `F_c − λ u²`, and β makes the `Q` of neighbouring speeds most alike where they overlap: the
+//! nose, which the model `rate` cannot tell from β, is out of these forces.
+//!
+//! The same equations hold in the closing coordinates of two equal bodies, with the reduced mass.
+
+use serde::{Deserialize, Serialize};
+
+use super::CaseCurve;
+use super::cached::Cached;
+use super::rate::Rate;
+use crate::curve::Envelope;
+use crate::dataset::grid;
+use crate::piecewise;
+use crate::signal::non_negative;
+
+/// What a group's runs say of the mass that is stopped, and of the force behind it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CrushLaw {
+    /// β in (s/m)^½, over the closing speed of the model's kind.
+    #[serde(rename = "sensitivity_sqrt_s_per_m")]
+    pub sensitivity: f64,
+    /// Nodes of the stopped mass, in m, from 0.
+    pub deflection_m: Vec<f64>,
+    /// Stopped mass in kg at each node, never falling: that of the body against a wall; of a pair
+    /// the reduced mass, so that of two equal ends half of one's.
+    pub stopped_kg: Vec<f64>,
+    /// Root mean square of what the runs' momentum says beside it, in kg.
+    pub residual_kg: f64,
+    #[serde(skip)]
+    forces: Cached<CrushForces>,
+}
+
+/// The curves of the crush force, and the speeds by which the curves they come from are known.
+#[derive(Clone, Debug)]
+struct CrushForces {
+    of: Vec<[f64; 2]>,
+    curves: Vec<CaseCurve>,
+}
+
+/// The law at one impact speed, as functions of the deflection.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CrushCurve {
+    /// `Q` in N, from (0, 0).
+    pub standing_n: Envelope,
+    /// Stopped mass in kg: an envelope by its shape, not a force.
+    pub stopped_kg: Envelope,
+}
+
+/// Segments of the stopped mass; they are shorter at the tip, where most happens.
+const SEGMENTS: usize = 64;
+const SHORTER_AT_TIP: f64 = 1.5;
+/// Momentum tells the mass while the body has at least this share of its first speed.
+const FAST: f64 = 0.25;
+/// Most of the mass that a crush zone may stop: beyond it the runs say something else.
+const MOST_STOPPED: f64 = 0.5;
+/// Fewest points of a law at one speed.
+const POINTS: usize = 400;
+
+impl CrushLaw {
+    /// Fits the law to the contact curves of a group; `mass_kg` moves along their deflections.
+    /// `None` if a curve has no closing speeds, there are fewer than two curves, or they say that more
+    /// than half of the mass is stopped.
+    pub(crate) fn fit(contact: &[CaseCurve], mass_kg: f64) -> Option<Self> {
+        if contact.len() < 2 || !contact.iter().all(CaseCurve::knows_closing) {
+            return None;
+        }
+        let end_m = contact.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
+        let node = |i: usize| end_m * (i as f64 / SEGMENTS as f64).powf(SHORTER_AT_TIP);
+        let deflection_m: Vec<f64> = (0..=SEGMENTS).map(node).collect();
+        let states: Vec<Vec<(f64, f64)>> =
+            contact.iter().map(|curve| stopped_by_momentum(curve, mass_kg)).collect();
+        let rates = rates_kg_per_m(&deflection_m, &states);
+        let mut stopped_kg = vec![0.0];
+        for (i, rate) in rates.iter().enumerate() {
+            let step_m = deflection_m[i + 1] - deflection_m[i];
+            stopped_kg.push(stopped_kg[i] + rate * step_m);
+        }
+        let most = stopped_kg[SEGMENTS];
+        if !(most.is_finite() && most < MOST_STOPPED * mass_kg) {
+            return None;
+        }
+        let stopped = Envelope::new(deflection_m.clone(), stopped_kg.clone()).ok()?;
+        let square = |(d, m): &(f64, f64)| (stopped.force_at(*d) - m).powi(2);
+        let of_case = |s: &Vec<(f64, f64)>| s.iter().map(square).sum::<f64>() / s.len() as f64;
+        let residual_kg = (states.iter().map(of_case).sum::<f64>() / states.len() as f64).sqrt();
+        let mut law = Self {
+            sensitivity: 0.0,
+            deflection_m,
+            stopped_kg,
+            residual_kg,
+            forces: Cached::default(),
+        };
+        law.sensitivity = Rate::best_sensitivity(&law.crush_forces(contact));
+        residual_kg.is_finite().then_some(law)
+    }
+
+    /// What a fit guarantees and a file might not.
+    ///
+    /// # Errors
+    /// What is wrong, to follow "the model is damaged: ".
+    pub(super) fn check(&self) -> Result<(), String> {
+        let Self { deflection_m: d, stopped_kg: m, residual_kg, .. } = self;
+        Rate::of(self.sensitivity).check_sensitivity()?;
+        let rises = |values: &[f64]| values.windows(2).all(|w| w[0] <= w[1]);
+        let is_sound = Envelope::new(d.clone(), m.clone()).is_ok()
+            && m[0] == 0.0
+            && rises(m)
+            && residual_kg.is_finite();
+        if is_sound { Ok(()) } else { Err("the stopped mass of its crush law is none".into()) }
+    }
+
+    /// Stopped mass in kg at a deflection in m.
+    pub(super) fn stopped_at(&self, deflection_m: f64) -> f64 {
+        let (d, m) = (&self.deflection_m, &self.stopped_kg);
+        match deflection_m < d[d.len() - 1] {
+            true => piecewise::by_share(d, m, piecewise::segment(d, deflection_m), deflection_m),
+            false => m[m.len() - 1],
+        }
+    }
+
+    /// Stopped mass per deflection, in kg/m.
+    fn rate_kg_per_m(&self, d: f64) -> f64 {
+        let nodes = &self.deflection_m;
+        if d >= nodes[nodes.len() - 1] {
+            return 0.0;
+        }
+        let i = piecewise::segment(nodes, d);
+        (self.stopped_kg[i + 1] - self.stopped_kg[i]) / (nodes[i + 1] - nodes[i])
+    }
+
+    /// The crush forces `F_c − λu²` of the contact curves, over their deflections.
+    fn crush_forces(&self, contact: &[CaseCurve]) -> Vec<CaseCurve> {
+        let of = |curve: &CaseCurve| {
+            curve.map_forces(|d, force_n| {
+                let u = curve.closing_at(d);
+                (force_n - self.rate_kg_per_m(d) * u * u).max(0.0)
+            })
+        };
+        contact.iter().map(of).collect()
+    }
+
+    /// The law at an impact speed of the model's kind; beyond the training speeds that of the
+    /// outermost. `contact` are the curves that it was fitted to.
+    pub(crate) fn at(&self, contact: &[CaseCurve], speed_m_per_s: f64) -> Option<CrushCurve> {
+        let of = || contact.iter().map(|c| [c.speed_m_per_s, c.end_m()]);
+        let kept = self.forces.get_or_compute(|| CrushForces {
+            of: of().collect(),
+            curves: self.crush_forces(contact),
+        });
+        let made;
+        let curves = match kept.of.iter().copied().eq(of()) {
+            true => &kept.curves,
+            false => {
+                made = self.crush_forces(contact);
+                &made
+            }
+        };
+        let end_m = curves.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
+        let deflection_m = grid(end_m, POINTS);
+        let mut standing_n =
+            Rate::of(self.sensitivity).standing_n(curves, speed_m_per_s, &deflection_m);
+        // Nothing is crushed before the contact.
+        standing_n[0] = 0.0;
+        Some(CrushCurve {
+            standing_n: Envelope::new(deflection_m, standing_n).ok()?.pushing(),
+            stopped_kg: Envelope::new(self.deflection_m.clone(), self.stopped_kg.clone()).ok()?,
+        })
+    }
+}
+
+/// Deflection in m and stopped mass in kg along a curve, from its momentum.
+fn stopped_by_momentum(curve: &CaseCurve, mass_kg: f64) -> Vec<(f64, f64)> {
+    let deflection_m = curve.envelope().deflection_m();
+    let first = curve.closing_at(0.0);
+    let (mut impulse, mut before) = (0.0, (0.0, curve.force_at(0.0) / first));
+    let mut states = Vec::new();
+    for &d in &deflection_m[1..] {
+        let u = curve.closing_at(d);
+        if u.is_nan() || u <= FAST * first {
+            break;
+        }
+        // dt = dd/u.
+        let now = (d, curve.force_at(d) / u);
+        impulse += 0.5 * (before.1 + now.1) * (d - before.0);
+        states.push((d, mass_kg - (mass_kg * first - impulse) / u));
+        before = now;
+    }
+    states
+}
+
+/// `λ` in kg/m between the nodes: least squares over all states, every run with the same weight,
+/// with its second differences kept small against the residuals.
+fn rates_kg_per_m(nodes_m: &[f64], states: &[Vec<(f64, f64)>]) -> Vec<f64> {
+    let n = nodes_m.len() - 1;
+    let (mut a, mut b) = (vec![vec![0.0; n]; n], vec![0.0; n]);
+    for states in states.iter().filter(|s| !s.is_empty()) {
+        let weight = 1.0 / states.len() as f64;
+        for &(d, stopped_kg) in states {
+            // The length of each segment up to d.
+            let lengths: Vec<f64> = (0..n)
+                .take_while(|&i| nodes_m[i] < d)
+                .map(|i| d.min(nodes_m[i + 1]) - nodes_m[i])
+                .collect();
+            for (i, p) in lengths.iter().enumerate() {
+                b[i] += weight * p * stopped_kg;
+                for (j, q) in lengths.iter().enumerate() {
+                    a[i][j] += weight * p * q;
+                }
+            }
+        }
+    }
+    let smoothing = states.len() as f64 / n as f64;
+    let step = |i: usize| nodes_m[i + 1] - nodes_m[i];
+    let middle = |i: usize| 0.5 * (nodes_m[i] + nodes_m[i + 1]);
+    for i in 1..n - 1 {
+        // By how far the middle of three leaves the line through the others, times its length.
+        let share = (middle(i) - middle(i - 1)) / (middle(i + 1) - middle(i - 1));
+        let row = [(i - 1, 1.0 - share), (i, -1.0), (i + 1, share)];
+        let weight = smoothing * (2.0 * step(i)).powi(2);
+        for (r, p) in row {
+            for (c, q) in row {
+                a[r][c] += weight * p * q;
+            }
+        }
+    }
+    // Segments that no state reaches have nothing to go by: not even rounding may decide.
+    let trace: f64 = (0..n).map(|i| a[i][i]).sum();
+    (0..n).for_each(|i| a[i][i] += 1e-12 * trace);
+    non_negative(&a, &b)
+}
