@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::common::containers::{Written, binout_of};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, fixture, python, run_python, samples, shared,
 };
@@ -133,65 +134,6 @@ fn histories_needs_a_section_and_selects() {
     );
     assert_eq!(csv.lines().next(), Some("time,z_coordinate[225]"));
     assert_eq!(csv.lines().count(), 9);
-}
-
-/// A binout written here: a wall's force and a node, `states` states, one table per state.
-struct Written {
-    bytes: Vec<u8>,
-}
-
-impl Written {
-    fn new() -> Self {
-        Self { bytes: vec![8, 8, 8, 1, 1, 1, 0, 0] }
-    }
-
-    fn record(&mut self, command: u8, payload: &[u8]) {
-        self.bytes.extend((payload.len() as u64 + 9).to_le_bytes());
-        self.bytes.push(command);
-        self.bytes.extend(payload);
-    }
-
-    fn cd(&mut self, path: &str) {
-        self.record(2, path.as_bytes());
-    }
-
-    fn data(&mut self, name: &str, kind: u8, values: &[u8]) {
-        let mut payload = vec![kind, name.len() as u8];
-        payload.extend(name.as_bytes());
-        payload.extend(values);
-        self.record(3, &payload);
-    }
-
-    fn reals(&mut self, name: &str, values: &[f64]) {
-        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        self.data(name, 10, &bytes);
-    }
-
-    fn ids(&mut self, section: &str, ids: &[i64]) {
-        self.cd(&format!("/{section}/metadata"));
-        let bytes: Vec<u8> = ids.iter().flat_map(|v| v.to_le_bytes()).collect();
-        self.data("ids", 4, &bytes);
-    }
-}
-
-/// The text histories of a bundled run as a binout.
-fn binout_of(run: &Path) -> Vec<u8> {
-    let all = Selection::all();
-    let nodout = read(&run.join("nodout"), None, &all).unwrap();
-    let rwforc = read(&run.join("rwforc"), None, &all).unwrap();
-    let mut out = Written::new();
-    for (file, section, id) in [(&nodout, "nodout", 900001), (&rwforc, "rwforc/forces", 1)] {
-        out.ids(section, &[id]);
-        for (state, &time) in file.time.iter().enumerate() {
-            out.cd(&format!("/{section}/d{:06}", state + 1));
-            out.reals("time", &[time]);
-            for component in &file.components {
-                let history = file.history(Some(EntityId::new(id)), component).unwrap();
-                out.reals(component, &history.values[state..=state]);
-            }
-        }
-    }
-    out.bytes
 }
 
 /// Processes of one run write sections of their own; a large file continues in another.

@@ -77,7 +77,20 @@ const MAY_NAME: [(&str, &[&str]); 36] = [
         "sweep",
         &["guess", "scenario", "plan", "multibody", "hdf5", "stream", "manifest", "file", "unit"],
     ),
-    ("init", &["scenario", "surrogate", "study", "solver", "curve", "signal", "history", "unit"]),
+    (
+        "init",
+        &[
+            "guess",
+            "scenario",
+            "surrogate",
+            "study",
+            "solver",
+            "curve",
+            "signal",
+            "history",
+            "unit",
+        ],
+    ),
     (
         "assess",
         &[

@@ -11,6 +11,7 @@ use crumple::init::{Given, Request, propose};
 use serde_json::Value;
 use toml::Table;
 
+use crate::common::containers::binout_of;
 use crate::common::crash::{Crash, Force, History, Layout, MM_KG_MS, MM_T_S, Node, SI};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, is_thorough, samples,
@@ -146,6 +147,92 @@ fn shared_runs_give_the_shipped_studies_from_text_and_from_t01() {
             assert!(deflection_m < 2e-5, "{name}/{}: {deflection_m}", text.name);
             let force = far(a.force_n(), b.force_n()) / peak;
             assert!(force < 1e-5, "{name}/{}: {force}", text.name);
+        }
+    }
+}
+
+/// The runs of a bundled group again, each as one binout.
+fn as_binouts(group: &str) -> tempfile::TempDir {
+    let source = fixture(&format!("fe/{group}"));
+    let folder = tempfile::tempdir().unwrap();
+    for run in entries(&source).iter().filter(|run| source.join(run).is_dir()) {
+        let to = folder.path().join(group).join(run);
+        fs::create_dir_all(&to).unwrap();
+        fs::write(to.join("binout0000"), binout_of(&source.join(run))).unwrap();
+    }
+    folder
+}
+
+/// What text files say, a binout of the same histories says in the same words.
+#[test]
+fn a_binout_gives_the_proposal_of_its_texts() {
+    for (group_name, options) in
+        [("lead-car-wall", &[][..]), ("lead-car-pair", &[]), ("vehicle-pair", &["--half-model"])]
+    {
+        let (text, binout) =
+            (group(&fixture(&format!("fe/{group_name}")), TEXTS), as_binouts(group_name));
+        let proposed = |folder: &tempfile::TempDir| {
+            let here = folder.path().join(group_name);
+            let document = json(&crumple_ok(&here, &[&["init", "--json"], options].concat()));
+            (document, study(&here, "study.toml"), here)
+        };
+        let (mut of_text, texts_study, _) = proposed(&text);
+        let (mut of_binout, binouts_study, here) = proposed(&binout);
+        assert_eq!(texts_study, binouts_study, "{group_name}");
+        let said = |document: &mut Value, by: &str| {
+            let from = document["filter"]["from"].take();
+            let means = "\"smp d R14 (from OpenRadioss T01)\": a mean over two intervals";
+            assert!(from.as_str().unwrap().starts_with(&format!("{by} {means}")), "{from}");
+        };
+        said(&mut of_text, "its second line says");
+        said(&mut of_binout, "its version is");
+        assert_eq!(of_text, of_binout, "{group_name}");
+        crumple_ok(&here, &["build", "-q"]);
+    }
+}
+
+/// Slow impacts in millimetres have numbers that are small for mm and large for m.
+const SLOW: [(&str, &str, f64); 3] = [
+    ("vehicle-pair", "3kmh", 1.5),
+    ("vehicle-pair", "6kmh", 3.0),
+    ("lead-car-wall", "12kmh", 12.0),
+];
+
+/// A run alone tells its units by itself, with nothing to guess.
+fn tells_millimetres(run: &Path, km_per_h: f64) {
+    let document = json(&crumple_ok(run, &["init", "--json", "-o", "alone.toml"]));
+    let units = &document["units"];
+    assert_eq!(units["value"], "mm-t-s", "{}: {units}", run.display());
+    assert_eq!(units["evidence"], "computed", "{}: {units}", run.display());
+    let speed = document["runs"][0]["speed_m_per_s"]["value"].as_f64().unwrap();
+    assert!((speed * 3.6 / km_per_h - 1.0).abs() < 1e-3, "{}: {speed} m/s", run.display());
+}
+
+#[test]
+fn slow_runs_alone_tell_their_units() {
+    for (group, run, km_per_h) in SLOW {
+        let from = fixture(&format!("fe/{group}")).join(run);
+        let folder = tempfile::tempdir().unwrap();
+        let (text, binout) = (folder.path().join("text"), folder.path().join("binout"));
+        copy_run(&from, &text, TEXTS);
+        // Without a force nothing tells the mass, which is half of what tells the units.
+        let motion = folder.path().join("motion");
+        copy_run(&from, &motion, &["nodout"]);
+        fs::create_dir(&binout).unwrap();
+        fs::write(binout.join("binout"), binout_of(&from)).unwrap();
+        [text, binout, motion].iter().for_each(|run| tells_millimetres(run, km_per_h));
+    }
+}
+
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn slow_runs_alone_tell_their_units_from_t01_and_full_texts() {
+    for (group, run, km_per_h) in SLOW {
+        let from = shared("fe").join(group).join(run);
+        for files in [T01, TEXTS] {
+            let folder = tempfile::tempdir().unwrap();
+            copy_run(&from, folder.path(), files);
+            tells_millimetres(folder.path(), km_per_h);
         }
     }
 }
@@ -354,6 +441,111 @@ fn pairs_have_both_bodies() {
     crumple_ok(&here, &["build", "-q"]);
 }
 
+/// Bodies that meet each other and of which nothing but their motion is recorded.
+const MOTION_ONLY: Crash = Crash {
+    body_kg: 1_200.0,
+    other_kg: Some(2_000.0),
+    speed_m_per_s: 12.0,
+    other_speed_m_per_s: 4.0,
+    gap_m: 0.05,
+    duration_s: 0.12,
+    interval_s: 2e-4,
+};
+
+/// Momentum alone says that two bodies meet, that they are of different mass, and that it is a
+/// guess.
+#[test]
+fn a_pair_without_forces_is_guessed() {
+    let history = MOTION_ONLY.run();
+    let node = |id, title, body, mass, shakes| Node { id, title, on: Some((body, mass)), shakes };
+    let nodes = [
+        Node { id: 4, title: "ground", on: None, shakes: 0.0 },
+        node(5, "", 0, 0, 0.0),
+        node(6, "", 0, 4, 0.01),
+        node(7, "", 0, 4, 0.02),
+        node(8, "CG of truck", 1, 4, 0.004),
+        node(10, "", 1, 0, 0.0),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let (run, here) = (folder.path().join("pair/a"), folder.path().join("pair"));
+    let layout = Layout { units: MM_T_S, axis: 1, sign: -1.0 };
+    layout.nodout(&run, &history, &nodes);
+    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let kind = &document["kind"];
+    assert_eq!(
+        (kind["value"].as_str(), kind["evidence"].as_str()),
+        (Some("pair"), Some("guessed"))
+    );
+    let why = kind["from"].as_str().unwrap();
+    assert!(why.starts_with("two bodies move, and their velocities change against each other"));
+    let deflection = &document["deflection"];
+    assert_eq!(deflection["evidence"], "guessed");
+    assert_eq!(deflection["value"]["node"], 6);
+    assert_eq!(deflection["value"]["minus_node"], 8, "its title says so");
+    assert_eq!(document["other_nodes"][0][0]["about"], "starts at the same velocity");
+    let force = &document["force"];
+    assert_eq!(
+        (force["evidence"].as_str(), force["value"]["times"].as_str()),
+        (Some("guessed"), Some("mass"))
+    );
+    let fill_in = document["fill_in"].to_string();
+    assert!(fill_in.contains("other_mass of a: by their velocities 1.6"), "{fill_in}");
+    let text = fs::read_to_string(here.join("study.toml")).unwrap();
+    assert!(
+        text.contains("\nkind = \"pair\"\n") && text.contains("\n# other_mass =     # fill in\n"),
+        "{text}"
+    );
+    let speed = document["runs"][0]["speed_m_per_s"]["value"].as_f64().unwrap();
+    assert!((speed / 16.0 - 1.0).abs() < 1e-3, "{speed}");
+    // One mass for both is not what the velocities say.
+    let output = crumple_in(&here, &["init", "--mass", "1.2t", "-o", "one.toml"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("mass: by their velocities the other body is 1.6"), "{said}");
+    let both = ["init", "--mass", "1.2t", "--other-mass", "2t", "-o", "both.toml"];
+    assert_eq!(String::from_utf8(crumple_in(&here, &both).stderr).unwrap(), "");
+    crumple_ok(&here, &["build", "both.toml", "-q"]);
+    let cases = Database::read(&here.join("curves.h5")).unwrap();
+    let case = &cases.cases("pair")[0];
+    assert!(case.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
+    // What the caller says of the bodies stands above it.
+    crumple_ok(&here, &["init", "--node", "8", "--minus-node", "6", "-o", "turned.toml"]);
+    let turned = study(&here, "turned.toml");
+    assert_eq!(turned["study"]["kind"].as_str(), Some("pair"));
+    assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(8));
+    let error = crumple_fails(&here, 1, &["init", "--half-model", "-o", "half.toml"]);
+    assert!(error.contains("two bodies move in these runs"), "{error}");
+}
+
+/// A struck body that stands at first is one of a pair; two that are stopped by walls of their own
+/// are none, and neither is one body with nodes that start alike.
+#[test]
+fn bodies_that_do_not_meet_are_no_pair() {
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let node = |id, body| Node { id, title: "", on: Some((body, 4)), shakes: 0.002 };
+    let proposed = |history: &History, nodes: &[Node]| {
+        let folder = tempfile::tempdir().unwrap();
+        layout.nodout(&folder.path().join("group/a"), history, nodes);
+        json(&crumple_ok(&folder.path().join("group"), &["init", "--json"]))
+    };
+    let standing = Crash { other_speed_m_per_s: 0.0, ..MOTION_ONLY }.run();
+    let document = proposed(&standing, &[node(1, 0), node(2, 1)]);
+    assert_eq!(document["kind"]["value"], "pair");
+    assert_eq!(document["deflection"]["value"]["node"], 1, "the one that moves");
+    assert_eq!(document["deflection"]["value"]["minus_node"], 2);
+    let mut apart = Crash::default().run();
+    apart.bodies.extend(Crash { speed_m_per_s: 8.0, gap_m: 0.2, ..Crash::default() }.run().bodies);
+    let document = proposed(&apart, &[node(1, 0), node(2, 1)]);
+    assert_eq!(document["kind"]["value"], "wall");
+    assert_eq!(document["kind"]["evidence"], "guessed");
+    assert!(
+        document["kind"]["from"].as_str().unwrap().starts_with("several bodies move, no force")
+    );
+    assert_eq!(document["deflection"]["value"]["node"], 1, "the fastest");
+    let document = proposed(&Crash::default().run(), &[node(1, 0), node(2, 0)]);
+    assert_eq!(document["kind"]["value"], "wall");
+    assert!(document["kind"]["from"].as_str().unwrap().starts_with("one body moves in the files"));
+}
+
 /// Where momentum and kinetic energy agree, the energy's mass is taken; where nothing tells it,
 /// it is left to fill in.
 #[test]
@@ -518,6 +710,40 @@ fn what_is_no_run_is_named_and_left_out() {
     assert_eq!(out.len(), 7);
     assert!(text.contains("\n# [[run]]\n# path = \"aborted\"\n"), "{text}");
     crumple_ok(&here, &["build", "-q"]);
+}
+
+/// Keeps the first states of a text, as a killed solver leaves them.
+fn keep(path: &Path, state_line: &str, states: usize) {
+    let text = fs::read_to_string(path).unwrap();
+    let end = text.match_indices(state_line).nth(states).unwrap().0;
+    fs::write(path, &text[..end]).unwrap();
+}
+
+/// A run that was killed early says where its record ends, alone and among others.
+#[test]
+fn a_run_that_died_early_says_where_its_record_ends() {
+    let (_folder, here) = four_runs();
+    let killed = here.join("killed");
+    copy_run(&fixture("fe/lead-car-wall/72kmh"), &killed, TEXTS);
+    keep(&killed.join("nodout"), "\n\n\n n o d a l   p r i n t", 20);
+    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    assert_eq!(document["runs"].as_array().unwrap().len(), 4);
+    let died = "it died: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
+    assert_eq!(left_out(&document), [("killed".into(), died.into())]);
+    let text = fs::read_to_string(here.join("study.toml")).unwrap();
+    assert!(text.contains("\n# [[run]]\n# path = \"killed\"\n"), "{text}");
+    // Alone its units are not known.
+    let error = crumple_fails(&here, 1, &["init", "killed", "-o", "killed.toml"]);
+    assert!(error.contains("  killed: it died: the record ends at 0.0142"), "{error}");
+    assert!(error.contains("while the bodies still close at 93 %"), "{error}");
+    assert!(!here.join("killed.toml").exists());
+    // A force that ends early ends the record, too.
+    copy_run(&fixture("fe/lead-car-wall/72kmh"), &killed, &["nodout"]);
+    let forces = fs::read_to_string(killed.join("rwforc")).unwrap();
+    let whole: Vec<&str> = forces.split_inclusive('\n').take(9 + 20).collect();
+    fs::write(killed.join("rwforc"), whole.concat()).unwrap();
+    let document = json(&crumple_ok(&here, &["init", "--json", "-o", "force.toml"]));
+    assert_eq!(left_out(&document), [("killed".into(), died.into())]);
 }
 
 #[test]

@@ -25,6 +25,7 @@ mod known_solutions;
 mod legacy_files;
 mod messages;
 mod models;
+mod new_user;
 mod nsdm;
 mod openradioss;
 mod overwritten;

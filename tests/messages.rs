@@ -350,6 +350,7 @@ fn global_options_have_their_heading_and_every_command_its_page() {
     while let Some(command) = left.pop() {
         let words: Vec<&str> = command.iter().map(String::as_str).collect();
         let help = crumple_ok(folder.path(), &[&words[..], &["--help"]].concat());
+        assert!(!help.contains('\\'), "quotes of the source are no part of the help: {help}");
         let global = help.split("\nGlobal options:\n").nth(1).unwrap_or_else(|| panic!("{help}"));
         for option in ["--json", "--quiet", "--strict", "--help", "--version"] {
             assert!(global.contains(option), "{words:?} {option}: {help}");
@@ -364,6 +365,18 @@ fn global_options_have_their_heading_and_every_command_its_page() {
     }
     assert_eq!(pages.read_dir().unwrap().count(), expected);
     assert!(expected > 20, "{expected}");
+}
+
+/// A file of one long line, such as a model where a scenario is meant, does not fill the log.
+#[test]
+fn a_long_line_is_shown_in_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let text =
+        format!("{{\"format\":\"crumple model\",\"forces\":[{}0]}}\n", "1.5,".repeat(10_000));
+    fs::write(folder.path().join("m.model"), text).unwrap();
+    let error = crumple_fails(folder.path(), 1, &["simulate", "m.model"]);
+    assert!(error.contains("1 | {\"format\":\"crumple model\""), "{error}");
+    assert!(error.lines().all(|line| line.chars().count() <= 200), "{error}");
 }
 
 /// What crumple prints on a terminal of so many columns, without the terminal's line ends.

@@ -193,7 +193,7 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     } else {
         output::print(|out| print(out, &proposal, output))?;
     }
-    let is_clean = warnings(&proposal).is_empty() && missing.is_empty();
+    let is_clean = warnings(&proposal).is_empty() && proposal.left_out.is_empty();
     Ok(if is_clean { Outcome::Clean } else { Outcome::Warned })
 }
 
@@ -220,13 +220,15 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     for left_out in &proposal.left_out {
         writeln!(out, "left out: {}: {}", left_out.path.display(), left_out.message)?;
     }
-    let runs = proposal.runs.len();
-    let runs = if runs == 1 { "1 run".into() } else { format!("{runs} runs") };
-    writeln!(
-        out,
-        "wrote {} ({runs}): look at what is guessed, then crumple build",
-        output.display()
-    )
+    let runs = output::counted(proposal.runs.len(), "run");
+    let next = match proposal.missing().len() {
+        0 => "look at what is guessed, then crumple build".into(),
+        lines => format!(
+            "not complete, {} to fill in or to give as an option: then crumple build",
+            output::counted(lines, "line")
+        ),
+    };
+    writeln!(out, "wrote {} ({runs}): {next}", output.display())
 }
 
 /// What the runs share: key, value, where it is from in a word.

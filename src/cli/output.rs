@@ -78,9 +78,13 @@ pub fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
 
+/// Characters of a file's line that are shown where no terminal bounds them: a log is no place for
+/// a file of one long line.
+const WIDEST: usize = 200;
+
 /// Prints the line of a file that an error is about on standard error, with carets below.
 pub fn say_excerpt(place: Option<&Place>) {
-    let width = terminal::error_width().unwrap_or(usize::MAX);
+    let width = terminal::error_width().unwrap_or(WIDEST);
     if let Some(excerpt) = place.and_then(|place| place.excerpt(width)) {
         say(&excerpt);
     }

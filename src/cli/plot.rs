@@ -27,7 +27,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
 /// Draw curves, predictions, runs and histories as SVG or PNG
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  crumple plot curves.h5 --group lead-car-wall -o curves.svg            # force over deflection by speed
+  crumple plot curves.h5 --group lead-car-wall -o curves.svg            # curves by speed
   crumple plot curves.h5 --group lead-car-wall --left-out 48km/h -o left-out.png
   crumple plot lead.model --speed 50km/h -o lead50.svg                  # band, over its neighbours
   crumple plot scenario.toml --quantity energy -o energy.svg            # runs the scenario

@@ -25,7 +25,7 @@ pub struct Args {
     database: PathBuf,
     /// Scenarios (TOML) whose runs are shown
     scenarios: Vec<PathBuf>,
-    /// Page to write; \"-\" is standard output
+    /// Page to write; "-" is standard output
     #[arg(short, long)]
     output: PathBuf,
     /// Group to show; may be repeated (default: all)

@@ -50,12 +50,14 @@ fn under_one_heading(command: Command) -> Command {
 }
 
 /// The usual order of work.
-const ORDER: [(&str, &str); 7] = [
-    ("inspect RUN/nodout", "what a solver's file holds"),
-    ("build study.toml -o curves.h5", "curves of all runs of a study"),
-    ("validate curves.h5 --group G", "which model predicts best"),
-    ("train curves.h5 --group G -o M", "fit it"),
+const ORDER: [(&str, &str); 9] = [
+    ("inspect RUNS", "what the run folders hold"),
+    ("init RUNS", "a study of them, in study.toml"),
+    ("build", "their curves, in curves.h5"),
+    ("validate curves.h5", "which model predicts best"),
+    ("train curves.h5 -o M", "fit it"),
     ("predict M --speed 50km/h", "a curve that was never run"),
+    ("init --scenario M", "a crash with it, in scenario.toml"),
     ("simulate scenario.toml", "a train, vehicle by vehicle"),
     ("report curves.h5 -o report.html", "all of it on one page"),
 ];

@@ -32,6 +32,11 @@ pub(super) struct Agreed {
     pub force: Option<ChosenForce>,
     /// What the chosen nodes leave of the impulse in the run where they follow it worst.
     pub residual: f64,
+    /// The same of what one body of a pair leaves of the other's change of velocity, if no force
+    /// moves them.
+    pub opposed: Option<f64>,
+    /// Bodies that move in the run with most of them.
+    pub bodies: usize,
     /// For each run whether it can take the recipe.
     pub members: Vec<Result<(), Reason>>,
 }
@@ -74,17 +79,20 @@ type Key = (bool, &'static str, Option<(&'static str, i64)>);
 struct View<'a> {
     survey: &'a Survey,
     best: Option<Explanation>,
+    /// Whether it has a say: the record holds the crash up to its end, or no run's does.
+    counts: bool,
 }
 
 impl Agreed {
     /// The recipe of most of the runs; `None` if there are no runs.
     pub(super) fn of(surveys: &[&Survey], given: &Given) -> Option<Self> {
         let single = given.half_model.then_some(StudyKind::Wall);
-        let kind = single.or(given.kind);
-        let views: Vec<View<'_>> =
-            surveys.iter().map(|survey| View { survey, best: best(survey, given, kind) }).collect();
+        // Whoever names a node of the other body has two.
+        let two = given.minus_node.map(|_| StudyKind::Pair);
+        let kind = single.or(given.kind).or(two);
+        let views = View::all(surveys, given, kind);
         let mut votes: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
-        for (k, view) in views.iter().enumerate() {
+        for (k, view) in views.iter().enumerate().filter(|(_, view)| view.counts) {
             votes.entry(key(view)).or_default().push(k);
         }
         // Of equally many votes the force that explains more, then the first run's.
@@ -103,9 +111,15 @@ impl Agreed {
             nodes: Vec::new(),
             force: None,
             residual: 0.0,
+            opposed: None,
+            bodies: surveys.iter().map(|survey| survey.bodies.len()).max().unwrap_or(0),
             members: Vec::new(),
         };
-        agreed.force = key.2.map(|_| chosen_force(&views, &explained));
+        agreed.force = key.2.and_then(|_| chosen_force(&views, &explained));
+        if agreed.force.is_none() && agreed.kind == StudyKind::Pair {
+            let residuals = explained.iter().flatten().flatten().map(|e| e.residual);
+            agreed.opposed = Some(residuals.fold(0.0, f64::max));
+        }
         agreed.choose_nodes(&views, &explained, given);
         Some(agreed)
     }
@@ -125,11 +139,11 @@ impl Agreed {
                 .iter()
                 .zip(explained)
                 .map(|(view, explained)| match explained {
-                    Ok(explained) => judged(view.survey, explained.as_ref(), slot),
-                    Err(_) => Vec::new(),
+                    Ok(explained) if view.counts => judged(view.survey, explained.as_ref(), slot),
+                    _ => Vec::new(),
                 })
                 .collect();
-            self.nodes.extend(choose(&of_runs, given));
+            self.nodes.extend(choose(&of_runs, given, self.force.is_some()));
         }
         let nodes: Vec<i64> = self.nodes.iter().map(|node| node.id).collect();
         self.members = views
@@ -151,7 +165,7 @@ fn best(survey: &Survey, given: &Given, kind: Option<StudyKind>) -> Option<Expla
             let force = survey.force(&named.file, named.id)?;
             explain::of_force(survey, force, kind)
         }
-        None => explain::best_of(survey, kind),
+        None => explain::best_of(survey, kind).or_else(|| explain::without_force(survey, kind)),
     }
 }
 
@@ -159,16 +173,48 @@ fn key(view: &View<'_>) -> Key {
     let direction = view.survey.direction.axis();
     match &view.best {
         Some(best) => {
-            let force = &view.survey.forces[best.force];
-            (best.kind == StudyKind::Pair, direction, Some((force.file, force.id)))
+            let force = view.moved_by(best).map(|force| (force.file, force.id));
+            (best.kind == StudyKind::Pair, direction, force)
         }
         None => (false, direction, None),
     }
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
+    /// All runs, each with what explains it best.
+    fn all(surveys: &[&'a Survey], given: &Given, kind: Option<StudyKind>) -> Vec<Self> {
+        let view = |survey: &&'a Survey| {
+            let best = best(survey, given, kind);
+            let counts = best.as_ref().is_some_and(|best| explain::reaches_the_end(survey, best));
+            Self { survey: *survey, best, counts }
+        };
+        let mut views: Vec<Self> = surveys.iter().map(view).collect();
+        if !views.iter().any(|view| view.counts) {
+            views.iter_mut().for_each(|view| view.counts = true);
+        }
+        views
+    }
+
     fn residual(&self) -> f64 {
-        self.best.as_ref().map_or(1.0, |best| best.residual)
+        let by_force = self.best.as_ref().filter(|best| best.force.is_some());
+        by_force.map_or(1.0, |best| best.residual)
+    }
+
+    /// The force of an explanation.
+    fn moved_by(&self, explanation: &Explanation) -> Option<&ForceCandidate> {
+        explanation.force.map(|force| &self.survey.forces[force])
+    }
+
+    /// Why a run is no member where one body moves and in the others two do, or the other way.
+    fn other_kind(&self, is_pair: bool) -> Option<Reason> {
+        let is_other = self.best.as_ref().is_some_and(|b| (b.kind == StudyKind::Pair) != is_pair)
+            && self.counts;
+        let (own, others) = match is_pair {
+            true => ("one body moves", "two bodies do"),
+            false => ("two bodies move", "one does"),
+        };
+        let why = format!("{own} in it, {others} in the others");
+        is_other.then_some(Reason::OtherRecipe { why })
     }
 
     /// What the recipe's force explains of the run, or why the run needs another recipe.
@@ -184,9 +230,13 @@ impl View<'_> {
             return other(format!("it moves along {}", self.survey.direction.axis()));
         }
         let Some((file, id)) = force else {
-            return match &self.best {
-                None => Ok(None),
-                Some(_) => other("it has a contact force, the others have none".into()),
+            let best = self.best.clone();
+            if best.as_ref().is_some_and(|best| best.force.is_some()) {
+                return other("it has a contact force, the others have none".into());
+            }
+            return match self.other_kind(is_pair) {
+                Some(reason) => Err(reason),
+                None => Ok(best.map(|explained| self.with_first(explained, given.node))),
             };
         };
         let wanted = kind.unwrap_or(if is_pair { StudyKind::Pair } else { StudyKind::Wall });
@@ -194,25 +244,18 @@ impl View<'_> {
             .survey
             .force(file, id)
             .and_then(|force| explain::of_force(self.survey, force, Some(wanted)))
-            .filter(|explained| explained.residual < RELATED || given.force.is_some())
+            .filter(|e| e.residual < RELATED || given.force.is_some() || !self.counts)
             .map(|explained| self.with_first(explained, given.node));
-        let own_kind = self.best.as_ref().is_some_and(|b| (b.kind == StudyKind::Pair) != is_pair);
-        match found {
-            Some(_) if own_kind => {
-                let (own, others) = if is_pair {
-                    ("one body moves", "two bodies do")
-                } else {
-                    ("two bodies move", "one does")
-                };
-                other(format!("{own} in it, {others} in the others"))
+        let own = self.best.as_ref().and_then(|best| self.moved_by(best));
+        match (found, self.other_kind(is_pair), own) {
+            (Some(_), Some(reason), _) => Err(reason),
+            (Some(found), None, _) => Ok(Some(found)),
+            (None, _, Some(own)) => {
+                other(format!("{file} {id} does not move its bodies, {} {} does", own.file, own.id))
             }
-            Some(found) => Ok(Some(found)),
-            None => other(match &self.best {
-                Some(best) => {
-                    let own = &self.survey.forces[best.force];
-                    format!("{file} {id} does not move its bodies, {} {} does", own.file, own.id)
-                }
-                None => format!("{file} {id} does not move its bodies"),
+            (None, _, None) => other(match self.survey.force(file, id) {
+                Some(_) => format!("{file} {id} does not move its bodies"),
+                None => format!("it has no {file} {id} along the motion"),
             }),
         }
     }
@@ -248,7 +291,7 @@ impl View<'_> {
                         why: format!("it has no moving node {id}{own}"),
                     });
                 }
-                Some(found) if !are_given && found.residual >= RELATED => {
+                Some(found) if self.counts && !are_given && found.residual >= RELATED => {
                     let why = format!("node {id} does not follow the force{own}");
                     return Err(Reason::OtherRecipe { why });
                 }
@@ -269,7 +312,7 @@ struct Judged<'a> {
 /// that place.
 fn judged<'a>(survey: &'a Survey, explained: Option<&Explanation>, slot: usize) -> Vec<Judged<'a>> {
     let (body, force) = match explained {
-        Some(explained) => (explained.bodies.get(slot).copied(), Some(explained.force)),
+        Some(explained) => (explained.bodies.get(slot).copied(), explained.force),
         None => (Some(slot), None),
     };
     let body = body.and_then(|body| survey.bodies.get(body));
@@ -294,7 +337,7 @@ struct Sum<'a> {
 
 /// The node that can stand for the body in most runs: a centre of gravity first, then the one
 /// with the smoothest velocity.
-fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>) -> Option<ChosenNode> {
+fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Option<ChosenNode> {
     let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
     for run in of_runs {
         let best = run.iter().map(|j| j.residual).fold(f64::INFINITY, f64::min);
@@ -331,47 +374,44 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>) -> Option<ChosenNode>
         return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
     }
     let (first, others) = sums.split_first()?;
+    let about = |sum: &Sum<'_>| {
+        let title = sum.node.title.as_ref().map_or(String::new(), |title| format!("\"{title}\", "));
+        match by_force {
+            true => format!("{title}follows the impulse within {} %", percent(sum.residual)),
+            false => format!("{title}starts at the same velocity"),
+        }
+    };
     let others = others
         .iter()
         .filter(|sum| sum.residual <= FOLLOWS.max(2.0 * first.residual))
         .take(NAMED)
-        .map(|sum| Alternative {
-            id: sum.node.id.to_string(),
-            about: format!(
-                "{}follows the impulse within {} %",
-                sum.node.title.as_ref().map_or(String::new(), |title| format!("\"{title}\", ")),
-                percent(sum.residual)
-            ),
-        })
+        .map(|sum| Alternative { id: sum.node.id.to_string(), about: about(sum) })
         .collect();
     let title = first.node.title.clone();
     Some(ChosenNode { id: first.node.id, title, residual: first.residual, others })
 }
 
-/// The force that the members share, as the recipe names it.
+/// The force that the members share, as the recipe names it; `None` if none moves them.
 fn chosen_force(
     views: &[View<'_>],
     explained: &[Result<Option<Explanation>, Reason>],
-) -> ChosenForce {
-    let of_members: Vec<(&Survey, &Explanation)> = views
+) -> Option<ChosenForce> {
+    let of_members: Vec<(&Survey, &ForceCandidate)> = views
         .iter()
         .zip(explained)
-        .filter_map(|(view, e)| Some((view.survey, e.as_ref().ok()?.as_ref()?)))
+        .filter_map(|(view, e)| Some((view.survey, view.moved_by(e.as_ref().ok()?.as_ref()?)?)))
         .collect();
-    let (first, explanation) =
-        of_members.first().expect("the run that gave the force its vote has it");
-    let force = &first.forces[explanation.force];
-    let all = || of_members.iter().map(|(survey, e)| &survey.forces[e.force]);
+    let (first, force) = *of_members.first()?;
+    let all = || of_members.iter().map(|(_, force)| *force);
     // Where a wall's normal force is not that along the motion in one run, the latter is taken.
     let along = all().find(|f| f.component != "normal_force").unwrap_or(force);
     let named = |f: &ForceCandidate| (f.file, f.id);
     let others = (0..first.forces.len())
         .filter(|&k| named(&first.forces[k]) != named(force))
-        .filter_map(|k| explain::of_force(first, k, None))
-        .filter(|other| other.residual < RELATED)
+        .filter_map(|k| Some((&first.forces[k], explain::of_force(first, k, None)?)))
+        .filter(|(_, other)| other.residual < RELATED)
         .take(NAMED)
-        .map(|other| {
-            let candidate = &first.forces[other.force];
+        .map(|(candidate, other)| {
             let title = candidate.title.as_ref();
             Alternative {
                 id: format!("{} {}", candidate.file, candidate.id),
@@ -384,7 +424,7 @@ fn chosen_force(
             }
         })
         .collect();
-    ChosenForce {
+    Some(ChosenForce {
         file: force.file,
         id: force.id,
         side: force.side,
@@ -392,7 +432,7 @@ fn chosen_force(
         title: force.title.clone(),
         other_side: all().all(|f| f.other_side),
         others,
-    }
+    })
 }
 
 /// A share in percent, with one digit below ten.

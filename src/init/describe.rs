@@ -6,27 +6,25 @@ use std::path::PathBuf;
 use super::agree::{Agreed, percent};
 use super::evidence::{Evidence, Proposed};
 use super::explain::FOLLOWS;
-use super::folders::speed_in;
 use super::given::Given;
 use super::left_out::Reason;
-use super::masses::{self, Weighed, is_near};
-use super::measure::{Measured, SAME_SPEED, SiRun};
-use super::proposal::{Proposal, ProposedRun};
+use super::measure::Measured;
+use super::proposal::Proposal;
 use super::propose::Recorded;
-use super::sampling;
 use super::sources::MOTION;
 use super::titles::is_centre;
+use super::{describe_runs, sampling};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
 use crate::signal::cfc;
 use crate::study::StudyKind;
 use crate::study::files::shown_name;
-use crate::unit::{SPEED, UnitSystem, km_per_h};
+use crate::unit::UnitSystem;
 
 /// Bodies whose speed lies along an axis by less than this share move obliquely.
 const ALONG: f64 = 0.99;
 
 /// How a path is written in the study.
-type Seen<'a> = &'a dyn Fn(&PathBuf) -> Option<String>;
+pub(super) type Seen<'a> = &'a dyn Fn(&PathBuf) -> Option<String>;
 
 /// The proposal for runs that were measured; `group`: name of the folder above them.
 pub(super) fn proposal(
@@ -45,7 +43,7 @@ pub(super) fn proposal(
         }
     };
     let (filter, truncated) = filter(measured);
-    let runs = runs(measured, given, &truncated, seen, warnings);
+    let runs = describe_runs::runs(measured, given, &truncated, seen, warnings);
     let times: Vec<sampling::Times> = measured.runs.iter().map(|run| run.times).collect();
     let no_units = || Proposed::missing("without units the times are not known");
     doubts(measured, warnings);
@@ -79,12 +77,21 @@ fn kind(measured: &Measured<'_>, given: &Given) -> Proposed<StudyKind> {
     if given.kind.is_some() {
         return Proposed::found(*kind, Evidence::Given("by --kind".into()));
     }
+    if given.minus_node.is_some() {
+        return Proposed::found(*kind, Evidence::Given("by --minus-node".into()));
+    }
     let evidence = match (kind, force) {
         (StudyKind::Pair, Some(force)) => Evidence::Computed(format!(
             "two bodies move, and {} {} drives them apart",
             force.file, force.id
         )),
-        (StudyKind::Pair, None) => Evidence::Guessed("two bodies move".into()),
+        (StudyKind::Pair, None) => Evidence::Guessed(format!(
+            "two bodies move, and their velocities change against each other within {} %; no force says whether they meet",
+            percent(measured.agreed.opposed.unwrap_or(1.0))
+        )),
+        (StudyKind::Wall, None) if measured.agreed.bodies > 1 => Evidence::Guessed(
+            "several bodies move, no force says which of them meet, and no two change their velocities against each other: taken is the fastest, as if it met a wall".into(),
+        ),
         (StudyKind::Wall, Some(force)) if force.file == "rwforc" => Evidence::Guessed(
             "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
         ),
@@ -111,7 +118,11 @@ fn deflection(measured: &Measured<'_>, given: &Given) -> Proposed<DeflectionSour
     }
     let mut because = vec![format!("the bodies start along {}", agreed.direction.axis())];
     let runs = measured.recorded.len();
-    let of_runs = if runs == 1 { "the run".into() } else { format!("all {runs} runs") };
+    let of_runs = match runs {
+        1 => "the run".into(),
+        2 => "both runs".into(),
+        _ => format!("all {runs} runs"),
+    };
     if agreed.force.is_some() {
         because.push(format!(
             "velocity and impulse of the force go together within {} % in {of_runs}",
@@ -190,186 +201,6 @@ fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
         return (Proposed::found(Filter::None, Evidence::Computed(from)), none);
     }
     (proposed, cut)
-}
-
-/// The runs by speed, then by name.
-fn runs(
-    measured: &Measured<'_>,
-    given: &Given,
-    truncated: &[Option<f64>],
-    seen: Seen<'_>,
-    warnings: &mut Vec<String>,
-) -> Vec<ProposedRun> {
-    let (bodies, others) = masses(measured, given, warnings);
-    let is_half = names_say_half(measured, given);
-    if is_half {
-        warnings.push("the folders' names say twice the recorded speeds: closing speeds of half models? Then say --half-model".into());
-    }
-    let mut runs: Vec<ProposedRun> = measured
-        .recorded
-        .iter()
-        .enumerate()
-        .map(|(k, recorded)| {
-            let run = measured.runs.get(k);
-            let folder = recorded.run.path.clone();
-            let no_units = || Proposed::missing("without units it is not known");
-            ProposedRun {
-                path: seen(&folder).unwrap_or_default(),
-                folder,
-                name: recorded.run.name.clone(),
-                speed_m_per_s: run.map_or_else(no_units, |run| speed(run, measured, given)),
-                mass_kg: bodies.get(k).cloned().unwrap_or_else(no_units),
-                other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
-                truncate_s: truncated.get(k).copied().flatten().map(|s| {
-                    let from = "the last state comes too soon behind the one before for the filter";
-                    Proposed::found(s, Evidence::Computed(from.into()))
-                }),
-                crush_m: run.map(|run| run.crush_m),
-                states: recorded.record.states,
-                notes: run.filter(|_| !is_half).map_or(Vec::new(), doubts_of_speed),
-            }
-        })
-        .collect();
-    let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
-    runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
-    let alike = runs.windows(2).filter(|pair| {
-        let (a, b) = (speed(&pair[0]), speed(&pair[1]));
-        a > 0.0 && is_near(a, b, SAME_SPEED)
-    });
-    let alike: Vec<String> =
-        alike.map(|pair| format!("{} and {}", pair[0].name, pair[1].name)).collect();
-    if !alike.is_empty() {
-        warnings.push(format!(
-            "runs of one speed with different histories: {}; a group holds one design",
-            alike.join(", ")
-        ));
-    }
-    runs
-}
-
-/// Speed of a run, from its first velocities or those right before the contact.
-fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &Given) -> Proposed<f64> {
-    let (state, time_s) = run.state;
-    let record = &run.recorded.record;
-    let values: Vec<String> = record.velocities.iter().map(|v| v[state].to_string()).collect();
-    let nodes: Vec<String> = measured.agreed.nodes.iter().map(|n| n.id.to_string()).collect();
-    let when = match state {
-        0 => "in the first state".into(),
-        _ => format!("in the last state before the contact, at {:.3} ms", time_s * 1e3),
-    };
-    let of = format!("{} of {} {when}", measured.agreed.direction.velocity(), nodes.join(" and "));
-    let unit = measured.units.value().and_then(|units| SPEED.name_of(units.speed()));
-    let values = format!("{} {}", values.join(" and "), unit.unwrap_or_default());
-    let evidence = match (record.velocities.len(), given.half_model) {
-        (1, false) => Evidence::Read(format!("{of}: {values}")),
-        (1, true) => Evidence::Computed(format!("twice the {of}: {values}")),
-        _ => Evidence::Computed(format!("difference of the {of}: {values}")),
-    };
-    Proposed::found(run.speed_m_per_s, evidence)
-}
-
-/// Whether the folders' names say twice the recorded speeds, of all runs whose name says one.
-fn names_say_half(measured: &Measured<'_>, given: &Given) -> bool {
-    let said: Vec<bool> = measured
-        .runs
-        .iter()
-        .filter_map(|run| Some((run, speed_in(&run.recorded.run.name)?)))
-        .map(|(run, said)| is_near(said, 2.0 * run.speed_m_per_s, SAME_SPEED))
-        .collect();
-    let is_single = measured.agreed.kind == StudyKind::Wall && !given.half_model;
-    is_single && !said.is_empty() && said.into_iter().all(|is_twice| is_twice)
-}
-
-/// What a folder's name and the run's own deck say of its speed, where they say something else.
-fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
-    let Recorded { run: of, record } = run.recorded;
-    let first = record.closing(run.state.0);
-    let mut notes = Vec::new();
-    let said = speed_in(&of.name);
-    if let Some(said) = said.filter(|said| !is_near(*said, run.speed_m_per_s, SAME_SPEED)) {
-        notes.push(format!(
-            "the folder's name says {}, the record {}",
-            km_per_h(said),
-            km_per_h(run.speed_m_per_s)
-        ));
-    }
-    if let Some((path, deck)) = &of.sources.deck
-        && path.parent() == Some(&of.path)
-        && let Some(said) =
-            deck.impact_speed().filter(|said| !is_near(said.speed, first, SAME_SPEED))
-    {
-        notes.push(format!(
-            "the deck {}, line {}, says {} in its units, the record {first}",
-            shown_name(path),
-            said.at.line,
-            said.speed
-        ));
-    }
-    notes
-}
-
-/// Masses of the bodies and of the other bodies, where these are others.
-fn masses(
-    measured: &Measured<'_>,
-    given: &Given,
-    warnings: &mut Vec<String>,
-) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
-    let agreed = measured.agreed;
-    let is_weak = agreed.force.is_some() && agreed.residual > FOLLOWS;
-    let is_part = agreed.force.as_ref().is_some_and(|force| force.file == "secforc");
-    let why = match &agreed.force {
-        Some(_) if is_weak => format!(
-            "impulse and change of velocity differ by {} %, so momentum tells no mass; say --mass",
-            percent(agreed.residual)
-        ),
-        Some(_) if is_part => {
-            "a section may carry only part of what stops the body, so momentum tells no mass; say --mass".into()
-        }
-        _ => "no force and no energy tells it; say --mass".into(),
-    };
-    let of = |weighed: fn(&SiRun<'_>) -> Option<Weighed>| -> Option<Vec<(String, Weighed)>> {
-        let all = measured.runs.iter().map(|run| {
-            let weighed = match (is_weak, is_part) {
-                (true, _) => Weighed::default(),
-                (false, true) => Weighed { by_momentum: None, ..weighed(run)? },
-                (false, false) => weighed(run)?,
-            };
-            Some((run.recorded.run.name.clone(), weighed))
-        });
-        all.collect()
-    };
-    let stated = |kg: Option<f64>, by: &str| {
-        kg.map(|kg| {
-            let one = Proposed::found(kg, Evidence::Given(format!("by {by}")));
-            vec![one; measured.recorded.len()]
-        })
-    };
-    let of_bodies = of(|run| Some(run.body)).unwrap_or_default();
-    let bodies = stated(given.mass_kg, "--mass")
-        .unwrap_or_else(|| masses::agree(&of_bodies, &why, warnings));
-    let others = stated(given.other_mass_kg, "--other-mass").or_else(|| {
-        let of_others = of(|run| run.other).filter(|_| given.mass_kg.is_none())?;
-        Some(masses::agree(&of_others, &why, &mut Vec::new()))
-    });
-    warnings.extend(masses::differ(&bodies));
-    match others {
-        Some(others) if given.other_mass_kg.is_none() => one_mass(bodies, others),
-        others => (bodies, others),
-    }
-}
-
-/// Masses of both bodies, as one where they are equal in all runs.
-fn one_mass(
-    bodies: Vec<Proposed<f64>>,
-    others: Vec<Proposed<f64>>,
-) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
-    let pairs = || bodies.iter().zip(&others);
-    let are_equal = |(a, b): (&Proposed<f64>, &Proposed<f64>)| match (a.value(), b.value()) {
-        (Some(a), Some(b)) => masses::are_equal(*a, *b),
-        (None, None) => true,
-        _ => false,
-    };
-    if pairs().all(are_equal) { (bodies, None) } else { (bodies, Some(others)) }
 }
 
 /// What whoever uses the proposal should look at.

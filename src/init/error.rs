@@ -12,12 +12,14 @@ use crate::surrogate::ModelError;
 #[derive(Debug, thiserror::Error)]
 pub enum InitError {
     /// A folder cannot be looked into.
-    #[error("{path}: {source}")]
+    #[error("{path}: {source}{}", guess.as_ref().map_or(String::new(), |guess| format!("; did you mean {}?", guess.display())))]
     Folder {
         /// The folder.
         path: PathBuf,
         /// Why not.
         source: io::Error,
+        /// A folder that is there and has a name like it.
+        guess: Option<PathBuf>,
     },
     /// There is no run.
     #[error(
@@ -64,7 +66,7 @@ pub enum InitError {
     HalfModelOfTwo,
     /// A pair has two bodies.
     #[error(
-        "only one body moves in these runs: if it stands for a pair, cut at its symmetry plane, say --half-model; if it meets a wall, leave out --kind pair"
+        "only one body moves in these runs: if it stands for a pair, cut at its symmetry plane, say --half-model; if it meets a wall, leave out --kind pair and --minus-node"
     )]
     PairOfOne,
     /// What was asked for stands there already.

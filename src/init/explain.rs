@@ -1,5 +1,7 @@
-//! Which force of a run moved which of its bodies.
+//! Which force of a run moved which of its bodies; without one, which bodies pushed each other.
 
+use super::record::STOPPED;
+use super::series::Fit;
 use super::survey::{Body, ForceCandidate, Survey};
 use crate::study::StudyKind;
 
@@ -10,15 +12,16 @@ pub(super) const RELATED: f64 = 0.3;
 /// Impulses that differ by less are equal.
 const EQUAL: f64 = 0.02;
 
-/// A force and the bodies that it acts on.
+/// A force and the bodies that it acts on, or without one the bodies alone.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Explanation {
     pub kind: StudyKind,
     /// Index into the survey's forces.
-    pub force: usize,
+    pub force: Option<usize>,
     /// Indices into the survey's bodies: the moving one, and of a pair the other.
     pub bodies: Vec<usize>,
-    /// What the best node of each body leaves of the impulse, the larger one of a pair.
+    /// What the best node of each body leaves of the impulse, the larger one of a pair. Without a
+    /// force what one body's change of velocity leaves of the other's.
     pub residual: f64,
 }
 
@@ -45,7 +48,8 @@ pub(super) fn of_force(
         .map(|(a, b)| (bodies[a].0.max(bodies[b].0), vec![a, b]))
         .min_by(|x, y| x.0.total_cmp(&y.0));
     let single = indices.map(|a| (bodies[a].0, vec![a])).min_by(|x, y| x.0.total_cmp(&y.0));
-    let explanation = |kind, (residual, bodies)| Explanation { kind, force, bodies, residual };
+    let explanation =
+        |kind, (residual, bodies)| Explanation { kind, force: Some(force), bodies, residual };
     match kind {
         Some(StudyKind::Pair) => pair.map(|found| explanation(StudyKind::Pair, found)),
         Some(StudyKind::Wall) => single.map(|found| explanation(StudyKind::Wall, found)),
@@ -58,24 +62,67 @@ pub(super) fn of_force(
 
 /// The force that explains most: of those that a node follows, the one with the largest impulse.
 pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explanation> {
-    let explained: Vec<Explanation> = (0..survey.forces.len())
-        .filter_map(|force| of_force(survey, force, kind))
-        .filter(|e| e.residual < RELATED)
+    let forces = survey.forces.iter().enumerate();
+    let explained: Vec<(&ForceCandidate, Explanation)> = forces
+        .filter_map(|(k, force)| Some((force, of_force(survey, k, kind)?)))
+        .filter(|(_, e)| e.residual < RELATED)
         .collect();
-    let least = explained.iter().map(|e| e.residual).fold(f64::INFINITY, f64::min);
-    let follows = |e: &&Explanation| e.residual <= FOLLOWS.max(2.0 * least);
-    let size = |e: &Explanation| size(&survey.forces[e.force]);
-    let is_section = |e: &Explanation| survey.forces[e.force].file == "secforc";
+    let least = explained.iter().map(|(_, e)| e.residual).fold(f64::INFINITY, f64::min);
     let largest = |sections: bool| {
-        let of_kind =
-            || explained.iter().filter(follows).filter(move |e| is_section(e) == sections);
-        let most = of_kind().map(size).fold(0.0, f64::max);
+        let of_kind = || {
+            let following =
+                explained.iter().filter(|(_, e)| e.residual <= FOLLOWS.max(2.0 * least));
+            following.filter(move |(force, _)| (force.file == "secforc") == sections)
+        };
+        let most = of_kind().map(|(force, _)| size(force)).fold(0.0, f64::max);
         // The survey has them by size: of equal ones a wall's comes before an interface's.
-        let equal = of_kind().filter(|e| size(e) >= (1.0 - EQUAL) * most);
-        equal.min_by_key(|e| rank(&survey.forces[e.force])).cloned()
+        let equal = of_kind().filter(|(force, _)| size(force) >= (1.0 - EQUAL) * most);
+        equal.min_by_key(|(force, _)| rank(force)).map(|(_, e)| e.clone())
     };
     // A section carries only what passes through it, so it stands for no contact that is there.
     largest(false).or_else(|| largest(true))
+}
+
+/// What can be said where no force explains a run: two bodies whose velocities change against each
+/// other at one ratio all along, as m₁Δv₁ = −m₂Δv₂ has it for two that meet only each other; else
+/// the fastest one. Whoever asks for a pair gets the two that come closest to it.
+pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<Explanation> {
+    let explanation = |kind, bodies, residual| Explanation { kind, force: None, bodies, residual };
+    let bodies = 0..survey.bodies.len();
+    let pairs = bodies.clone().flat_map(|a| (a + 1..bodies.end).map(move |b| (a, b)));
+    let pair = pairs
+        .map(|(a, b)| explanation(StudyKind::Pair, vec![a, b], opposed(survey, a, b)))
+        .min_by(|x, y| x.residual.total_cmp(&y.residual));
+    let single = || (!bodies.is_empty()).then(|| explanation(StudyKind::Wall, vec![0], 1.0));
+    match kind {
+        Some(StudyKind::Pair) => pair,
+        Some(StudyKind::Wall) => single(),
+        None => pair.filter(|pair| pair.residual < RELATED).or_else(single),
+    }
+}
+
+/// Whether the bodies of an explanation stop closing within the record: a run that died before says
+/// little of how well its nodes follow the force.
+pub(super) fn reaches_the_end(survey: &Survey, explanation: &Explanation) -> bool {
+    let bodies: Vec<&Body> = explanation.bodies.iter().map(|&k| &survey.bodies[k]).collect();
+    let covers = explanation.force.map_or(usize::MAX, |force| survey.forces[force].covers);
+    let states = bodies.iter().map(|body| body.change.len()).fold(covers, usize::min);
+    let closing = |velocity: &dyn Fn(&Body) -> f64| match &bodies[..] {
+        [body, other] => velocity(body) - velocity(other),
+        _ => bodies.first().map_or(0.0, |body| velocity(body)),
+    };
+    let first = closing(&|body| body.first_velocity);
+    let later = |state: usize| closing(&|body| body.first_velocity + body.change[state]);
+    first != 0.0 && (0..states).any(|state| later(state) / first < STOPPED)
+}
+
+/// What a body's change of velocity leaves of another's, 1 if they do not go against each other.
+fn opposed(survey: &Survey, a: usize, b: usize) -> f64 {
+    let change = |body: usize| &survey.bodies[body].change[..];
+    match Fit::of(change(a), change(b)) {
+        fit if fit.mass < 0.0 => fit.residual,
+        _ => 1.0,
+    }
 }
 
 /// Largest impulse of a force, in the file's units.

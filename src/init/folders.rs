@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 use super::error::InitError;
 use super::left_out::{LeftOut, Reason};
+use crate::guess;
 use crate::solver::decks::{self, Search};
 use crate::solver::runs::{renamed_file, run_folders};
 use crate::study::files::shown_name;
@@ -24,8 +25,10 @@ impl Folders {
         let mut seen = HashSet::new();
         let mut is_new = |path: &PathBuf| seen.insert(real(path));
         for root in given {
-            let below = run_folders(root)
-                .map_err(|source| InitError::Folder { path: root.clone(), source })?;
+            let below = run_folders(root).map_err(|source| {
+                let guess = is_there_instead(root).filter(|_| !root.exists());
+                InitError::Folder { path: root.clone(), source, guess }
+            })?;
             let shown = |path: PathBuf| match path.strip_prefix(".") {
                 Ok(below) if !below.as_os_str().is_empty() => below.to_path_buf(),
                 _ => path,
@@ -80,6 +83,19 @@ impl Folders {
         let name = common.and_then(|path| Some(clean(&path.file_name()?.to_string_lossy())));
         name.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| "runs".into())
     }
+}
+
+/// The folder beside a missing one whose name is most like its name.
+fn is_there_instead(missing: &Path) -> Option<PathBuf> {
+    let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
+    let entries = parent.unwrap_or(Path::new(".")).read_dir().ok()?;
+    let folders = entries.filter_map(Result::ok).filter(|entry| entry.path().is_dir());
+    let mut names: Vec<String> =
+        folders.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort();
+    let name = missing.file_name()?.to_str()?;
+    let nearest = guess::nearest(name, names.iter().map(String::as_str))?;
+    Some(parent.map_or(nearest.into(), |parent| parent.join(nearest)))
 }
 
 /// Why a folder holds no run.

@@ -6,6 +6,7 @@
 mod agree;
 mod batches;
 mod describe;
+mod describe_runs;
 mod error;
 mod evidence;
 mod explain;

@@ -170,7 +170,9 @@ fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(
         if found.is_some_and(|found| found.kind == StudyKind::Pair) {
             return Err(InitError::HalfModelOfTwo);
         }
-    } else if given.kind == Some(StudyKind::Pair) && agreed.kind != StudyKind::Pair {
+    } else if (given.kind == Some(StudyKind::Pair) || given.minus_node.is_some())
+        && agreed.kind != StudyKind::Pair
+    {
         return Err(InitError::PairOfOne);
     }
     Ok(())
@@ -270,9 +272,22 @@ fn agree_on_units(
                 None => format!("{end} in the file's unit of time"),
             },
             share,
-            damage: run.record.damage(),
+            damage: run.record.damage() + &also_held(&run.run.sources),
         };
         left_out.push(LeftOut::new(run.run.path, reason));
     }
     (units, kept, warnings)
+}
+
+/// What else holds the motion of a run whose record is too short: its solver may have written more
+/// of one file than of the other.
+fn also_held(sources: &Sources) -> String {
+    match &sources.motion.others[..] {
+        [] => String::new(),
+        others => format!(
+            "; {} holds it too, and is read where there is no {}",
+            others.join(" and "),
+            sources.motion.shown()
+        ),
+    }
 }

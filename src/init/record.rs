@@ -10,7 +10,7 @@ use crate::solver::WantedId;
 use crate::study::StudyKind;
 
 /// Bodies that still close at more than this share of their first speed have not been stopped.
-const STOPPED: f64 = 0.05;
+pub(super) const STOPPED: f64 = 0.05;
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
 /// A flight behind the contact that is shorter than this, in states and as a share of the record,
@@ -225,19 +225,23 @@ impl Record {
         (states >= FREE.0 && share >= FREE.1).then_some(from)
     }
 
+    /// Mass of the other body over the first one's, by their changes of velocity while loading:
+    /// no force is needed for that. `None` for one body.
+    pub(super) fn mass_ratio(&self) -> Option<f64> {
+        let [node, other] = &self.velocities[..] else { return None };
+        let end = self.loading_end().ok()?;
+        let changes = (0..=end).map(|i| (node[i] - node[0], other[i] - other[0]));
+        let (of, by) = changes.fold((0.0, 0.0), |(of, by), (a, b)| (of - a * b, by + b * b));
+        Some(of / by).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+    }
+
     /// The masses by the kinetic energy of the first state, if all that moves is the bodies: that
     /// of two bodies is shared by the ratio of their changes of velocity.
     pub(super) fn masses_by_energy(&self) -> Option<RawMasses> {
         let kinetic = self.kinetic.filter(|k| *k > 0.0)?;
         let first = |k: usize| self.velocities[k][0];
-        let ratio = match &self.velocities[..] {
-            [node, other] => {
-                let end = self.loading_end().ok()?;
-                let changes = (0..=end).map(|i| (node[i] - node[0], other[i] - other[0]));
-                let (of, by) =
-                    changes.fold((0.0, 0.0), |(of, by), (a, b)| (of - a * b, by + b * b));
-                Some(of / by).filter(|ratio| ratio.is_finite() && *ratio > 0.0)?
-            }
+        let ratio = match self.velocities.len() {
+            2 => self.mass_ratio()?,
             _ => 0.0,
         };
         let squares = first(0).powi(2) + if ratio > 0.0 { ratio * first(1).powi(2) } else { 0.0 };

@@ -77,8 +77,10 @@ impl Sources {
         }
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
+            let hint = misnamed(folder)
+                .map_or(String::new(), |name| format!("; if {name} is the {MOTION}, name it so"));
             found.extend(unread.iter().map(|why| format!("({why})")));
-            Reason::NoMotion { found: found.join(", ") }
+            Reason::NoMotion { found: found.join(", ") + &hint }
         })?;
         let forces: Vec<Source> =
             FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed)).collect();
@@ -97,6 +99,17 @@ impl Sources {
     pub(super) fn force(&self, name: &str) -> Option<&Source> {
         self.forces.iter().find(|source| source.name == name)
     }
+}
+
+/// A file of a folder without a nodout that is called nearly so, such as `nodout.txt`.
+fn misnamed(folder: &Path) -> Option<String> {
+    let entries = folder.read_dir().ok()?.filter_map(Result::ok);
+    let mut names: Vec<String> = entries
+        .map(|entry| shown_name(&entry.path()))
+        .filter(|name| name != MOTION && name.to_lowercase().contains(MOTION))
+        .collect();
+    names.sort();
+    names.into_iter().next()
 }
 
 impl Source {
@@ -121,7 +134,7 @@ impl Source {
             entities: section.entities.clone(),
             components: section.components.clone(),
             states: section.time.len(),
-            means: means(section),
+            means: means(section, is_text(chosen)),
             others: others.iter().map(|file| shown_name(&file.path)).collect(),
             damage: section.problems.first().map(ToString::to_string),
         })
@@ -173,14 +186,15 @@ fn is_looked_at(path: &Path) -> bool {
     is_binary || FORCES.contains(&&*name) || [MOTION, ENERGY].contains(&&*name)
 }
 
-/// Why the forces of a file are means over their output intervals, if they are.
-fn means(file: &SolverFile) -> Option<String> {
+/// Why the forces of a section are means over their output intervals, if they are.
+fn means(file: &SolverFile, is_text: bool) -> Option<String> {
     let version = file.version.as_deref().unwrap_or_default();
     if file.format == "t01" {
         return Some("a T01 holds impulses, so each force is a mean over two intervals".into());
     }
     version.contains(MADE_OF_T01).then(|| {
-        format!("its second line says \"{version}\": a mean over two intervals of a T01's impulse")
+        let says = if is_text { "its second line says" } else { "its version is" };
+        format!("{says} \"{version}\": a mean over two intervals of a T01's impulse")
     })
 }
 

@@ -45,6 +45,9 @@ pub(super) struct Body {
     /// In the file's units, with its sign.
     pub first_velocity: f64,
     pub nodes: Vec<NodeCandidate>,
+    /// Change of its smoothest node's velocity over time: how the body moves where no force tells
+    /// which node stands for it.
+    pub change: Vec<f64>,
 }
 
 /// A node and how well it follows each force.
@@ -71,6 +74,8 @@ pub(super) struct ForceCandidate {
     pub title: Option<String>,
     /// Over the motion's times, in the file's units.
     pub impulse: Vec<f64>,
+    /// States of the motion that its record covers.
+    pub covers: usize,
 }
 
 /// A node as it starts.
@@ -204,6 +209,7 @@ fn bodies(starts: &[Start], direction: DisplacementComponent) -> Vec<Body> {
                     fits: Vec::new(),
                 })
                 .collect(),
+            change: Vec::new(),
         })
         .collect();
     // Of two that come at each other equally fast, the one with the smaller number.
@@ -232,6 +238,7 @@ fn force_candidates(
         for of in by_entity(&piece.histories) {
             let Some(entity) = of[0].entity else { continue };
             let Some((component, impulse)) = along(of, direction, time) else { continue };
+            let last = of[0].time.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let title = titles.get(&entity).and_then(|title| (*title).clone());
             let candidate = ForceCandidate {
                 file: source.name,
@@ -241,6 +248,7 @@ fn force_candidates(
                 component,
                 title,
                 impulse,
+                covers: time.partition_point(|&t| t <= last),
             };
             add(&mut found, candidate);
         }
@@ -300,7 +308,7 @@ fn add(found: &mut Vec<ForceCandidate>, candidate: ForceCandidate) {
     }
 }
 
-/// How well each node of the bodies follows each force.
+/// How well each node of the bodies follows each force, and how each body moves.
 fn judge(
     nodes: &mut Batches<'_>,
     bodies: &mut [Body],
@@ -308,13 +316,17 @@ fn judge(
     direction: DisplacementComponent,
 ) -> Result<(), Reason> {
     let ends: Vec<usize> = forces.iter().map(|f| largest(&f.impulse)).collect();
-    let mut candidates: HashMap<i64, &mut NodeCandidate> =
-        bodies.iter_mut().flat_map(|body| &mut body.nodes).map(|node| (node.id, node)).collect();
+    let mut smoothest = vec![(f64::INFINITY, Vec::new()); bodies.len()];
+    let mut candidates: HashMap<i64, (usize, &mut NodeCandidate)> = HashMap::new();
+    for (k, body) in bodies.iter_mut().enumerate() {
+        candidates.extend(body.nodes.iter_mut().map(|node| (node.id, (k, node))));
+    }
     nodes.each(&mut |piece| {
         let states = rising(&piece.time);
         for node in by_entity(&piece.histories) {
             let candidate = node[0].entity.and_then(|entity| candidates.get_mut(&entity.id));
-            let (Some(candidate), Some(velocity)) = (candidate, velocity(node, direction, &states))
+            let (Some((body, candidate)), Some(velocity)) =
+                (candidate, velocity(node, direction, &states))
             else {
                 continue;
             };
@@ -328,12 +340,16 @@ fn judge(
                 .zip(&ends)
                 .map(|(force, &end)| Fit::of(&force.impulse[..=end], &change[..=end]))
                 .collect();
+            if candidate.roughness < smoothest[*body].0 {
+                smoothest[*body] = (candidate.roughness, change);
+            }
         }
     })?;
     // A node whose number repeats in the file has no fits of its own.
     drop(candidates);
-    for body in bodies {
+    for (body, (_, change)) in bodies.iter_mut().zip(smoothest) {
         body.nodes.retain(|node| node.fits.len() == forces.len());
+        body.change = change;
     }
     Ok(())
 }

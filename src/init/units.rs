@@ -1,7 +1,8 @@
 //! The unit system of a run: what its deck states, or the one in which its impact is possible.
 //!
 //! Momentum and energy balance in every consistent system, so only magnitudes tell: an impact
-//! has a speed, a crush, a time to the largest crush and a mass that vehicles have.
+//! has a speed, a crush, a time to the largest crush, a mean deceleration and a mass that vehicles
+//! have.
 
 use super::evidence::{Evidence, Proposed};
 use crate::unit::{UnitSystem, km_per_h};
@@ -28,6 +29,13 @@ struct Range {
 const SPEED_M_PER_S: Range = Range { low: 0.05, high: 200.0, usual: 10.0, spread: 3.0 };
 const CRUSH_M: Range = Range { low: 3e-4, high: 30.0, usual: 0.3, spread: 4.0 };
 const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 };
+/// First closing speed over the time to the largest crush: from a train against soft buffers to
+/// some hundred g. Speed and time may each be possible and what they make together not: the mean
+/// force is mass times deceleration, and no crush zone stops its own vehicle with hundreds of its
+/// weights. A shunting impact at 0.5 km/h, recorded in mm and s, is no impact at 139 m/s that
+/// ends within the same 20 ms, for that would be 700 g. The spread is wide, because what is hit may
+/// be a buffer or a rock.
+const DECELERATION_M_PER_S2: Range = Range { low: 0.2, high: 5e3, usual: 100.0, spread: 5.0 };
 /// From a test body to a train.
 const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
 
@@ -48,10 +56,12 @@ impl Magnitudes {
         let speed = self.speed * units.speed();
         let crush = self.crush * units.length_m;
         let time = self.loading_time * units.time_s;
+        let mean = speed / time;
         let mut all = vec![
             (time, &LOADING_S, format!("a crush that takes {}", seconds(time))),
             (speed, &SPEED_M_PER_S, format!("an impact at {}", shown_speed(speed))),
             (crush, &CRUSH_M, format!("a crush of {} m", digits(crush))),
+            (mean, &DECELERATION_M_PER_S2, format!("a mean deceleration of {} m/s²", digits(mean))),
         ];
         if let Some(mass) = self.mass.map(|mass| mass * units.mass_kg) {
             all.push((mass, &MASS_KG, format!("a body of {}", shown_mass(mass))));
@@ -243,6 +253,30 @@ mod tests {
             let found = choose(&[car(&units)], None, None, &mut Vec::new());
             assert_eq!(found.value(), Some(&units), "{found}");
         }
+    }
+
+    /// A shunting impact in mm and s has numbers that a fast one in SI could have, were it not for
+    /// how soon it is over. Of its mass nothing is known.
+    #[test]
+    fn a_slow_impact_in_millimetres_is_no_fast_one_in_metres() {
+        let shunting = |km_per_h: f64| Magnitudes {
+            speed: km_per_h / 3.6 * 1e3,
+            crush: 0.6 * km_per_h / 3.6 * 0.02 * 1e3,
+            loading_time: 0.02,
+            mass: None,
+        };
+        let in_si = shunting(0.5).in_si(&UnitSystem::SI);
+        let others = in_si.iter().filter(|(_, range, _)| range.high != DECELERATION_M_PER_S2.high);
+        assert!(others.clone().all(|(value, range, _)| range.holds(*value)), "each alone may be");
+        assert_eq!(others.count(), 3);
+        for km_per_h in [0.4, 0.5, 0.7, 3.0] {
+            let found = choose(&[shunting(km_per_h)], None, None, &mut Vec::new());
+            let units = found.value().map(ToString::to_string);
+            assert_eq!(units.as_deref(), Some("mm-t-s"), "{km_per_h} km/h: {found}");
+            assert!(found.to_string().starts_with("computed: "), "{found}");
+        }
+        let found = choose(&[shunting(0.5)], None, None, &mut Vec::new()).to_string();
+        assert!(found.contains("SI would make a mean deceleration of 6944 m/s²"), "{found}");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! A test that needs more than a Rust toolchain bears `#[ignore = "needs …"]`. What it asks for here
 //! panics where it is absent, so that no such test can pass without having tested anything.
 
+pub mod containers;
 pub mod crash;
 
 use std::collections::BTreeMap;
