@@ -15,9 +15,12 @@ use std::process::Command;
 use cpu_time::ProcessTime;
 use crumple::build::build;
 use crumple::curve::Envelope;
+use crumple::dataset::TrainingSet;
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Record, RunSettings, Unloading, simulate,
 };
+use crumple::scenario::{self, Prepared};
+use crumple::surrogate::{Model, ModelKind};
 use rayon::prelude::*;
 
 const POINTS: usize = 200;
@@ -119,6 +122,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         let used = simulate(&chain, &settings)?.step_s;
         line(name, used, run_s, error, plain_s);
     }
+    let ends = split_ends()?;
+    for (name, prepared) in
+        ["one mass a vehicle, Verlet", "two ends a vehicle, Verlet"].iter().zip(ends)
+    {
+        let settings = RunSettings { record: Record::Histories, ..base };
+        let exact = simulate(&prepared.chain, &base.with_method(Method::Reference))?;
+        let run = simulate(&prepared.chain, &settings)?;
+        let pairs = prepared.order.iter().map(|&i| (&run.bodies[i], &exact.bodies[i]));
+        let error = pairs
+            .flat_map(|(ours, exact)| ours.v_m_per_s.iter().zip(&exact.v_m_per_s))
+            .fold(0.0_f64, |e, (a, b)| e.max((a - b).abs()));
+        let run_s = seconds(|| simulate(&prepared.chain, &settings).map(|r| r.bodies.len()));
+        line(name, run.step_s, run_s, error, plain_s);
+    }
     let wall = std::time::Instant::now();
     let runs = 100_000;
     let energy: f64 = (0..runs)
@@ -208,6 +225,34 @@ fn chain() -> Result<(Chain, Vec<Envelope>), Box<dyn Error>> {
         Interface::new(format!("I{k}"), law, if k == 7 { 0.0 } else { 0.04 })
     });
     Ok((Chain::new(bodies.collect(), interfaces.collect())?, tables))
+}
+
+/// The same trains by models: one mass a vehicle, then two ends each.
+fn split_ends() -> Result<[Prepared; 2], Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    for (group, file) in [("lead-car-pair", "pair.model"), ("vehicle-pair", "vehicle.model")] {
+        let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(group);
+        let report = build(&study.join("study.toml"), &folder.path().join("c.h5"), |_| {})?;
+        let set = TrainingSet::new(group, report.database.cases(group))?;
+        Model::fit(&set, ModelKind::rate())?.write(&folder.path().join(file))?;
+    }
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/trains/eight-on-eight.toml");
+    let one = std::fs::read_to_string(shipped)?.replace("method = \"fourth_order\"\n", "");
+    let two = one
+        .replace(", gap = \"32mm\" }", " }")
+        .replace("inner = \"inner\"", "gap = \"32mm\"")
+        .replace(
+            "mass = \"24.00t\" }",
+            "mass = \"24.00t\", front = { curve = \"nose\" }, ends = \"inner\" }",
+        )
+        .replace("mass = \"20.24t\" }", "mass = \"20.24t\", ends = \"inner\" }")
+        .replace("[contact]\ncurve = \"nose\"", "[contact]");
+    let load = |name: &str, text: &str| -> Result<Prepared, Box<dyn Error>> {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text)?;
+        Ok(scenario::load(&path)?)
+    };
+    Ok([load("one.toml", &one)?, load("two.toml", &two)?])
 }
 
 /// What one would write first: velocity Verlet, a search in the table for every force.

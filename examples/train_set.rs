@@ -14,7 +14,7 @@ use crumple::charts;
 use crumple::scenario;
 
 /// Methods that are drawn.
-const METHODS: [&str; 3] = ["fdrm", "best_train", "best_local"];
+const METHODS: [&str; 4] = ["fdrm", "best_train", "best_local", "split_ends"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

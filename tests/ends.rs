@@ -116,9 +116,9 @@ fn split(speed: f64) -> Chain {
         Interface::new(name, law, gap_m).with_damping(damping)
     };
     let stopped_kg = || Arc::new(envelope(vec![0.0, 0.1, 0.8], vec![0.0, 300.0, 900.0]));
-    let rate = |behind, ahead| RateFactor {
+    let rate = |behind, ahead: Option<usize>| RateFactor {
         sensitivity_sqrt_s_per_m: 0.07,
-        share: if ahead == None { 1.0 } else { 0.5 },
+        share: if ahead.is_none() { 1.0 } else { 0.5 },
         behind,
         ahead,
     };
@@ -198,16 +198,16 @@ fn simulate_text(name: &str, text: &str) -> Value {
 const HEAD: &str = "[run]\nduration = \"150ms\"\n[curves]\nnose = { model = \"lead-car-wall.model\" }\n\
     end = { model = \"vehicle-pair.model\" }\nnoses = { model = \"lead-car-pair.model\" }\n";
 
-/// FE's contact force at a training speed, driven by the crush law, gives FE's velocity: within
-/// 1 % in the mean of each group, from contact to 30 ms after the largest crush.
+/// FE's contact force at a training speed, driven by the crush law, gives FE's velocity within 1 %
+/// from contact to 30 ms after the largest crush, from 4.5 km/h against the wall on.
 #[test]
 fn fes_contact_force_gives_fes_velocity() {
     let database = Database::read(&MODELS.path().join("curves.h5")).unwrap();
+    let mut held = 0;
     for (group, mass_t, curve, per_wall) in
         [("lead-car-wall", 24.0, "nose", 1.0), ("vehicle-pair", 20.24, "end", 0.5)]
     {
         let cases = database.group(Path::new("curves.h5"), group).unwrap();
-        let mut sum = 0.0;
         for (i, case) in cases.iter().enumerate() {
             let v = case.speed.m_per_s * per_wall;
             let text = format!(
@@ -235,12 +235,15 @@ fn fes_contact_force_gives_fes_velocity() {
                 off += (p - fe * per_wall).abs();
                 all += (fe * per_wall).abs();
             }
-            eprintln!("{group} {}: {:.2} %", case.name, 100.0 * off / all);
-            sum += off / all;
+            // Below, the whole crush is a few millimetres, and most of the time is rebound.
+            if case.speed.m_per_s * per_wall >= 1.25 {
+                let error = off / all;
+                assert!(error < 0.01, "{group}/{}: {:.2} %", case.name, 100.0 * error);
+                held += 1;
+            }
         }
-        let mean = sum / cases.len() as f64;
-        assert!(mean < 0.01, "{group}: {:.2} %", 100.0 * mean);
     }
+    assert_eq!(held, 7 + 7);
 }
 
 /// Two identical vehicles that meet at twice the speed each load as one does on a wall.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root};
+use crumple::assess::choose::gaps;
 use crumple::assess::validate::{Choice, train, validate};
 use crumple::curve::energy::audit;
 use crumple::curve::loading::unloading_stiffness;
@@ -10,6 +11,7 @@ use crumple::curve::{Case, Curve, DrivingCurve, ForceKind, Masses, Parameter};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::forest::ForestOptions;
+use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, QueryPoint, predict};
 use crumple::unit::{Speed, SpeedKind};
@@ -905,5 +907,46 @@ fn what_drives_a_train_is_the_prediction() {
                 }
             }
         }
+    }
+}
+
+/// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one
+/// is asked for. What is left is the error at the other one, trained with the one that was run.
+#[test]
+fn the_next_run_is_nearly_the_best_of_two() {
+    let folder = tempfile::tempdir().unwrap();
+    for (group, at_most) in [("lead-car-wall", 0.002), ("vehicle-pair", 0.005)] {
+        let database = build_fixture(folder.path(), group);
+        let database = Database::read(&database).unwrap();
+        let cases = database.cases(group);
+        let kinds = [ModelKind::nearest(), ModelKind::linear(), ModelKind::rate()];
+        let validated = |cases: &[Case]| validate(group, cases, &kinds, Some("rate")).unwrap();
+        let error_at = |validation: &Validation, v: f64| {
+            let rows = validation.rows.iter().filter(|row| row.model == "rate");
+            rows.filter(|row| row.speed_m_per_s == v).map(|row| row.force_l1).sum::<f64>()
+        };
+        let whole = validated(cases);
+        let (mut regret, mut pairs) = (0.0, 0);
+        for i in 1..cases.len() - 1 {
+            for j in i + 2..cases.len() - 1 {
+                let without = |k: usize| k != i && k != j;
+                let rest: Vec<Case> =
+                    (0..cases.len()).filter(|&k| without(k)).map(|k| cases[k].clone()).collect();
+                let set = TrainingSet::new(group, &rest).unwrap();
+                let speed = |k: usize| cases[k].speed.m_per_s;
+                // Advice between the two gaps that the two left.
+                let gaps = gaps(&set, &validated(&rest));
+                let of = |k: usize| {
+                    let gap = gaps.iter().find(|gap| gap.holds(speed(k))).unwrap();
+                    gap.expected_force_l1.unwrap_or(0.0)
+                };
+                let (run, other) = if of(i) >= of(j) { (i, j) } else { (j, i) };
+                let left = error_at(&whole, speed(other));
+                regret += left - left.min(error_at(&whole, speed(run)));
+                pairs += 1;
+            }
+        }
+        let mean = regret / f64::from(pairs);
+        assert!(mean <= at_most, "{group}: {:.2} points worse than the best", 100.0 * mean);
     }
 }

@@ -276,7 +276,9 @@ fn the_train_set_is_compared_with_fe() {
     assert!((result["until_s"].as_f64().unwrap() - 0.135).abs() < 1e-3);
     let rows = result["rows"].as_array().unwrap();
     let methods: Vec<&str> = rows.iter().map(|r| r["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["fe_body", "fdrm", "nsdm", "ddtcm", "best_train", "best_local"]);
+    let of_curves = ["fe_body", "fdrm", "nsdm", "ddtcm", "best_train", "best_local"];
+    let of_crush_laws = ["rate_only", "rate_live", "split_ends"];
+    assert_eq!(methods, [&of_curves[..], &of_crush_laws].concat());
     for row in rows {
         let vehicles = row["vehicles"].as_array().unwrap();
         assert_eq!(vehicles.len(), 3);

@@ -63,14 +63,42 @@ pub struct NextRun {
     pub expected_force_l1: Option<f64>,
     /// Why this one, in a sentence.
     pub reason: String,
+    /// The other gaps, those where a run would bring more first.
+    pub other_gaps: Vec<Gap>,
 }
 
-/// Proposes the middle of the gap with the largest expected error.
+/// A gap between two neighbouring training speeds, and what a run in its middle would bring.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Gap {
+    /// The two speeds, in m/s.
+    pub between_m_per_s: (f64, f64),
+    /// Force error expected in the middle, from the errors at the speeds that were left out: what a
+    /// run there would take away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_force_l1: Option<f64>,
+}
+
+impl Gap {
+    /// Whether a speed in m/s lies in it.
+    pub fn holds(&self, speed_m_per_s: f64) -> bool {
+        let (low, high) = self.between_m_per_s;
+        low < speed_m_per_s && speed_m_per_s < high
+    }
+
+    /// The gaps with a known error first, the largest first; without errors the widest in ratio to
+    /// its speeds.
+    fn rank(&self) -> (bool, f64) {
+        let (low, high) = self.between_m_per_s;
+        (self.expected_force_l1.is_some(), self.expected_force_l1.unwrap_or(high / low))
+    }
+}
+
+/// The gaps between training speeds, those where a run would bring most first.
 ///
 /// A left-out speed is predicted over the gap that its absence leaves; the error expected
 /// in the middle of a gap is that of the speeds at its ends, in ratio of the gaps. Gaps at
-/// the ends of the range have one such speed. `None` for fewer than two speeds.
-pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
+/// the ends of the range have one such speed.
+pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
     let mut speeds: Vec<f64> = set.cases.iter().map(|c| c.speed_m_per_s).collect();
     speeds.dedup();
     let error_at = |v: f64| {
@@ -80,27 +108,32 @@ pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
             of_chosen.filter(|r| r.speed_m_per_s == v).map(|r| r.force_l1).collect();
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
     };
-    let expected = |i: usize| -> Option<f64> {
-        let gap = speeds[i + 1] - speeds[i];
+    let gap = |i: usize| {
+        let width = speeds[i + 1] - speeds[i];
         let from = |k: usize| {
             let whole = speeds.get(k + 1)? - speeds[k.checked_sub(1)?];
-            Some(error_at(speeds[k])? * gap / whole)
+            Some(error_at(speeds[k])? * width / whole)
         };
         let ends: Vec<f64> = [from(i), from(i + 1)].into_iter().flatten().collect();
-        (!ends.is_empty()).then(|| ends.iter().sum::<f64>() / ends.len() as f64)
+        Gap {
+            between_m_per_s: (speeds[i], speeds[i + 1]),
+            expected_force_l1: (!ends.is_empty())
+                .then(|| ends.iter().sum::<f64>() / ends.len() as f64),
+        }
     };
-    let score = |i: usize| match expected(i) {
-        Some(error) => (1, error),
-        // Without errors the widest gap in ratio to its speed.
-        None => (0, speeds[i + 1] / speeds[i]),
-    };
-    let gaps = 0..speeds.len().saturating_sub(1);
-    let i = gaps.max_by(|&a, &b| {
-        let (a, b) = (score(a), score(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-    })?;
-    let (low, high) = (speeds[i], speeds[i + 1]);
-    let reason = match expected(i) {
+    let mut gaps: Vec<Gap> = (0..speeds.len().saturating_sub(1)).map(gap).collect();
+    gaps.sort_by(|a, b| {
+        let (a, b) = (a.rank(), b.rank());
+        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+    });
+    gaps
+}
+
+/// Proposes the middle of the first of [`gaps`]. `None` for fewer than two speeds.
+pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
+    let mut gaps = gaps(set, validation).into_iter();
+    let Gap { between_m_per_s: (low, high), expected_force_l1 } = gaps.next()?;
+    let reason = match expected_force_l1 {
         Some(error) => format!(
             "of all gaps between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), judged by the speeds at its ends when they were left out",
             km_per_h(low),
@@ -116,8 +149,9 @@ pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
     Some(NextRun {
         speed_m_per_s: 0.5 * (low + high),
         between_m_per_s: (low, high),
-        expected_force_l1: expected(i),
+        expected_force_l1,
         reason,
+        other_gaps: gaps.collect(),
     })
 }
 

@@ -185,7 +185,17 @@ fn print_group(
     }
     match next {
         Some(next) => {
-            writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)
+            writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+            let then = next.other_gaps.iter().filter_map(|gap| {
+                let (low, high) = gap.between_m_per_s;
+                let error = gap.expected_force_l1? * 100.0;
+                Some(format!("{} to {} ({error:.1} %)", km_per_h(low), km_per_h(high)))
+            });
+            let then: Vec<String> = then.collect();
+            match then.is_empty() {
+                true => Ok(()),
+                false => writeln!(out, "then: {}", then.join(", ")),
+            }
         }
         None => Ok(()),
     }

@@ -7,6 +7,7 @@
 //! first peak of its force; and again, until none changes by 0.1 m/s. Models are asked beyond their largest crush here,
 //! because neighbours push on; the closing speed that rate effects follow is then zero.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::assemble::assemble_at;
@@ -78,6 +79,7 @@ pub(crate) fn assemble(
             speeds_m_per_s[k] += change;
         }
         if largest.0 < CHANGE_M_PER_S {
+            prepared.warnings.extend(slow_interfaces(&prepared, sources));
             return Ok(prepared);
         }
         prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
@@ -97,7 +99,30 @@ pub(crate) fn assemble(
             unsettled.join(", ")
         ));
     }
+    prepared.warnings.extend(slow_interfaces(&prepared, sources));
     Ok(prepared)
+}
+
+/// Advice for every model whose interfaces close below its slowest run: one run there tells what no
+/// model can.
+fn slow_interfaces(prepared: &Prepared, sources: &Sources) -> Vec<String> {
+    let mut slowest: BTreeMap<&str, f64> = BTreeMap::new();
+    for used in &prepared.used {
+        let Some(speed) = used.speed_m_per_s else { continue };
+        let least = slowest.entry(&used.curve).or_insert(speed);
+        *least = least.min(speed);
+    }
+    let advice = |(curve, speed): (&str, f64)| {
+        let (low, _) = sources.model(curve)?.range_m_per_s();
+        (speed < low * (1.0 - 1e-9)).then(|| {
+            format!(
+                "curve \"{curve}\": an interface closes at {}, below its slowest run ({}): one more FE run at about that speed would help most",
+                km_per_h(speed),
+                km_per_h(low)
+            )
+        })
+    };
+    slowest.into_iter().filter_map(advice).collect()
 }
 
 /// Whether a slot's curve depends on its own closing speed: between vehicles, from a model.

@@ -91,6 +91,14 @@ impl Sources {
         }
     }
 
+    /// Makes a model's crush law one without stopped mass, in which the contact force itself has the
+    /// rate.
+    pub(crate) fn forget_stopped_mass(&mut self, curve: &str) {
+        if let Some(CurveSource::Model(model)) = self.curves.get_mut(curve) {
+            model.forget_stopped_mass();
+        }
+    }
+
     /// Puts another source in place of a curve's.
     pub(crate) fn replace(&mut self, curve: &str, source: CurveSource) {
         self.curves.insert(curve.into(), source);

@@ -105,6 +105,16 @@ impl CrushLaw {
         residual_kg.is_finite().then_some(law)
     }
 
+    /// The law that takes the contact force for the crush force, with its own β.
+    pub(super) fn without_stopped_mass(&self, contact: &[CaseCurve]) -> Self {
+        Self {
+            sensitivity: Rate::best_sensitivity(contact),
+            stopped_kg: vec![0.0; self.stopped_kg.len()],
+            forces: Cached::default(),
+            ..self.clone()
+        }
+    }
+
     /// What a fit guarantees and a file might not.
     ///
     /// # Errors
@@ -238,4 +248,70 @@ fn rates_kg_per_m(nodes_m: &[f64], states: &[Vec<(f64, f64)>]) -> Vec<f64> {
     let trace: f64 = (0..n).map(|i| a[i][i]).sum();
     (0..n).for_each(|i| a[i][i] += 1e-12 * trace);
     non_negative(&a, &b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run made by the law: `Q` a wave, β, and 300 kg stopped evenly in the first 100 mm.
+    fn made(speed: f64) -> CaseCurve {
+        const MASS: f64 = 20e3;
+        let (beta, step) = (0.06, 5e-5);
+        let (mut d, mut u, mut stopped) = (0.0_f64, speed, 0.0_f64);
+        let (mut deflection, mut force, mut closing) = (vec![], vec![], vec![]);
+        while u > 0.0 {
+            let rate = if d < 0.1 { 3000.0 } else { 0.0 };
+            let crush = (1.5e6 + 0.6e6 * (25.0 * d).sin()) * (1.0 + beta * u.sqrt());
+            deflection.push(d);
+            force.push(crush + rate * u * u);
+            closing.push(u);
+            // (M − m_s) u du = −F dd
+            let squared = u * u - 2.0 * crush / (MASS - stopped) * step;
+            u = squared.max(0.0).sqrt();
+            stopped += rate * step;
+            d += step;
+        }
+        CaseCurve::new(speed, vec![], deflection, force, closing).unwrap()
+    }
+
+    #[test]
+    fn stopped_mass_and_rate_are_found_again() {
+        let cases = [3.0, 5.0, 8.0, 12.0].map(made);
+        let law = CrushLaw::fit(&cases, 20e3).unwrap();
+        let end = law.stopped_kg[SEGMENTS];
+        assert!((end / 300.0 - 1.0).abs() < 0.03, "{end} kg in all");
+        let half = law.stopped_at(0.05);
+        assert!((half / 150.0 - 1.0).abs() < 0.05, "{half} kg at 50 mm");
+        assert!((law.sensitivity - 0.06).abs() <= 0.006, "{}", law.sensitivity);
+        assert!(law.residual_kg < 10.0, "{} kg", law.residual_kg);
+        // The law at a speed between them, standing.
+        let at = law.at(&cases, 6.5).unwrap();
+        for d in [0.15_f64, 0.2, 0.25, 0.3] {
+            let truth = 1.5e6 + 0.6e6 * (25.0 * d).sin();
+            let found = at.standing_n.force_at(d);
+            assert!((found / truth - 1.0).abs() < 0.03, "{found} N instead of {truth} N at {d} m");
+        }
+    }
+
+    #[test]
+    fn runs_without_stopped_mass_have_none() {
+        let plain = |speed: f64| {
+            let n = 400;
+            let end = speed * speed / 150.0;
+            let d: Vec<f64> = (0..=n).map(|i| end * f64::from(i) / f64::from(n)).collect();
+            let u = d.iter().map(|d| (speed * speed - 150.0 * d).max(0.0).sqrt()).collect();
+            CaseCurve::new(speed, vec![], d.clone(), vec![1.5e6; d.len()], u).unwrap()
+        };
+        let law = CrushLaw::fit(&[5.0, 8.0].map(plain), 20e3).unwrap();
+        assert!(law.stopped_kg[SEGMENTS] < 5.0, "{:?}", law.stopped_kg);
+        assert!(law.sensitivity < 0.01, "{}", law.sensitivity);
+    }
+
+    #[test]
+    fn what_tells_no_law_gives_none() {
+        let silent = CaseCurve::new(5.0, vec![], vec![0.0, 1.0], vec![1e6, 1e6], vec![]).unwrap();
+        assert_eq!(CrushLaw::fit(&[silent.clone(), silent], 20e3), None, "no closing speeds");
+        assert_eq!(CrushLaw::fit(&[made(5.0)], 20e3), None, "one curve");
+    }
 }

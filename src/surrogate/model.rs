@@ -296,6 +296,13 @@ impl Model {
         self.fitted_body.is_some()
     }
 
+    /// Makes its crush law one without stopped mass, in which the contact force itself has the rate.
+    pub(crate) fn forget_stopped_mass(&mut self) {
+        if let Some(law) = &self.crush_law {
+            self.crush_law = Some(law.without_stopped_mass(&self.curves.declared));
+        }
+    }
+
     /// The crush law and its curve at a speed of the model's kind.
     pub(crate) fn crush_curve(&self, speed_m_per_s: f64) -> Option<(&CrushLaw, CrushCurve)> {
         let law = self.crush_law.as_ref()?;

@@ -105,16 +105,38 @@ pub(super) fn methods(
         changed.run.interface_speed = speed;
         add(name, "body force", changed, best.clone(), fit_s);
     }
-    if has_crush_laws(&best, &groups) {
-        add("rate_live", "crush force", with_rates(scenario, &groups), best.clone(), fit_s);
-        add("split_ends", "crush force", with_ends(scenario), best, fit_s);
-    }
+    methods.extend(crush_methods(scenario, &groups, best, fit_s));
     Ok(methods)
 }
 
-/// Whether every model tells its crush law.
-fn has_crush_laws(models: &Sources, groups: &BTreeMap<String, (Case, Vec<Case>)>) -> bool {
-    groups.keys().all(|name| models.model(name).is_some_and(|model| model.crush_law.is_some()))
+/// The methods of the models' crush laws, where every model has one: from the rate alone to two ends
+/// at each vehicle.
+fn crush_methods(
+    scenario: &Scenario,
+    groups: &BTreeMap<String, (Case, Vec<Case>)>,
+    models: Sources,
+    fit_time_s: f64,
+) -> Vec<Method> {
+    let has_law = |name| models.model(name).is_some_and(|model| model.crush_law.is_some());
+    if !groups.keys().all(|name| has_law(name)) {
+        return Vec::new();
+    }
+    let mut without = models.clone();
+    groups.keys().for_each(|name| without.forget_stopped_mass(name));
+    let rates = with_rates(scenario, groups);
+    let of = [
+        ("rate_only", rates.clone(), without),
+        ("rate_live", rates, models.clone()),
+        ("split_ends", with_ends(scenario), models),
+    ];
+    let method = |(name, scenario, sources)| Method {
+        name,
+        driven_by: "crush force",
+        scenario,
+        sources,
+        fit_time_s,
+    };
+    of.map(method).into()
 }
 
 /// The scenario with forces that follow the speeds of its run.
