@@ -16,9 +16,9 @@ use crate::surrogate::crush_law::{CrushCurve, CrushLaw};
 use crate::surrogate::{Model, QueryPoint};
 use crate::unit::SpeedKind;
 
-/// Stiffness and damping between two plates, or a plate and the wall: 20 times as stiff as any end
+/// Stiffness and damping between two plates, or a plate and the wall: ten times as stiff as any end
 /// we have seen, so that little of the crush is theirs, and damped enough not to ring.
-const PLATES_N_PER_M: f64 = 1e10;
+const PLATES_N_PER_M: f64 = 5e9;
 const PLATES_N_S_PER_M: f64 = 3e5;
 
 /// A crush force as the chain takes it, with what must be said of it.

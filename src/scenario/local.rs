@@ -62,23 +62,8 @@ pub(crate) fn assemble(
         }
         let failed = |source| ScenarioError::Local { place: prepared.place_of(&source), source };
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
-        let mut largest = (0.0, 0);
-        for k in (0..own.len()).filter(|&k| own[k]) {
-            let Some(closing) = closing_speed(&prepared.chain, &run, k) else {
-                before[k] = 0.0;
-                continue;
-            };
-            let mut change = closing.max(SLOWEST_M_PER_S) - speeds_m_per_s[k];
-            if f64::abs(change) > largest.0 {
-                largest = (f64::abs(change), k);
-            }
-            if change * before[k] < 0.0 {
-                change *= RELAXATION;
-            }
-            before[k] = change;
-            speeds_m_per_s[k] += change;
-        }
-        if largest.0 < CHANGE_M_PER_S {
+        let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
+        if largest < CHANGE_M_PER_S {
             prepared.warnings.extend(slow_interfaces(&prepared, sources));
             return Ok(prepared);
         }
@@ -101,6 +86,32 @@ pub(crate) fn assemble(
     }
     prepared.warnings.extend(slow_interfaces(&prepared, sources));
     Ok(prepared)
+}
+
+/// Takes the closing speeds of a run for the interfaces with curves of their `own`; `before` holds the
+/// last changes. The largest change in m/s.
+fn follow(
+    chain: &Chain,
+    run: &Run,
+    own: &[bool],
+    speeds_m_per_s: &mut [f64],
+    before: &mut [f64],
+) -> f64 {
+    let mut largest: f64 = 0.0;
+    for k in (0..own.len()).filter(|&k| own[k]) {
+        let Some(closing) = closing_speed(chain, run, k) else {
+            before[k] = 0.0;
+            continue;
+        };
+        let mut change = closing.max(SLOWEST_M_PER_S) - speeds_m_per_s[k];
+        largest = largest.max(change.abs());
+        if change * before[k] < 0.0 {
+            change *= RELAXATION;
+        }
+        before[k] = change;
+        speeds_m_per_s[k] += change;
+    }
+    largest
 }
 
 /// Advice for every model whose interfaces close below its slowest run: one run there tells what no
