@@ -85,7 +85,7 @@ pub enum DatasetError {
     /// There is no case.
     #[error("the group is empty: build it first")]
     Empty,
-    /// Two cases cannot be told apart by speed and parameters, but were measured differently.
+    /// Two cases of one speed and parameters were measured differently.
     #[error(
         "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}"
     )]
@@ -277,12 +277,11 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
     Ok(features)
 }
 
-/// Runs of equal features.
+/// Features, and the runs that have them.
 type Runs<'a> = (Vec<f64>, Vec<&'a Case>);
 
-/// The cases, which stand in order of their names, with those together that differ in nothing that
-/// a model could see: their speeds are within 0.1 %, so that a difference of their curves is
-/// scatter and not a matter of speed.
+/// The cases, with those together that differ in nothing that a model could see: their speeds are
+/// within 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
 fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, DatasetError> {
     let mut cases = cases.to_vec();
     cases.sort_by(|a, b| a.speed.m_per_s.total_cmp(&b.speed.m_per_s));
@@ -296,10 +295,9 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
             None => found.push((values, vec![case])),
             Some((_, runs)) if runs[0].is_measured_as(case) => runs.push(case),
             Some((_, runs)) => {
-                let (parameters, hint) = match features.is_empty() {
-                    true => ("", ", or tell them apart by parameters = { … } in the manifest"),
-                    false => (" and parameters", ""),
-                };
+                let hint = ", or tell them apart by parameters = { … } in the manifest";
+                let alone = features.is_empty();
+                let (parameters, hint) = if alone { ("", hint) } else { (" and parameters", "") };
                 return Err(DatasetError::EqualSpeeds {
                     first: runs[0].name.clone(),
                     second: case.name.clone(),
@@ -472,6 +470,11 @@ impl TrainingCase {
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
             case: Arc::new(case),
         })
+    }
+
+    /// Time by the clock that the solver took for all of its runs, in s.
+    pub(crate) fn solver_time_s(&self) -> Option<f64> {
+        Some(self.case.solver_wall_time_s? * self.runs.len() as f64)
     }
 
     /// What cases are ordered by.

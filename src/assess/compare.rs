@@ -114,7 +114,7 @@ pub fn compare(
     let speed = case.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
     let fixed_case: &Case = &fixed.case;
-    let times = rest.cases.iter().map(|c| c.case.solver_wall_time_s);
+    let times = rest.cases.iter().map(TrainingCase::solver_time_s);
     let training_time_s: Option<f64> =
         times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
     let rows = RowBuilder { reference, fe_time_s: case.solver_wall_time_s, training_time_s };
@@ -126,7 +126,8 @@ pub fn compare(
     compared.push(rows.row(methods::fdrm(&left_out, fixed, fixed_case))?);
     let mut report = None;
     if settings.nsdm_seeds > 0 {
-        let fitted = methods::fit_nsdm(fixed_case, settings)?;
+        let mut fitted = methods::fit_nsdm(fixed_case, settings)?;
+        fitted.training_s = fixed.solver_time_s();
         compared.push(rows.of_nsdm(&fitted)?);
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }

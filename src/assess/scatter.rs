@@ -43,7 +43,8 @@ struct Apart {
 
 fn at_speed(mean: &TrainingCase, cases: &[Case]) -> Option<SpeedScatter> {
     let motion = Reference::of(&mean.case).ok()?;
-    let runs = cases.iter().filter(|case| mean.runs.contains(&case.name));
+    // In their own order, so that the order of the cases changes no sum.
+    let runs = mean.runs.iter().filter_map(|name| cases.iter().find(|case| case.name == *name));
     let apart: Vec<Apart> = runs.map(|run| apart(run, mean, &motion)).collect::<Option<_>>()?;
     let n = apart.len() as f64;
     let over = |of: fn(&Apart) -> f64| apart.iter().map(of).sum::<f64>() / (n - 1.0);

@@ -53,8 +53,8 @@ pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, CurveError
     of.closing_speed_m_per_s = mean_over_time(&speeds, sampled.time_s());
     of.sampled = sampled;
     of.original = mean_curve(&runs, |run| &run.original)?;
-    // All of them had to be run.
-    of.solver_wall_time_s = runs.iter().map(|run| run.solver_wall_time_s).sum();
+    let times: Option<f64> = runs.iter().map(|run| run.solver_wall_time_s).sum();
+    of.solver_wall_time_s = times.map(|sum| sum / runs.len() as f64);
     of.unloading_stiffness_n_per_m =
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
     of.audit = EnergyAudit {
