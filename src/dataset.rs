@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use linfa::Dataset;
 use ndarray::{Array1, Array2};
@@ -9,14 +10,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::curve::body::{BodyMotion, body_motion};
 use crate::curve::loading::loading_branch;
+use crate::curve::replicates::mean_of;
 use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
-/// One case as models see it.
+/// One case as models see it: a run, or the mean of runs that differ in nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingCase {
     /// Name of the case.
     pub name: String,
+    /// Names of the runs that it is the mean of; one as a rule.
+    pub runs: Vec<String>,
+    /// With its records over time.
+    pub case: Arc<Case>,
     /// Speed before contact, in m/s, of the set's kind.
     pub speed_m_per_s: f64,
     /// Values of the set's [`features`](TrainingSet::features).
@@ -33,8 +39,6 @@ pub struct TrainingCase {
     pub truncated: bool,
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Hash over the case's recipe, entry and sources.
-    pub fingerprint: String,
 }
 
 /// A column of the table besides speed and deflection: a number, or whether the case is of
@@ -56,7 +60,7 @@ pub(crate) const OTHER_MASS: &str = "other_mass_kg";
 /// The cases of one group.
 ///
 /// Invariant: at least one case, in order of speed, then features; no two cases equal in
-/// both; one kind of speed and force.
+/// both, since runs that are so enter as their mean; one kind of speed and force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingSet {
     /// Name of the group.
@@ -81,9 +85,9 @@ pub enum DatasetError {
     /// There is no case.
     #[error("the group is empty: build it first")]
     Empty,
-    /// Two cases cannot be told apart by speed and parameters.
+    /// Two cases of one speed and parameters were measured differently.
     #[error(
-        "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}: keep one of them{hint}"
+        "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}"
     )]
     EqualSpeeds {
         /// Name of the one case.
@@ -273,6 +277,41 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
     Ok(features)
 }
 
+/// Features, and the runs that have them.
+type Runs<'a> = (Vec<f64>, Vec<&'a Case>);
+
+/// The cases, with those together that differ in nothing that a model could see: their speeds are
+/// within 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
+fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, DatasetError> {
+    let mut cases = cases.to_vec();
+    cases.sort_by(|a, b| a.speed.m_per_s.total_cmp(&b.speed.m_per_s));
+    let mut found: Vec<Runs<'a>> = Vec::new();
+    for case in cases {
+        let values = feature_values(features, &parameters(case))?;
+        let is_like = |(of, runs): &&mut Runs<'a>| {
+            *of == values && is_same_speed(case.speed.m_per_s, runs[0].speed.m_per_s)
+        };
+        match found.iter_mut().rev().find(is_like) {
+            None => found.push((values, vec![case])),
+            Some((_, runs)) if runs[0].is_measured_as(case) => runs.push(case),
+            Some((_, runs)) => {
+                let hint = ", or tell them apart by parameters = { … } in the manifest";
+                let alone = features.is_empty();
+                let (parameters, hint) = if alone { ("", hint) } else { (" and parameters", "") };
+                return Err(DatasetError::EqualSpeeds {
+                    first: runs[0].name.clone(),
+                    second: case.name.clone(),
+                    speed: km_per_h(case.speed.m_per_s),
+                    parameters,
+                    hint,
+                });
+            }
+        }
+    }
+    found.iter_mut().for_each(|(_, runs)| runs.sort_by(|a, b| a.name.cmp(&b.name)));
+    Ok(found)
+}
+
 /// Which points of the cases make the table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -349,30 +388,17 @@ impl TrainingSet {
         of_one_kind(cases.iter().copied())?;
         cases.sort_by(|a, b| a.name.cmp(&b.name));
         let features = features(&cases)?;
-        let mut training = cases
-            .iter()
-            .map(|case| TrainingCase::new(case, &features))
+        let mut training = replicates(&cases, &features)?
+            .into_iter()
+            .map(|(features, runs)| TrainingCase::new(&runs, features))
             .collect::<Result<Vec<_>, _>>()?;
         // By values, so that names and the order of the cases change nothing.
         training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
-        if let Some(pair) = training.windows(2).find(|w| w[0].is_like(&w[1])) {
-            let (parameters, hint) = match features.is_empty() {
-                true => ("", ", or tell them apart by parameters = { … } in the manifest"),
-                false => (" and parameters", ""),
-            };
-            return Err(DatasetError::EqualSpeeds {
-                first: pair[0].name.clone(),
-                second: pair[1].name.clone(),
-                speed: km_per_h(pair[0].speed_m_per_s),
-                parameters,
-                hint,
-            });
-        }
         Ok(Self {
             group: group.into(),
             speed_kind: first.speed.kind,
             force_kind: first.force_kind,
-            masses: cases.iter().find(|c| c.name == training[0].name).unwrap_or(&first).masses,
+            masses: training[0].case.masses,
             units: first.units().filter(|u| cases.iter().all(|c| c.units() == Some(*u))),
             features,
             cases: training,
@@ -383,7 +409,7 @@ impl TrainingSet {
     pub(crate) fn hash(&self) -> String {
         let mut hash = blake3::Hasher::new();
         for case in &self.cases {
-            hash.update(case.fingerprint.as_bytes());
+            hash.update(case.case.fingerprint.as_bytes());
         }
         hash.finalize().to_hex().to_string()
     }
@@ -425,28 +451,30 @@ impl TrainingSet {
 }
 
 impl TrainingCase {
-    fn new(case: &Case, features: &[Feature]) -> Result<Self, DatasetError> {
+    /// The mean of `runs`, of which there is one at least.
+    fn new(runs: &[&Case], features: Vec<f64>) -> Result<Self, DatasetError> {
+        let no_motion = || DatasetError::NoMotion { name: runs[0].name.clone() };
+        let case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
         let named = |source| DatasetError::Envelope { name: case.name.clone(), source };
-        let motion =
-            body_motion(case).ok_or_else(|| DatasetError::NoMotion { name: case.name.clone() })?;
+        let motion = body_motion(&case).ok_or_else(no_motion)?;
         Ok(Self {
             name: case.name.clone(),
+            runs: runs.iter().map(|run| run.name.clone()).collect(),
             speed_m_per_s: case.speed.m_per_s,
-            features: feature_values(features, &parameters(case))?,
+            features,
             effective_mass_kg: case.masses.effective_kg(),
             motion,
             envelope: loading_branch(&case.original).map_err(named)?.envelope,
             sampled: loading_branch(&case.sampled).map_err(named)?.envelope,
             truncated: case.is_truncated(),
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
-            fingerprint: case.fingerprint.clone(),
+            case: Arc::new(case),
         })
     }
 
-    /// Whether two cases differ in nothing that a model could see: their speeds are within
-    /// 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
-    fn is_like(&self, other: &Self) -> bool {
-        self.features == other.features && is_same_speed(self.speed_m_per_s, other.speed_m_per_s)
+    /// Time by the clock that the solver took for all of its runs, in s.
+    pub(crate) fn solver_time_s(&self) -> Option<f64> {
+        Some(self.case.solver_wall_time_s? * self.runs.len() as f64)
     }
 
     /// What cases are ordered by.

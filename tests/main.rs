@@ -33,6 +33,7 @@ mod plots;
 mod rating;
 mod readers;
 mod readme;
+mod replicates;
 mod report;
 mod samples;
 mod slurm;

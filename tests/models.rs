@@ -21,7 +21,7 @@ const GROUPS: [&str; 3] = ["lead-car-pair", "lead-car-wall", "vehicle-pair"];
 
 /// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and thrown back on a line of
 /// 100 MN/m; 400 states each 0.75 ms.
-fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Case {
+pub fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Case {
     let (mut d, mut speed, mut largest) = (0.0_f64, v, 0.0_f64);
     let (mut time, mut deflection, mut forces, mut speeds) = (vec![], vec![], vec![], vec![]);
     let step = 0.75e-3 / 150.0;
@@ -74,16 +74,16 @@ fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Ca
 }
 
 /// Rises in 0.1 m, then a hump; stronger at speed.
-fn law(d: f64, speed: f64) -> f64 {
+pub fn law(d: f64, speed: f64) -> f64 {
     let hump = (-((d - 0.4) / 0.08).powi(2)).exp();
     (2e6 * (d / 0.1).min(1.0) + 1e6 * hump) * (1.0 + 0.01 * speed)
 }
 
-fn family(speeds: &[f64]) -> Vec<Case> {
+pub fn family(speeds: &[f64]) -> Vec<Case> {
     speeds.iter().map(|&v| case(&format!("v{v}"), v, 24e3, &law)).collect()
 }
 
-fn all_kinds() -> Vec<ModelKind> {
+pub fn all_kinds() -> Vec<ModelKind> {
     let small = |options: ForestOptions| ForestOptions { trees: 20, ..options };
     ModelKind::all(0).into_iter().map(|kind| kind.with_forest(small)).collect()
 }
@@ -472,8 +472,15 @@ fn cases_that_are_no_training_set() {
         assert!(error.contains(expected), "{error}\nlacks: {expected}");
     }
     t(&[], "the group is empty");
-    let two = || vec![case("a", 8.0, 24e3, &law), case("b", 8.0, 24e3, &law)];
-    t(&two(), "cases \"a\" and \"b\" have the same speed 28.8 km/h: keep one of them, or tell");
+    let two = || {
+        let mut two = vec![case("a", 8.0, 24e3, &law), case("b", 8.0, 24e3, &law)];
+        two[1].recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
+        two
+    };
+    t(
+        &two(),
+        "cases \"a\" and \"b\" have the same speed 28.8 km/h, but different recipes, so that they are no replicates: keep one of them, or tell them apart by parameters",
+    );
     let mut near = two();
     near[1].speed.m_per_s *= 1.0005;
     t(&near, "have the same speed");
@@ -482,7 +489,7 @@ fn cases_that_are_no_training_set() {
     same[0].parameters = angle();
     t(&same, "case \"b\" has no parameter \"angle_deg\", which case \"a\" has");
     same[1].parameters = angle();
-    t(&same, "have the same speed 28.8 km/h: keep one");
+    t(&same, "have the same speed 28.8 km/h, but different recipes");
     let name = || Parameter::Category("steep".into());
     same[1].parameters = BTreeMap::from([("angle_deg".into(), name())]);
     t(&same, "\"angle_deg\" is a number in case \"a\" and a category in case \"b\"");
@@ -685,7 +692,7 @@ fn validate_prints_and_tells_what_to_run_next() {
 }
 
 /// A database of made cases.
-fn database_of(path: &std::path::Path, groups: &[(&str, Vec<Case>)]) {
+pub fn database_of(path: &std::path::Path, groups: &[(&str, Vec<Case>)]) {
     let mut database = Database::default();
     for (group, cases) in groups {
         for case in cases {

@@ -109,15 +109,12 @@ pub fn compare(
     settings: &ComparisonSettings,
 ) -> Result<Comparison, CompareError> {
     let set = TrainingSet::new(group, cases)?;
-    let left_out = left_out_at(speed_m_per_s, &set, cases)?;
+    let left_out = left_out_at(speed_m_per_s, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
     let speed = case.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
-    let find = |name: &str| {
-        cases.iter().find(|c| c.name == name).expect("a training set is made of the group's cases")
-    };
-    let fixed_case = find(&fixed.name);
-    let times = rest.cases.iter().map(|c| find(&c.name).solver_wall_time_s);
+    let fixed_case: &Case = &fixed.case;
+    let times = rest.cases.iter().map(TrainingCase::solver_time_s);
     let training_time_s: Option<f64> =
         times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
     let rows = RowBuilder { reference, fe_time_s: case.solver_wall_time_s, training_time_s };
@@ -129,7 +126,8 @@ pub fn compare(
     compared.push(rows.row(methods::fdrm(&left_out, fixed, fixed_case))?);
     let mut report = None;
     if settings.nsdm_seeds > 0 {
-        let fitted = methods::fit_nsdm(fixed_case, settings)?;
+        let mut fitted = methods::fit_nsdm(fixed_case, settings)?;
+        fitted.training_s = fixed.solver_time_s();
         compared.push(rows.of_nsdm(&fitted)?);
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
@@ -159,7 +157,6 @@ pub fn compare(
 fn left_out_at<'a>(
     speed_m_per_s: f64,
     set: &'a TrainingSet,
-    cases: &'a [Case],
 ) -> Result<LeftOutCase<'a>, CompareError> {
     let index = set
         .cases
@@ -170,7 +167,7 @@ fn left_out_at<'a>(
     if set.cases.len() < 3 {
         return Err(too_few);
     }
-    match LeftOutCase::new(set, cases, index) {
+    match LeftOutCase::new(set, index) {
         Ok(left_out) if left_out.rest.cases.len() < 2 => Err(too_few),
         Ok(left_out) => Ok(left_out),
         Err(NotLeftOut::Truncated { case }) => Err(CompareError::Truncated { case }),

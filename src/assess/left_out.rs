@@ -40,7 +40,7 @@ pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
 pub(crate) struct LeftOutCase<'a> {
     /// As the training set has it.
     pub own: &'a TrainingCase,
-    /// As the database has it.
+    /// Its records: a run, or the mean of the runs that it stands for.
     pub case: &'a Case,
     /// The training set without the cases of its speed.
     pub rest: TrainingSet,
@@ -53,20 +53,13 @@ pub(crate) struct LeftOutCase<'a> {
 }
 
 impl<'a> LeftOutCase<'a> {
-    /// Leaves out all cases of the speed of the set's case `index`, which is one of `cases`.
+    /// Leaves out all cases of the speed of the set's case `index`.
     ///
     /// # Errors
     /// [`NotLeftOut`] if it cannot be compared with.
-    pub(crate) fn new(
-        set: &'a TrainingSet,
-        cases: &'a [Case],
-        index: usize,
-    ) -> Result<Self, NotLeftOut> {
+    pub(crate) fn new(set: &'a TrainingSet, index: usize) -> Result<Self, NotLeftOut> {
         let own = &set.cases[index];
-        let case = cases
-            .iter()
-            .find(|c| c.name == own.name)
-            .expect("a training set is made of the group's cases");
+        let case: &Case = &own.case;
         let name = || own.name.clone();
         if own.truncated {
             return Err(NotLeftOut::Truncated { case: name() });
@@ -178,7 +171,8 @@ impl<'a> LeftOutCase<'a> {
                 let first = curve.deflection_m[1];
                 let from = along.iter().position(|&d| d >= first).unwrap_or(0);
                 let ratios = band::ratios(&reference, &predicted).split_off(from);
-                Residuals { span_m_per_s: self.span_m_per_s, ratios }
+                let runs = self.own.runs.len();
+                Residuals { span_m_per_s: self.span_m_per_s, ratios, runs }
             },
             body: driven_by(ForceKind::Body)?,
             contact: match curve.body_force_n {

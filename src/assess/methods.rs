@@ -79,7 +79,7 @@ pub(super) fn fdrm(left_out: &LeftOutCase<'_>, fixed: &TrainingCase, of: &Case) 
         made_from: fe_at(fixed.speed_m_per_s),
         curve: of_recipe(fixed, of.force_kind),
         forces: (left_out.own.envelope.clone(), fixed.envelope.clone()),
-        times: Times { training_s: of.solver_wall_time_s, ..Times::default() },
+        times: Times { training_s: fixed.solver_time_s(), ..Times::default() },
     }
 }
 

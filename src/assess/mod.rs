@@ -8,6 +8,7 @@ pub(crate) mod left_out;
 mod methods;
 pub mod reference;
 mod row;
+mod scatter;
 pub(crate) mod settings;
 pub mod train;
 pub mod validate;

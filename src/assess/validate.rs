@@ -15,11 +15,12 @@ use serde::Serialize;
 use super::choose::{NextRun, choose};
 use super::error::ValidateError;
 use super::left_out::{LeftOutCase, Trial, query_of};
+use super::scatter::scatter;
 use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind, predict};
 
@@ -137,7 +138,7 @@ pub fn validate(
 ) -> Result<Validation, ValidateError> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, mut notes) = those_that_fit(&set, candidates);
-    let left_out = match left_out_cases(&set, cases) {
+    let left_out = match left_out_cases(&set) {
         Ok((left_out, more)) => {
             notes.extend(more);
             left_out
@@ -147,6 +148,7 @@ pub fn validate(
             Vec::new()
         }
     };
+    let scatter = scatter(&set, cases);
     let mut floors = Vec::new();
     for case in &left_out {
         match case.floors() {
@@ -162,7 +164,7 @@ pub fn validate(
     let (mut rows, mut means, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
     for kind in &fitting {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.model == kind.name()).collect();
-        let Some(table) = ModelTable::of(kind, &own) else { continue };
+        let Some(table) = ModelTable::of(kind, &own, scatter.as_ref()) else { continue };
         notes.extend(table.failures);
         match mean(kind.name(), table.rule, &table.rows) {
             Some(of) if of.speeds < inner_speeds => notes.push(without_means(kind.name())),
@@ -176,11 +178,22 @@ pub fn validate(
         None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
     };
     let band_of = |left_out: LeftOutSpeeds| {
-        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?)
+        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?, scatter.as_ref())
     };
     let (band, band_outside) = (band_of(LeftOutSpeeds::Inner), band_of(LeftOutSpeeds::Ends));
     let group = group.into();
-    Ok(Validation { group, chosen, reason, rows, means, floors, band, band_outside, notes })
+    Ok(Validation {
+        group,
+        chosen,
+        reason,
+        rows,
+        means,
+        floors,
+        scatter,
+        band,
+        band_outside,
+        notes,
+    })
 }
 
 /// The candidates that can be fitted to the set, and why the others cannot.
@@ -199,10 +212,7 @@ fn those_that_fit(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind
 ///
 /// # Errors
 /// Says why no speed can be left out.
-fn left_out_cases<'a>(
-    set: &'a TrainingSet,
-    cases: &'a [Case],
-) -> Result<(Vec<LeftOutCase<'a>>, Vec<String>), String> {
+fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String>), String> {
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let found = speeds.len();
@@ -212,7 +222,7 @@ fn left_out_cases<'a>(
     }
     let (mut left_out, mut notes) = (Vec::new(), Vec::new());
     for index in 0..set.cases.len() {
-        match LeftOutCase::new(set, cases, index) {
+        match LeftOutCase::new(set, index) {
             Ok(case) => left_out.push(case),
             Err(error) => notes.push(error.to_string()),
         }
@@ -231,7 +241,7 @@ struct ModelTable {
 
 impl ModelTable {
     /// `None` without any trial.
-    fn of(kind: &ModelKind, trials: &[&Trial]) -> Option<Self> {
+    fn of(kind: &ModelKind, trials: &[&Trial], scatter: Option<&Scatter>) -> Option<Self> {
         let rule = best_rule(kind, trials)?;
         let mut rows = Vec::new();
         let mut residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>> = BTreeMap::new();
@@ -244,7 +254,7 @@ impl ModelTable {
         for row in &mut rows {
             let left_out = LeftOutSpeeds::of(row.inner);
             let i = index.entry(left_out).or_default();
-            row.coverage = band::coverage(left_out, &residuals[&left_out], *i);
+            row.coverage = band::coverage(left_out, &residuals[&left_out], *i, scatter);
             *i += 1;
         }
         let failures = trials.iter().filter_map(|t| t.failure(rule)).collect();
@@ -278,7 +288,7 @@ pub fn add_nested(
         return Ok(());
     }
     // Cases that cannot be left out have been noted.
-    let (mut left_out, _) = left_out_cases(&set, cases).unwrap_or_default();
+    let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials: Vec<Trial> = left_out
         .par_iter()

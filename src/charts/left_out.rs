@@ -5,7 +5,7 @@ use crate::assess::error::ValidateError;
 use crate::assess::reference::{MotionError, Reference};
 use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, ForceKind};
-use crate::dataset::is_same_speed;
+use crate::dataset::{TrainingSet, is_same_speed};
 use crate::plot::Chart;
 use crate::surrogate::{PredictError, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
@@ -46,7 +46,10 @@ pub fn left_out_at(
     choice: Choice,
 ) -> Result<Chart, LeftOutError> {
     let is_that = |case: &&Case| is_same_speed(case.speed.m_per_s, speed_m_per_s);
-    let Some(case) = cases.iter().find(is_that) else {
+    let set = TrainingSet::new(group, cases).map_err(ValidateError::from)?;
+    // Several runs of that speed are one case, their mean.
+    let mut own = set.cases.iter().map(|own| &*own.case);
+    let Some(case) = own.find(is_that) else {
         let speeds: Vec<String> = cases.iter().map(|c| km_per_h(c.speed.m_per_s)).collect();
         let known = speeds.join(", ");
         return Err(LeftOutError::NoSuchSpeed { group: group.into(), speed_m_per_s, known });

@@ -237,6 +237,14 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
             band.level * 100.0,
             rests_on(band, provenance.in_range)
         )?;
+        if let Some(scatter) = band.scatter {
+            writeln!(
+                out,
+                "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
+                band.interpolation_share() * 100.0,
+                scatter.pointwise_share * 100.0
+            )?;
+        }
     }
     writeln!(
         out,

@@ -9,10 +9,12 @@ use crumple::assess::error::ValidateError;
 use crumple::assess::validate::{GroupReport, Report, add_nested, validate};
 use crumple::curve::Case;
 use crumple::database::Database;
-use crumple::dataset::TrainingSet;
+use crumple::dataset::{TrainingSet, is_same_speed};
 use crumple::surrogate::ModelKind;
 use crumple::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
-use crumple::surrogate::leave_one_out::{Floor, LeftOut, Means, PeakError, Validation};
+use crumple::surrogate::leave_one_out::{
+    Floor, LeftOut, Means, PeakError, Scatter, SpeedScatter, Validation,
+};
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::unit::km_per_h;
 
@@ -33,7 +35,9 @@ multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to
 largest crush. The means are over inner speeds; the ends of the range are extrapolation and stand
 apart. FE contact (floor) is FE's own contact force in that run: no prediction of that force
 can be expected to do better. FE body (check) is made from FE's own speeds, and only checks curve,
-force law and run. forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
+force law and run. FE scatter (floor) is how far a run lies from the mean of several at its speed,
+which stands for them: no model can remove this part of an error, though the mean over n runs has
+only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
 model and rule chosen without the speed that is left out.")]
 pub struct Args {
     /// Curve database
@@ -165,6 +169,7 @@ fn print_group(
             .filter(|r| r.inner == inner)
             .map(|r| row(r, &validation.chosen))
             .chain(validation.floors.iter().filter(|f| f.inner == inner).map(floor))
+            .chain(scatter_rows(validation, inner))
             .collect();
         if !rows.is_empty() {
             writeln!(out, "\n{}: {title}", validation.group)?;
@@ -265,14 +270,58 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
             .iter()
             .map(|m| means(m, &validation.chosen))
             .chain(["contact", "body"].iter().filter_map(|f| mean_floor(validation, f)))
+            .chain(validation.scatter.as_ref().map(mean_scatter))
             .collect();
         output::table(out, &heading, &rows)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
+    if let Some(scatter) = &validation.scatter {
+        writeln!(out, "{group}: {}", scatter_line(scatter))?;
+    }
     for band in [&validation.band, &validation.band_outside].into_iter().flatten() {
         writeln!(out, "{group}: {}", band_line(band))?;
     }
     Ok(())
+}
+
+/// What the rows of the scatter are called.
+const SCATTER: &str = "FE scatter (floor)";
+
+/// The scatter at the speeds that have several runs and rows of models, inner or not.
+fn scatter_rows(validation: &Validation, inner: bool) -> impl Iterator<Item = Vec<String>> + '_ {
+    let is_in_table = move |at: &&SpeedScatter| {
+        let mut rows = validation.rows.iter().filter(|row| row.inner == inner);
+        rows.any(|row| is_same_speed(row.speed_m_per_s, at.speed_m_per_s))
+    };
+    validation.scatter.iter().flat_map(|of| &of.speeds).filter(is_in_table).map(|at| {
+        let mut cells = vec![SCATTER.into(), km_per_h(at.speed_m_per_s), percent(at.force_l1)];
+        cells.extend(["-"; 4].map(String::from));
+        cells.push(percent(at.velocity_l1));
+        cells.extend(["-"; 2].map(String::from));
+        cells
+    })
+}
+
+/// The scatter beside the means, pooled over the speeds that have several runs.
+fn mean_scatter(scatter: &Scatter) -> Vec<String> {
+    let mut cells = vec![SCATTER.into(), percent(scatter.force_l1)];
+    cells.extend(["-"; 6].map(String::from));
+    cells.push(percent(scatter.velocity_l1));
+    cells.push("-".into());
+    cells
+}
+
+/// How far equal runs lie from their mean.
+fn scatter_line(scatter: &Scatter) -> String {
+    let at = |at: &SpeedScatter| {
+        format!("{} at {}", counted(at.runs.len(), "run"), km_per_h(at.speed_m_per_s))
+    };
+    format!(
+        "scatter of {}: force {}, velocity {}: no model can remove this part",
+        scatter.speeds.iter().map(at).collect::<Vec<_>>().join(", "),
+        percent(scatter.force_l1),
+        percent(scatter.velocity_l1)
+    )
 }
 
 /// A band of the validation, with the span that it is stated for.
@@ -293,8 +342,16 @@ fn band_line(band: &Band) -> String {
         Some(share) => format!("covers {} of the points of the others left out", percent(share)),
         None => format!("one {of} cannot be checked against others"),
     };
+    let parts = match band.scatter {
+        Some(scatter) => format!(
+            " (interpolation ±{}, scatter of equal runs ±{}, which no gap changes)",
+            percent(band.interpolation_share()),
+            percent(scatter.pointwise_share)
+        ),
+        None => String::new(),
+    };
     format!(
-        "band ±{} of the local force {place}; empirical range for {:.0} %, from {}; {coverage}",
+        "band ±{} of the local force{parts} {place}; empirical range for {:.0} %, from {}; {coverage}",
         percent(band.pointwise_share),
         band.level * 100.0,
         counted(band.curves, of)

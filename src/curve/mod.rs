@@ -12,6 +12,7 @@ pub mod from_table;
 pub mod loading;
 pub(crate) mod made_of;
 pub mod recipe;
+pub(crate) mod replicates;
 pub mod retrace;
 
 use std::collections::BTreeMap;

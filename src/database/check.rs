@@ -343,8 +343,13 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
         Findings { group, case, list }.add(code, None, None, message);
     };
     for pair in cases.windows(2) {
-        if pair[0].speed == pair[1].speed && pair[0].parameters == pair[1].parameters {
-            let message = format!("has the same speed as {}", pair[0].name);
+        let (one, other) = (&pair[0], &pair[1]);
+        let is_like = one.speed == other.speed
+            && one.masses == other.masses
+            && one.parameters == other.parameters;
+        // Equal runs of one recipe are replicates.
+        if is_like && !one.is_measured_as(other) {
+            let message = format!("has the same speed as {}, but another recipe", one.name);
             add(&pair[1].name, "equal_speeds", message);
         }
     }

@@ -151,6 +151,13 @@ impl Validated<'_> {
             parts.push(Part::Table(self.models()));
         }
         parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
+        if let Some(scatter) = &validation.scatter {
+            parts.push(Part::Text(format!(
+                "Equal runs lie apart by {} in force and {} in velocity: no model can remove this part of its errors.",
+                percent(scatter.force_l1),
+                percent(scatter.velocity_l1)
+            )));
+        }
         for note in &validation.notes {
             content.warn(format!("{group}: {note}"));
         }
@@ -260,6 +267,10 @@ impl Validated<'_> {
                 ),
                 format!("±{} of the local force", percent(band.pointwise_share)),
             ));
+            if let Some(scatter) = &band.scatter {
+                let name = "part of it from scatter between equal runs".to_string();
+                rows.push((name, format!("±{}", percent(scatter.pointwise_share))));
+            }
         }
         parts.push(Part::Table(Table {
             caption: "The curve".into(),

@@ -9,6 +9,10 @@
 //! training speeds around it; at a training speed, the wider of the two gaps beside it. A left-out speed lies in the
 //! middle of its gap, so it does not tell how fast errors fall towards the gap's ends.
 //!
+//! Where speeds have several runs, their scatter is a part of its own: what a single run differs from the mean of its
+//! like by no gap can change. A left-out residual is that of interpolation plus the scatter of the runs it is measured
+//! against, of n the n-th part, which is taken off its square; the half width is the root of the squares of both parts.
+//!
 //! Outside the training speeds, the two ends that were left out tell, in proportion to the distance. Further outside than
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
 //! interfaces close far more slowly than any run by itself.
@@ -16,6 +20,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::leave_one_out::Scatter;
 use crate::dataset::is_same_speed;
 
 /// The level that bands are made for.
@@ -82,10 +87,39 @@ pub struct Band {
     pub pointwise_share: f64,
     /// Half width that the whole curve keeps to.
     pub simultaneous_share: f64,
+    /// The part of both that comes from the scatter between equal runs, whatever the span; the
+    /// squares of it and of the error of interpolation add. Absent without such runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<ScatterWidths>,
     /// Share of the left-out points inside the band that the other curves give over the same
     /// span; `None` with fewer than two curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
+}
+
+/// Half widths that the scatter between equal runs gives by itself: Student's t times its root mean
+/// square.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScatterWidths {
+    /// As of [`Band::pointwise_share`].
+    pub pointwise_share: f64,
+    /// As of [`Band::simultaneous_share`].
+    pub simultaneous_share: f64,
+}
+
+impl ScatterWidths {
+    fn of(scatter: &Scatter) -> Option<Self> {
+        let t = student_t(scatter.degrees_of_freedom)?;
+        Some(Self {
+            pointwise_share: t * scatter.force_share,
+            simultaneous_share: t * scatter.largest_force_share,
+        })
+    }
+}
+
+/// What remains of a root of added squares without one of its parts.
+fn without(whole: f64, part: f64) -> f64 {
+    (whole * whole - part * part).max(0.0).sqrt()
 }
 
 /// Residuals of one left-out curve in ratio to the local level of the prediction.
@@ -94,6 +128,8 @@ pub(crate) struct Residuals {
     /// Over which it was predicted, as of [`Band::span_m_per_s`].
     pub span_m_per_s: f64,
     pub ratios: Vec<f64>,
+    /// How many runs the left-out curve is the mean of.
+    pub runs: usize,
 }
 
 /// The ratios `(FE − prediction) / level` at even deflections.
@@ -143,57 +179,109 @@ fn level(force_n: &[f64]) -> Vec<f64> {
 
 impl Band {
     /// The band that left-out curves give; `None` without any.
-    pub(crate) fn of(left_out: LeftOutSpeeds, curves: &[Residuals]) -> Option<Self> {
-        let mut band = Self::without_coverage(left_out, &curves.iter().collect::<Vec<_>>())
-            .filter(Self::is_sound)?;
+    pub(crate) fn of(
+        left_out: LeftOutSpeeds,
+        curves: &[Residuals],
+        scatter: Option<&Scatter>,
+    ) -> Option<Self> {
+        let all: Vec<&Residuals> = curves.iter().collect();
+        let mut band = Self::without_coverage(left_out, &all, scatter).filter(Self::is_sound)?;
         let covered: Vec<f64> =
-            (0..curves.len()).filter_map(|i| coverage(left_out, curves, i)).collect();
+            (0..curves.len()).filter_map(|i| coverage(left_out, curves, i, scatter)).collect();
         if !covered.is_empty() {
             band.coverage = Some(covered.iter().sum::<f64>() / covered.len() as f64);
         }
         Some(band)
     }
 
-    fn without_coverage(left_out: LeftOutSpeeds, curves: &[&Residuals]) -> Option<Self> {
+    fn without_coverage(
+        left_out: LeftOutSpeeds,
+        curves: &[&Residuals],
+        scatter: Option<&Scatter>,
+    ) -> Option<Self> {
         let t = student_t(curves.len())?;
         let n = curves.len() as f64;
         let span_m_per_s = curves.iter().map(|r| r.span_m_per_s).sum::<f64>() / n;
-        let over_span = |of: &dyn Fn(&[f64]) -> f64| {
+        let over_span = |of: &dyn Fn(&[f64]) -> f64, scatter: Option<f64>| {
             let of = |r: &&Residuals| {
-                of(&r.ratios) / (r.span_m_per_s / span_m_per_s).powf(2.0 * left_out.power())
+                let of_scatter = scatter.map_or(0.0, |s| s * s / r.runs as f64);
+                (of(&r.ratios) - of_scatter)
+                    / (r.span_m_per_s / span_m_per_s).powf(2.0 * left_out.power())
             };
-            t * (curves.iter().map(of).sum::<f64>() / n).sqrt()
+            t * (curves.iter().map(of).sum::<f64>() / n).max(0.0).sqrt()
         };
         let squares = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>() / r.len().max(1) as f64;
         let largest = |r: &[f64]| r.iter().fold(0.0_f64, |m, x| m.max(x.abs())).powi(2);
-        Some(Self {
+        let band = Self {
             level: LEVEL,
             curves: curves.len(),
             left_out,
             span_m_per_s,
-            pointwise_share: over_span(&squares),
-            simultaneous_share: over_span(&largest),
+            pointwise_share: over_span(&squares, scatter.map(|s| s.force_share)),
+            simultaneous_share: over_span(&largest, scatter.map(|s| s.largest_force_share)),
+            scatter: None,
             coverage: None,
-        })
+        };
+        Some(band.and(scatter.and_then(ScatterWidths::of)))
+    }
+
+    /// A band of interpolation alone with a scatter added.
+    fn and(self, scatter: Option<ScatterWidths>) -> Self {
+        let Some(of) = scatter else { return self };
+        Self {
+            pointwise_share: self.pointwise_share.hypot(of.pointwise_share),
+            simultaneous_share: self.simultaneous_share.hypot(of.simultaneous_share),
+            scatter,
+            ..self
+        }
+    }
+
+    /// The band of interpolation alone.
+    fn of_interpolation(self) -> Self {
+        let Some(of) = self.scatter else { return self };
+        Self {
+            pointwise_share: without(self.pointwise_share, of.pointwise_share),
+            simultaneous_share: without(self.simultaneous_share, of.simultaneous_share),
+            scatter: None,
+            ..self
+        }
+    }
+
+    /// The part of the pointwise half width that comes from interpolation.
+    pub fn interpolation_share(&self) -> f64 {
+        self.of_interpolation().pointwise_share
+    }
+
+    /// Pointwise half width for the mean of so many runs.
+    fn share_of_mean(&self, runs: usize) -> f64 {
+        let mean = |of: ScatterWidths| ScatterWidths {
+            pointwise_share: of.pointwise_share / (runs as f64).sqrt(),
+            ..of
+        };
+        self.of_interpolation().and(self.scatter.map(mean)).pointwise_share
     }
 
     /// The same band over another span; `None` if the scaled widths are no finite numbers.
     pub(crate) fn over(self, span_m_per_s: f64) -> Option<Self> {
         let factor = (span_m_per_s / self.span_m_per_s).powf(self.left_out.power());
+        let interpolation = self.of_interpolation();
         let band = Self {
             span_m_per_s,
-            pointwise_share: factor * self.pointwise_share,
-            simultaneous_share: factor * self.simultaneous_share,
-            ..self
+            pointwise_share: factor * interpolation.pointwise_share,
+            simultaneous_share: factor * interpolation.simultaneous_share,
+            ..interpolation
         };
-        band.is_sound().then_some(band)
+        Some(band.and(self.scatter)).filter(Self::is_sound)
     }
 
     /// Whether its widths are numbers that a fit gives.
     pub(crate) fn is_sound(&self) -> bool {
         let sound = |share: f64| (0.0..=WIDEST).contains(&share);
+        let of_scatter =
+            self.scatter.map_or([0.0; 2], |s| [s.pointwise_share, s.simultaneous_share]);
         sound(self.pointwise_share)
             && sound(self.simultaneous_share)
+            && of_scatter.into_iter().all(sound)
             && self.span_m_per_s > 0.0
             && self.span_m_per_s.is_finite()
     }
@@ -223,12 +311,18 @@ pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64
 }
 
 /// Share of curve `i`'s points inside the band that the other curves give over its span.
-pub(crate) fn coverage(left_out: LeftOutSpeeds, curves: &[Residuals], i: usize) -> Option<f64> {
+pub(crate) fn coverage(
+    left_out: LeftOutSpeeds,
+    curves: &[Residuals],
+    i: usize,
+    scatter: Option<&Scatter>,
+) -> Option<f64> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
-    let Residuals { span_m_per_s, ratios } = &curves[i];
-    let band = Band::without_coverage(left_out, &others)?.over(*span_m_per_s)?;
-    let inside = ratios.iter().filter(|r| r.abs() <= band.pointwise_share).count();
+    let Residuals { span_m_per_s, ratios, runs } = &curves[i];
+    let band = Band::without_coverage(left_out, &others, scatter)?.over(*span_m_per_s)?;
+    let share = band.share_of_mean(*runs);
+    let inside = ratios.iter().filter(|r| r.abs() <= share).count();
     Some(inside as f64 / ratios.len().max(1) as f64)
 }
 
@@ -258,26 +352,26 @@ mod tests {
     use super::*;
 
     fn curve(span_m_per_s: f64, ratios: &[f64]) -> Residuals {
-        Residuals { span_m_per_s, ratios: ratios.to_vec() }
+        Residuals { span_m_per_s, ratios: ratios.to_vec(), runs: 1 }
     }
 
     #[test]
     fn few_curves_give_wide_bands() {
         let one = curve(4.0, &[0.1, -0.1, 0.1, -0.1]);
-        let band = |n: usize| Band::of(Inner, &vec![one.clone(); n]).unwrap();
+        let band = |n: usize| Band::of(Inner, &vec![one.clone(); n], None).unwrap();
         assert!((band(1).pointwise_share - 0.63138).abs() < 1e-12);
         assert!((band(3).pointwise_share - 0.23534).abs() < 1e-12);
         assert_eq!(band(3).span_m_per_s, 4.0);
         assert_eq!(band(1).coverage, None);
         assert_eq!(band(2).coverage, Some(1.0));
-        assert!(Band::of(Inner, &[]).is_none());
+        assert!(Band::of(Inner, &[], None).is_none());
     }
 
     #[test]
     fn coverage_counts_points_outside() {
         let curves = [curve(4.0, &[0.01, 0.01]), curve(4.0, &[0.01, 0.5])];
-        assert_eq!(coverage(Inner, &curves, 1), Some(0.5));
-        assert_eq!(coverage(Inner, &curves, 0), Some(1.0));
+        assert_eq!(coverage(Inner, &curves, 1, None), Some(0.5));
+        assert_eq!(coverage(Inner, &curves, 0, None), Some(1.0));
     }
 
     /// Errors that follow the span are one error at one span, and each lies on the edge of what
@@ -286,7 +380,7 @@ mod tests {
     fn residuals_are_compared_over_one_span() {
         let grown = 0.1 * 2.0_f64.powf(0.65);
         let curves = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[grown, grown])];
-        let band = Band::of(Inner, &curves).unwrap();
+        let band = Band::of(Inner, &curves, None).unwrap();
         let share = |band: Band, span: f64| band.over(span).unwrap().pointwise_share;
         assert!((share(band, 3.0) - 2.92 * 0.1).abs() < 1e-12);
         assert!((share(band, 6.0) - 2.92 * grown).abs() < 1e-12);
@@ -294,9 +388,9 @@ mod tests {
         // 0.7 of a gap of 6 is within the band that 0.1 of a gap of 3 gives there (t of one: 6.3),
         // and outside of the one that it gives at 3.
         let wide = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[0.7, 1.1])];
-        assert_eq!(coverage(Inner, &wide, 1), Some(0.5));
+        assert_eq!(coverage(Inner, &wide, 1, None), Some(0.5));
         // Outside in proportion.
-        let ends = Band::of(Ends, &curves[..1]).unwrap();
+        let ends = Band::of(Ends, &curves[..1], None).unwrap();
         assert!((share(ends, 9.0) - 3.0 * 6.3138 * 0.1).abs() < 1e-12);
     }
 
@@ -315,8 +409,8 @@ mod tests {
 
     #[test]
     fn outside_the_band_grows_from_the_one_inside() {
-        let inner = Band::of(Inner, &[curve(4.0, &[0.1; 2]), curve(4.0, &[0.1; 2])]);
-        let ends = Band::of(Ends, &[curve(2.0, &[0.2; 2]), curve(2.0, &[0.2; 2])]);
+        let inner = Band::of(Inner, &[curve(4.0, &[0.1; 2]), curve(4.0, &[0.1; 2])], None);
+        let ends = Band::of(Ends, &[curve(2.0, &[0.2; 2]), curve(2.0, &[0.2; 2])], None);
         let speeds = [5.0, 7.0, 9.0];
         let share = |v: f64| at(inner, ends, &speeds, v).map(|b| (b.left_out, b.pointwise_share));
         let (kind, inside) = share(8.0).unwrap();
@@ -336,10 +430,47 @@ mod tests {
 
     #[test]
     fn bands_follow_the_level_of_the_force() {
-        let band = Band::of(Inner, &[curve(4.0, &[0.1; 4]), curve(4.0, &[0.1; 4])]).unwrap();
+        let band = Band::of(Inner, &[curve(4.0, &[0.1; 4]), curve(4.0, &[0.1; 4])], None).unwrap();
         let force: Vec<f64> = (0..200).map(|i| if i < 100 { 1e6 } else { 2e6 }).collect();
         let (low, high) = band.around(&force);
         let width = |i: usize| high[i] - low[i];
         assert!((width(150) / width(50) - 2.0).abs() < 1e-12);
+    }
+
+    /// A residual's square is that of interpolation plus the scatter of the runs it was measured
+    /// against; a wider gap widens the former alone, and the scatter is the floor.
+    #[test]
+    fn scatter_is_a_part_of_its_own() {
+        let scatter = Scatter {
+            speeds: Vec::new(),
+            degrees_of_freedom: 3,
+            force_l1: 0.0,
+            velocity_l1: 0.0,
+            force_share: 0.03,
+            largest_force_share: 0.06,
+        };
+        // Interpolation 0.04; a single run scatters by 0.03, the mean of nine by 0.01.
+        let one = curve(4.0, &[0.05, -0.05]);
+        let nine = Residuals { runs: 9, ..curve(4.0, &[(0.0016_f64 + 0.0001).sqrt(); 2]) };
+        let band = Band::of(Inner, &[one, nine], Some(&scatter)).unwrap();
+        let (t2, t3) = (2.92, 2.3534);
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+        near(band.scatter.unwrap().pointwise_share, t3 * 0.03);
+        near(band.scatter.unwrap().simultaneous_share, t3 * 0.06);
+        near(band.interpolation_share(), t2 * 0.04);
+        near(band.pointwise_share, (t2 * 0.04_f64).hypot(t3 * 0.03));
+        near(band.share_of_mean(9), (t2 * 0.04_f64).hypot(t3 * 0.01));
+        let wide = band.over(8.0).unwrap();
+        near(wide.interpolation_share(), t2 * 0.04 * 2.0_f64.powf(0.65));
+        assert_eq!(wide.scatter, band.scatter);
+        near(band.over(1e-9).unwrap().pointwise_share, t3 * 0.03);
+        // Residuals below the scatter leave nothing to interpolation, and no scatter changes nothing.
+        let small = [curve(4.0, &[0.01; 2]), curve(4.0, &[0.01; 2])];
+        let band = Band::of(Inner, &small, Some(&scatter)).unwrap();
+        assert_eq!((band.interpolation_share(), band.coverage), (0.0, Some(1.0)));
+        let none = Scatter { force_share: 0.0, largest_force_share: 0.0, ..scatter };
+        let (with, alone) = (Band::of(Inner, &small, Some(&none)), Band::of(Inner, &small, None));
+        let (with, alone) = (with.unwrap().over(7.0).unwrap(), alone.unwrap().over(7.0).unwrap());
+        assert_eq!(with.pointwise_share, alone.pointwise_share);
     }
 }

@@ -110,6 +110,43 @@ pub struct Means {
     pub acceleration_unfiltered_l1: f64,
 }
 
+/// How far runs of one speed lie from their mean: no model can remove this part of an error.
+///
+/// Errors of runs that the mean is made of are multiplied by √(n/(n − 1)): they are those of a run
+/// that it does not know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scatter {
+    /// Those that have several runs.
+    pub speeds: Vec<SpeedScatter>,
+    /// Runs at these speeds, less one for the mean of each: weights of the means below.
+    pub degrees_of_freedom: usize,
+    /// Error of the declared force of a run against the mean, as the tables have it.
+    pub force_l1: f64,
+    /// The same of the closing speed.
+    pub velocity_l1: f64,
+    /// Root mean square of the force's residuals in ratio to its local level, as of bands.
+    pub force_share: f64,
+    /// Root mean square over the runs of the largest of these residuals.
+    pub largest_force_share: f64,
+}
+
+/// The scatter at one speed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SpeedScatter {
+    /// Mean of the runs' speeds, in m/s.
+    pub speed_m_per_s: f64,
+    /// Names of the runs.
+    pub runs: Vec<String>,
+    /// As of all speeds.
+    pub force_l1: f64,
+    /// As of all speeds.
+    pub velocity_l1: f64,
+    /// As of all speeds.
+    pub force_share: f64,
+    /// As of all speeds.
+    pub largest_force_share: f64,
+}
+
 /// Leave-one-speed-out of a group: what `crumple validate` prints and a model file keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Validation {
@@ -125,6 +162,9 @@ pub struct Validation {
     pub means: Vec<Means>,
     /// FE's own curves in the same runs.
     pub floors: Vec<Floor>,
+    /// How far equal runs lie apart; absent where no speed has several runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
     /// Between training speeds, of the chosen model, from its residuals at the inner speeds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,

@@ -1,0 +1,80 @@
+//! Scatter: how far nominally equal runs lie from their mean, which no model can remove.
+
+use super::reference::Reference;
+use crate::curve::Case;
+use crate::curve::replicates::at_times;
+use crate::dataset::{TrainingCase, TrainingSet, grid};
+use crate::signal::l1_ratio;
+use crate::surrogate::band;
+use crate::surrogate::leave_one_out::{Scatter, SpeedScatter};
+
+/// Fewest steps along a run's crush at which forces are compared, as for left-out speeds.
+const STEPS: usize = 400;
+
+/// The scatter of the set's cases that are means of several of `cases`; `None` without any, or if
+/// none can be compared.
+pub(super) fn scatter(set: &TrainingSet, cases: &[Case]) -> Option<Scatter> {
+    let several = set.cases.iter().filter(|case| case.runs.len() > 1);
+    let speeds: Vec<SpeedScatter> = several.filter_map(|mean| at_speed(mean, cases)).collect();
+    let degrees = |at: &SpeedScatter| at.runs.len() - 1;
+    let degrees_of_freedom: usize = speeds.iter().map(degrees).sum();
+    let pooled = |of: &dyn Fn(&SpeedScatter) -> f64| {
+        let sum: f64 = speeds.iter().map(|at| degrees(at) as f64 * of(at)).sum();
+        sum / degrees_of_freedom as f64
+    };
+    let found = (degrees_of_freedom > 0).then(|| Scatter {
+        speeds: Vec::new(),
+        degrees_of_freedom,
+        force_l1: pooled(&|at| at.force_l1),
+        velocity_l1: pooled(&|at| at.velocity_l1),
+        force_share: pooled(&|at| at.force_share.powi(2)).sqrt(),
+        largest_force_share: pooled(&|at| at.largest_force_share.powi(2)).sqrt(),
+    });
+    found.map(|pooled| Scatter { speeds, ..pooled })
+}
+
+/// Errors of one run against the mean.
+struct Apart {
+    force_l1: f64,
+    velocity_l1: f64,
+    mean_square: f64,
+    largest_square: f64,
+}
+
+fn at_speed(mean: &TrainingCase, cases: &[Case]) -> Option<SpeedScatter> {
+    let motion = Reference::of(&mean.case).ok()?;
+    // In their own order, so that the order of the cases changes no sum.
+    let runs = mean.runs.iter().filter_map(|name| cases.iter().find(|case| case.name == *name));
+    let apart: Vec<Apart> = runs.map(|run| apart(run, mean, &motion)).collect::<Option<_>>()?;
+    let n = apart.len() as f64;
+    let over = |of: fn(&Apart) -> f64| apart.iter().map(of).sum::<f64>() / (n - 1.0);
+    // Of a magnitude, not of a square.
+    let unknown = ((n - 1.0) / n).sqrt();
+    let found = SpeedScatter {
+        speed_m_per_s: mean.speed_m_per_s,
+        runs: mean.runs.clone(),
+        force_l1: unknown * over(|a| a.force_l1),
+        velocity_l1: unknown * over(|a| a.velocity_l1),
+        force_share: over(|a| a.mean_square).sqrt(),
+        largest_force_share: over(|a| a.largest_square).sqrt(),
+    };
+    let SpeedScatter { force_l1, velocity_l1, largest_force_share, .. } = found;
+    [force_l1, velocity_l1, largest_force_share].iter().all(|x| x.is_finite()).then_some(found)
+}
+
+fn apart(run: &Case, mean: &TrainingCase, motion: &Reference) -> Option<Apart> {
+    let own = run.loading().ok()?.envelope;
+    let along = grid(own.end_m(), STEPS);
+    let own_n: Vec<f64> = along.iter().map(|&d| own.force_at(d)).collect();
+    let mean_n: Vec<f64> = along.iter().map(|&d| mean.envelope.force_at(d)).collect();
+    let ratios = band::ratios(&own_n, &mean_n);
+    let squares = || ratios.iter().map(|r| r * r);
+    let time_s = &motion.time_s()[..motion.inside()];
+    let own_v = at_times(run.sampled.time_s(), &run.closing_speed_m_per_s, time_s);
+    Some(Apart {
+        force_l1: l1_ratio(&mean_n, &own_n),
+        velocity_l1: l1_ratio(&motion.velocity()[..motion.inside()], &own_v),
+        mean_square: squares().sum::<f64>() / ratios.len() as f64,
+        largest_square: squares().fold(0.0, f64::max),
+    })
+}
