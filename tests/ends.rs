@@ -342,6 +342,7 @@ fn ends_are_all_that_a_user_writes() {
     // In a table there are vehicles only.
     let table = crumple_ok(MODELS.path(), &["simulate", "ends.toml", "-q"]);
     assert!(!table.contains("\nA1 front  ") && table.contains("\nA1  "), "{table}");
+    assert!(table.contains(" damped; largest imbalance"), "{table}");
 }
 
 /// A sweep over masses and speeds gives the same rows for any number of threads.

@@ -300,9 +300,14 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
     if let Some(limits) = &summary.limits {
         print_limits(out, limits)?;
     }
+    // What only some trains have.
+    let further = [("damped", ledger.damped_j), ("resisted", ledger.resisted_j)];
+    let further = further.into_iter().filter(|(_, energy_j)| *energy_j != 0.0);
+    let further: String =
+        further.map(|(what, energy_j)| format!(", {:.6} {what}", energy_j / 1e6)).collect();
     writeln!(
         out,
-        "energy of {:.6} MJ: {:.6} kinetic, {:.6} stored, {:.6} dissipated; largest imbalance {:.1e}",
+        "energy of {:.6} MJ: {:.6} kinetic, {:.6} stored, {:.6} dissipated{further}; largest imbalance {:.1e}",
         ledger.initial_kinetic_j / 1e6,
         ledger.kinetic_j / 1e6,
         ledger.stored_j / 1e6,
