@@ -916,6 +916,29 @@ fn moments(count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(|k| (k as f64 * 0.618_033_988_749_895 + 0.3).fract())
 }
 
+/// How long commands are left to run before they are killed: longer after one that was killed,
+/// shorter after one that had ended, so that both happen however busy the machine is.
+struct Aim(Duration);
+
+impl Aim {
+    /// At a command that takes about as long as `whole`.
+    fn at(whole: Duration) -> Self {
+        Self(whole.mul_f64(1.2))
+    }
+
+    fn wait(&self, moment: f64) {
+        std::thread::sleep(self.0.mul_f64(moment));
+    }
+
+    fn killed(&mut self) {
+        self.0 = self.0.mul_f64(1.15).min(Duration::from_secs(20));
+    }
+
+    fn ended(&mut self) {
+        self.0 = self.0.mul_f64(0.85);
+    }
+}
+
 /// Kills every changing command at many moments; `look` is shown the database each time.
 fn kill_at_many_moments(look: &mut dyn FnMut(&Path)) {
     let kills = if is_thorough() { 200 } else { 20 };
@@ -930,7 +953,7 @@ fn kill_at_many_moments(look: &mut dyn FnMut(&Path)) {
         let old = state(&path);
         let begun = Instant::now();
         crumple_ok(here, &words);
-        let whole = begun.elapsed();
+        let mut aim = Aim::at(begun.elapsed());
         let new = state(&path);
         assert!(old != new, "{line}");
         let (mut killed, mut acknowledged) = (0, 0);
@@ -943,18 +966,20 @@ fn kill_at_many_moments(look: &mut dyn FnMut(&Path)) {
                 .stderr(Stdio::null())
                 .spawn()
                 .unwrap();
-            std::thread::sleep(whole.mul_f64(1.2 * moment));
+            aim.wait(moment);
             let _ = child.kill();
             let found = match child.wait().unwrap().success() {
                 // Whoever was told that it is done finds it.
                 true => {
                     acknowledged += 1;
+                    aim.ended();
                     assert!(state(&path) == new, "{line}");
                     continue;
                 }
                 false => state(&path),
             };
             killed += 1;
+            aim.killed();
             assert!(found == old || found == new, "{line}");
             look(&path);
             let left: Vec<String> =
@@ -1023,17 +1048,23 @@ fn every_acknowledged_case_is_there() {
     };
     let begun = Instant::now();
     assert!(add("first").wait().unwrap().success());
-    let whole = begun.elapsed();
+    let mut aim = Aim::at(begun.elapsed());
     let mut acknowledged = BTreeSet::from(["g/first".to_string()]);
     let (mut asked, mut killed) = (acknowledged.clone(), 0);
     for (k, moment) in moments(if is_thorough() { 200 } else { 40 }).enumerate() {
         let mut child = add(&k.to_string());
         asked.insert(format!("g/{k}"));
-        std::thread::sleep(whole.mul_f64(1.5 * moment) + Duration::from_micros(k as u64));
+        aim.wait(moment);
         let _ = child.kill();
         match child.wait().unwrap().success() {
-            true => drop(acknowledged.insert(format!("g/{k}"))),
-            false => killed += 1,
+            true => {
+                acknowledged.insert(format!("g/{k}"));
+                aim.ended();
+            }
+            false => {
+                killed += 1;
+                aim.killed();
+            }
         }
         let there: BTreeSet<String> = names(here, "c.h5").into_iter().collect();
         assert!(acknowledged.is_subset(&there) && there.is_subset(&asked), "{there:?}");

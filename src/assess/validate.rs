@@ -20,7 +20,7 @@ use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter, Validation};
+use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Scatter, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind, predict};
 
@@ -149,13 +149,8 @@ pub fn validate(
         }
     };
     let scatter = scatter(&set, cases);
-    let mut floors = Vec::new();
-    for case in &left_out {
-        match case.floors() {
-            Ok(own) => floors.extend(own),
-            Err(error) => notes.push(format!("FE's own curves of \"{}\": {error}", case.own.name)),
-        }
-    }
+    let (floors, without_floors) = floors_of(&left_out);
+    notes.extend(without_floors);
     let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
         fitting.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
     let trials: Vec<Trial> = pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect();
@@ -194,6 +189,18 @@ pub fn validate(
         band_outside,
         notes,
     })
+}
+
+/// FE's own curves at the speeds that are left out, and why some have none.
+fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
+    let (mut floors, mut notes) = (Vec::new(), Vec::new());
+    for case in left_out {
+        match case.floors() {
+            Ok(own) => floors.extend(own),
+            Err(error) => notes.push(format!("FE's own curves of \"{}\": {error}", case.own.name)),
+        }
+    }
+    (floors, notes)
 }
 
 /// The candidates that can be fitted to the set, and why the others cannot.

@@ -300,6 +300,10 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
     if let Some(limits) = &summary.limits {
         print_limits(out, limits)?;
     }
+    print_energy(out, ledger)
+}
+
+fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
     // What only some trains have.
     let further = [("damped", ledger.damped_j), ("resisted", ledger.resisted_j)];
     let further = further.into_iter().filter(|(_, energy_j)| *energy_j != 0.0);
