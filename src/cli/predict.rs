@@ -193,6 +193,26 @@ fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()
     Ok(())
 }
 
+/// How far FE may lie from the curve, and what of it lies between equal runs.
+fn print_band(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+    let provenance = &curve.provenance;
+    let Some(band) = &provenance.band else { return Ok(()) };
+    writeln!(
+        out,
+        "  band                 ±{:.1} % of the local force: empirical range for {:.0} % {}",
+        band.pointwise_share * 100.0,
+        band.level * 100.0,
+        rests_on(band, provenance.in_range)
+    )?;
+    let Some(scatter) = band.scatter else { return Ok(()) };
+    writeln!(
+        out,
+        "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
+        band.interpolation_share() * 100.0,
+        scatter.pointwise_share * 100.0
+    )
+}
+
 fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     let provenance = &curve.provenance;
     let crush = provenance.max_crush;
@@ -229,23 +249,7 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         writeln!(out, "  energy of body force {:.2} %", share * 100.0)?;
     }
     print_unloading(out, curve)?;
-    if let Some(band) = &provenance.band {
-        writeln!(
-            out,
-            "  band                 ±{:.1} % of the local force: empirical range for {:.0} % {}",
-            band.pointwise_share * 100.0,
-            band.level * 100.0,
-            rests_on(band, provenance.in_range)
-        )?;
-        if let Some(scatter) = band.scatter {
-            writeln!(
-                out,
-                "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
-                band.interpolation_share() * 100.0,
-                scatter.pointwise_share * 100.0
-            )?;
-        }
-    }
+    print_band(out, curve)?;
     writeln!(
         out,
         "  nearest training     {} away",
