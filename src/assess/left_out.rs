@@ -123,7 +123,7 @@ impl<'a> LeftOutCase<'a> {
     /// Predicts the case by one model and every rule for the maximal crush.
     pub(super) fn trial(&self, kind: ModelKind) -> Trial {
         let judged = || -> Result<Vec<_>, ValidateError> {
-            let model = Model::fit(&self.rest, kind)
+            let model = Model::fit_curves(&self.rest, kind)
                 .map_err(|error| ValidateError::NotFitted(error.to_string()))?;
             let query = query_of(self.case, &model);
             // Body force and motion are the same by all rules.

@@ -155,6 +155,16 @@ impl Model {
     /// [`ModelError`] if the set is too small for the model, differs in more than the model
     /// sees, or its options are wrong.
     pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
+        let model = Self::fit_curves(set, kind)?;
+        let crush_law = crush_law(set, &model.curves.declared);
+        Ok(Self { crush_law, ..model })
+    }
+
+    /// The same without a crush law, for trials that only ask for curves.
+    ///
+    /// # Errors
+    /// As of [`fit`](Self::fit).
+    pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
         Self::check_fits(set, kind)?;
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
@@ -184,7 +194,7 @@ impl Model {
             },
             mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
             leave_one_out: None,
-            crush_law: crush_law(set, &curves.declared),
+            crush_law: None,
             fitted: fitted(&curves.declared, set.force_kind)?,
             fitted_body: match set.force_kind {
                 ForceKind::Contact => Some(fitted(&curves.body, ForceKind::Body)?),
