@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use crumple::assess::choose::{Purpose, Selection};
 use crumple::assess::validate::validate;
 use crumple::curve::Case;
 use crumple::dataset::TrainingSet;
@@ -33,7 +34,8 @@ fn kind(name: &str) -> ModelKind {
     ModelKind::named(name, 0).expect("a model of that name")
 }
 
-const MODELS: [&str; 6] = ["nearest", "linear", "rate", "registered", "forest", "extra"];
+const MODELS: [&str; 7] =
+    ["nearest", "linear", "rate", "crush-law", "registered", "forest", "extra"];
 
 #[divan::bench(args = MODELS, sample_count = 5)]
 fn fit(bencher: Bencher, name: &str) {
@@ -50,5 +52,8 @@ fn predict_one_curve(bencher: Bencher, name: &str) {
 
 #[divan::bench(sample_count = 3)]
 fn validate_all_models() {
-    black_box(validate(GROUP, cases(), &ModelKind::candidates(0), None).expect("a validation"));
+    black_box(
+        validate(GROUP, cases(), &ModelKind::candidates(0), Selection::Best(Purpose::Vehicle))
+            .expect("a validation"),
+    );
 }

@@ -10,6 +10,7 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
+use crumple::assess::choose::Purpose;
 use crumple::assess::validate::{Choice, train};
 use crumple::build::build;
 use crumple::curve::{Case, Envelope, ForceKind};
@@ -32,7 +33,8 @@ fn main() -> Anything<()> {
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(GROUP);
     let report = build(&study.join("study.toml"), &folder.path().join("curves.h5"), |_| {})?;
     let cases = report.database.cases(GROUP);
-    let model = train(GROUP, cases, Choice::Auto { seed: 0, trees: None })?;
+    let model =
+        train(GROUP, cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })?;
     let (curve, beyond) = predict_beyond(&model, &Query::at(PREDICTED_M_PER_S))?;
     let predicted = ExportInput { curve, beyond: None };
     let along_faster_runs = ExportInput { beyond: Some(beyond), ..predicted.clone() };

@@ -6,6 +6,7 @@
 use std::error::Error;
 use std::path::Path;
 
+use crumple::assess::choose::Purpose;
 use crumple::assess::validate::{Choice, train};
 use crumple::build::build;
 use crumple::charts;
@@ -22,7 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(GROUP);
     let report = build(&study.join("study.toml"), &folder.path().join("curves.h5"), |_| {})?;
     let cases = report.database.cases(GROUP);
-    let model = train(GROUP, cases, Choice::Auto { seed: 0, trees: None })?;
+    let model =
+        train(GROUP, cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })?;
     let curve = predict(&model, &Query::at(SPEED_M_PER_S))?.of_force(ForceKind::Contact)?;
 
     let mut chart = charts::group_curves(GROUP, cases, ForceKind::Contact);

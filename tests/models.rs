@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root};
-use crumple::assess::choose::gaps;
+use crumple::assess::choose::{Purpose, Selection, gaps};
 use crumple::assess::validate::{Choice, train, validate};
 use crumple::curve::energy::audit;
 use crumple::curve::loading::unloading_stiffness;
@@ -117,7 +117,13 @@ fn curve(model: &Model, v: f64) -> PredictedCurve {
 #[test]
 fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
     for group in GROUPS {
-        let found = validate(group, databases().cases(group), &ModelKind::all(0), None).unwrap();
+        let found = validate(
+            group,
+            databases().cases(group),
+            &ModelKind::all(0),
+            Selection::Best(Purpose::Vehicle),
+        )
+        .unwrap();
         let of = |model: &str| found.means.iter().find(|m| m.model == model).unwrap();
         let chosen = of(&found.chosen);
         for baseline in ["nearest", "linear", "forest"] {
@@ -323,7 +329,7 @@ fn a_monotone_family_gives_a_monotone_crush() {
 #[test]
 fn left_out_speeds_of_a_made_family() {
     let cases = family(&[7.0, 10.0, 13.0, 17.0, 20.0]);
-    let found = validate("made", &cases, &all_kinds(), None).unwrap();
+    let found = validate("made", &cases, &all_kinds(), Selection::Best(Purpose::Vehicle)).unwrap();
     let rate = found.means.iter().find(|m| m.model == "rate").unwrap();
     // Half of the sensitivity is taken, so the motion is not found exactly.
     assert!(rate.max_crush_error < 0.01 && rate.velocity_l1 < 0.015, "{rate:?}");
@@ -372,7 +378,9 @@ fn one_to_five_curves() {
             assert_eq!(validation.means.is_empty(), n < 3);
             assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));
         }
-        let auto = train("made", &cases, Choice::Auto { seed: 0, trees: None }).unwrap();
+        let auto =
+            train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
+                .unwrap();
         let expected = ["nearest", "linear"];
         if n < 3 {
             assert_eq!(auto.name(), expected[n - 1]);
@@ -445,7 +453,9 @@ fn several_parameters() {
         let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
         assert!(predict(&model, &crush).unwrap_err().to_string().contains("try --max-crush"));
     }
-    let auto = train("made", &cases, Choice::Auto { seed: 0, trees: None }).unwrap();
+    let auto =
+        train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
+            .unwrap();
     let notes = auto.leave_one_out.unwrap().notes;
     assert!(notes.iter().any(|n| n.starts_with("linear: ")), "{notes:?}");
 }
@@ -468,7 +478,9 @@ fn masses_are_a_parameter_where_they_differ() {
 fn cases_that_are_no_training_set() {
     fn t(cases: &[Case], expected: &str) {
         let error =
-            train("made", cases, Choice::Auto { seed: 0, trees: None }).unwrap_err().to_string();
+            train("made", cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
+                .unwrap_err()
+                .to_string();
         assert!(error.contains(expected), "{error}\nlacks: {expected}");
     }
     t(&[], "the group is empty");
@@ -712,7 +724,7 @@ fn a_speed_without_an_answer_is_named() {
     let cases: Vec<Case> = speeds.map(|v| case(&format!("v{v}"), v, 8e3, &hardening)).to_vec();
     let options =
         [ModelKind::nearest(), ModelKind::linear(), ModelKind::forest(ForestOptions::paper())];
-    let found = validate("made", &cases, &options, None).unwrap();
+    let found = validate("made", &cases, &options, Selection::Best(Purpose::Vehicle)).unwrap();
     let mut missing = 0;
     for options in &options {
         for case in &cases {
@@ -927,7 +939,8 @@ fn the_next_run_is_nearly_the_best_of_two() {
         let database = Database::read(&database).unwrap();
         let cases = database.cases(group);
         let kinds = [ModelKind::nearest(), ModelKind::linear(), ModelKind::rate()];
-        let validated = |cases: &[Case]| validate(group, cases, &kinds, Some("rate")).unwrap();
+        let validated =
+            |cases: &[Case]| validate(group, cases, &kinds, Selection::Named("rate")).unwrap();
         let error_at = |validation: &Validation, v: f64| {
             let rows = validation.rows.iter().filter(|row| row.model == "rate");
             rows.filter(|row| row.speed_m_per_s == v).map(|row| row.force_l1).sum::<f64>()

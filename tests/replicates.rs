@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::common::{crumple_fails, crumple_ok, shared};
 use crate::models::{all_kinds, case, database_of, family, law};
+use crumple::assess::choose::{Purpose, Selection};
 use crumple::assess::validate::{Choice, train, validate};
 use crumple::curve::{Case, Parameter};
 use crumple::dataset::TrainingSet;
@@ -19,7 +20,14 @@ fn flat(name: &str, v: f64, share: f64) -> Case {
 }
 
 fn scatter_of(cases: &[Case]) -> Option<Scatter> {
-    validate("made", cases, &[ModelKind::nearest(), ModelKind::linear()], None).unwrap().scatter
+    validate(
+        "made",
+        cases,
+        &[ModelKind::nearest(), ModelKind::linear()],
+        Selection::Best(Purpose::Vehicle),
+    )
+    .unwrap()
+    .scatter
 }
 
 fn near(found: f64, expected: f64) {
@@ -258,7 +266,12 @@ fn perturbed_runs_scatter_little() {
     assert!(force > 0.003 && force < 0.02 && scatter.force_share < 0.02, "{scatter:?}");
     assert!(velocity > 0.0 && velocity < 0.01, "{scatter:?}");
     // Beside an error of interpolation, of which it is a small part.
-    let model = train("lead-car-wall", cases, Choice::Auto { seed: 0, trees: None }).unwrap();
+    let model = train(
+        "lead-car-wall",
+        cases,
+        Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None },
+    )
+    .unwrap();
     let band = model.leave_one_out.unwrap().band.unwrap();
     assert!(band.scatter.unwrap().pointwise_share < 0.5 * band.interpolation_share(), "{band:?}");
 }

@@ -3,7 +3,8 @@
 //! `auto` considers the models that are at or below `nearest`, `linear` and `forest` in mean force error and in mean
 //! velocity error. Of these it takes the simplest one within 10 % of the smallest force error. Speeds inside the range and
 //! its two ends are reported apart. The errors of what was chosen flatter it, so `--nested` repeats the choice without each
-//! left-out speed.
+//! left-out speed. For trains the ends count as the inner speeds do, and of the best models those are taken first
+//! whose force follows the closing speed.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -16,24 +17,52 @@ use crate::unit::km_per_h;
 /// Mean errors that differ by less are a tie: three to five speeds say no more.
 const TIE: f64 = 0.10;
 
+/// Where the queries of a model will lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Purpose {
+    /// Between the speeds of the runs: one vehicle that hits something.
+    #[default]
+    Vehicle,
+    /// Beyond them as well: most vehicles of a train close more slowly than any run.
+    Train,
+}
+
+/// Which model counts as chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Selection<'a> {
+    /// The best for a purpose.
+    Best(Purpose),
+    /// The one of this name, whatever its errors.
+    Named(&'a str),
+}
+
 /// The chosen model and why; `None` without means.
 ///
-/// Of the models that are, in the mean over the inner speeds, at or below every baseline in
+/// Of the models that are, in the mean over the speeds that count, at or below every baseline in
 /// force and in velocity error, those within 10 % of the smallest force error tie, and the
-/// simplest of them is taken. If none keeps to all baselines, the one whose worst ratio to
-/// them is smallest.
-pub(crate) fn choose(means: &[Means]) -> Option<(String, String)> {
+/// simplest of them is taken; for trains first those whose force follows the closing speed. If none
+/// keeps to all baselines, the one whose worst ratio to them is smallest.
+pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, String)> {
     let entry = |m: &Means| MODELS.iter().find(|entry| entry.name == m.model);
     let baselines = || means.iter().filter(|m| entry(m).is_some_and(|e| e.baseline));
     let least = |of: fn(&Means) -> f64| baselines().map(of).fold(f64::INFINITY, f64::min);
     let (force, velocity) = (least(|m| m.force_l1), least(|m| m.velocity_l1));
     let keeps = |m: &&Means| m.force_l1 <= force && m.velocity_l1 <= velocity;
-    let complexity = |m: &Means| entry(m).map_or(u8::MAX, |e| e.complexity);
+    let rank = |m: &Means| {
+        let follows = entry(m).is_some_and(|e| e.follows_closing);
+        (purpose == Purpose::Train && !follows, entry(m).map_or(u8::MAX, |e| e.complexity))
+    };
+    let (over, preferred) = match purpose {
+        Purpose::Vehicle => ("", "the simplest"),
+        Purpose::Train => {
+            (" with the ends of the range", "the simplest that follows the closing speed")
+        }
+    };
     let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
     let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
-    if let Some(chosen) = tied.min_by_key(|m| complexity(m)) {
+    if let Some(chosen) = tied.min_by_key(|m| rank(m)) {
         let reason = format!(
-            "mean force error {:.2} %, the smallest is {:.2} %; of those within 10 % the simplest",
+            "mean force error{over} {:.2} %, the smallest is {:.2} %; of those within 10 % {preferred}",
             chosen.force_l1 * 100.0,
             best * 100.0
         );
@@ -177,7 +206,7 @@ mod tests {
 
     #[test]
     fn ties_go_to_the_simpler_model() {
-        let chosen = |of: &[Means]| choose(of).unwrap().0;
+        let chosen = |of: &[Means]| choose(of, Purpose::Vehicle).unwrap().0;
         let (nearest, forest) = (means("nearest", 0.2, 0.2), means("forest", 0.1, 0.1));
         let linear = means("linear", 0.05, 0.03);
         let rate = means("rate", 0.048, 0.02);
@@ -185,7 +214,11 @@ mod tests {
         assert_eq!(chosen(&all(rate)), "linear");
         assert_eq!(chosen(&all(means("rate", 0.040, 0.02))), "rate");
         assert_eq!(chosen(&all(means("rate", 0.040, 0.031))), "linear", "worse in velocity");
-        assert!(choose(&[]).is_none());
+        assert!(choose(&[], Purpose::Vehicle).is_none());
+        // For trains a force that follows the closing speed goes first, among those that tie.
+        let for_train = |of: &[Means]| choose(of, Purpose::Train).unwrap().0;
+        assert_eq!(for_train(&all(means("rate", 0.048, 0.02))), "rate");
+        assert_eq!(for_train(&all(means("rate", 0.060, 0.02))), "linear");
     }
 
     /// Where linear wins in force and the forest in velocity, neither is chosen blindly.
@@ -197,6 +230,6 @@ mod tests {
             means("forest", 0.09, 0.028),
             means("rate", 0.051, 0.0281),
         ];
-        assert_eq!(choose(&of).unwrap().0, "rate");
+        assert_eq!(choose(&of, Purpose::Vehicle).unwrap().0, "rate");
     }
 }

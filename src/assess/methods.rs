@@ -3,6 +3,7 @@
 use crate::plural::counted;
 use std::time::Instant;
 
+use super::choose::Purpose;
 use super::error::CompareError;
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
@@ -165,7 +166,8 @@ pub(super) fn best(
     seed: u64,
 ) -> Result<Method, CompareError> {
     let start = Instant::now();
-    let model = train(group, others, Choice::Auto { seed, trees: None })?;
+    let model =
+        train(group, others, Choice::Auto { purpose: Purpose::Vehicle, seed, trees: None })?;
     let fit_s = start.elapsed().as_secs_f64();
     let (curve, predict_s) = predicted(left_out, &model, None)?;
     let driving = curve.driving(ForceKind::Body)?;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::choose::{NextRun, choose};
+use super::choose::{NextRun, Purpose, Selection, choose};
 use super::error::ValidateError;
 use super::left_out::{LeftOutCase, Trial, query_of};
 use super::scatter::scatter;
@@ -59,6 +59,8 @@ pub enum Choice {
     /// The one that leave-one-speed-out chooses; seed of the forests, and their number of trees
     /// if not their own.
     Auto {
+        /// Where the model will be asked.
+        purpose: Purpose,
         /// Of all random draws.
         seed: u64,
         /// Of each forest.
@@ -74,13 +76,13 @@ pub enum Choice {
 /// [`ValidateError`] if the cases are no training set, or too few for the model.
 pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, ValidateError> {
     match choice {
-        Choice::Auto { seed, trees } => {
+        Choice::Auto { purpose, seed, trees } => {
             let asked = |kind: ModelKind| {
                 kind.with_forest(|f| ForestOptions { trees: trees.unwrap_or(f.trees), ..f })
             };
             let candidates: Vec<ModelKind> =
                 ModelKind::candidates(seed).into_iter().map(asked).collect();
-            let validation = validate(group, cases, &candidates, None)?;
+            let validation = validate(group, cases, &candidates, Selection::Best(purpose))?;
             let kept: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
             train_chosen(group, cases, &kept, validation)
         }
@@ -91,7 +93,8 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Valid
             candidates.retain(|baseline| baseline.name() != kind.name());
             candidates.push(kind);
             candidates.sort_by_key(|kind| MODELS.iter().position(|e| e.name == kind.name()));
-            let validation = validate(group, cases, &candidates, Some(kind.name()))?;
+            let named = Selection::Named(kind.name());
+            let validation = validate(group, cases, &candidates, named)?;
             train_chosen(group, cases, &[kind], validation)
         }
     }
@@ -125,8 +128,8 @@ pub fn train_chosen(
 /// Leaves every speed out in turn and predicts it by every candidate.
 ///
 /// A model that cannot be fitted to the group, or has no answer at a speed, is noted with the
-/// reason; one without an answer at every inner speed has no means and cannot be chosen. `keep`
-/// names the model that counts as chosen, whatever its errors.
+/// reason; one without an answer at every inner speed has no means and cannot be chosen, nor for a
+/// train one without an answer at an end.
 ///
 /// # Errors
 /// [`ValidateError`] if the cases are no training set.
@@ -134,7 +137,7 @@ pub fn validate(
     group: &str,
     cases: &[Case],
     candidates: &[ModelKind],
-    keep: Option<&str>,
+    selection: Selection<'_>,
 ) -> Result<Validation, ValidateError> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, mut notes) = those_that_fit(&set, candidates);
@@ -168,9 +171,15 @@ pub fn validate(
         residuals.insert(kind.name(), table.residuals);
         rows.extend(table.rows);
     }
-    let (chosen, reason) = match keep {
-        Some(model) => (model.to_string(), "asked for".into()),
-        None => choose(&means).unwrap_or_else(|| without_validation(&fitting)),
+    let (chosen, reason) = match selection {
+        Selection::Named(model) => (model.to_string(), "asked for".into()),
+        Selection::Best(purpose) => {
+            let counted = match purpose {
+                Purpose::Vehicle => means.clone(),
+                Purpose::Train => means_with_ends(&means, &rows, left_out.len()),
+            };
+            choose(&counted, purpose).unwrap_or_else(|| without_validation(&fitting))
+        }
     };
     let band_of = |left_out: LeftOutSpeeds| {
         Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?, scatter.as_ref())
@@ -303,17 +312,21 @@ pub fn add_nested(
             let v = held.own.speed_m_per_s;
             let others: Vec<Case> =
                 cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
-            let predictions = train(&group, &others, Choice::Auto { seed, trees: None })
-                .and_then(|model| {
-                    let curve = predict(&model, &query_of(held.case, &model))?;
-                    let rule = curve.provenance.max_crush_rule;
-                    let rule = rule.expect("a prediction says its rule");
-                    Ok((rule, held.judged(curve)?))
-                })
-                .map_or_else(
-                    |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),
-                    |(rule, judged)| BTreeMap::from([(rule, Ok(judged))]),
-                );
+            let predictions = train(
+                &group,
+                &others,
+                Choice::Auto { purpose: Purpose::Vehicle, seed, trees: None },
+            )
+            .and_then(|model| {
+                let curve = predict(&model, &query_of(held.case, &model))?;
+                let rule = curve.provenance.max_crush_rule;
+                let rule = rule.expect("a prediction says its rule");
+                Ok((rule, held.judged(curve)?))
+            })
+            .map_or_else(
+                |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),
+                |(rule, judged)| BTreeMap::from([(rule, Ok(judged))]),
+            );
             held.trial_of("auto", predictions)
         })
         .collect();
@@ -372,13 +385,25 @@ fn best_rule(kind: &ModelKind, trials: &[&Trial]) -> Option<MaxCrushRule> {
 
 /// Means over the inner speeds; `None` without any.
 fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
-    let inner: Vec<&LeftOut> = rows.iter().filter(|r| r.inner).collect();
-    let over = |of: fn(&LeftOut) -> f64| {
-        inner.iter().map(|r| of(r).abs()).sum::<f64>() / inner.len() as f64
+    mean_over(model, rule, rows.iter().filter(|r| r.inner).collect())
+}
+
+/// The means of models with an answer at every speed that is left out, over all of these.
+fn means_with_ends(of_inner: &[Means], rows: &[LeftOut], left_out: usize) -> Vec<Means> {
+    let of_all = |of: &Means| {
+        let own: Vec<&LeftOut> = rows.iter().filter(|row| row.model == of.model).collect();
+        (own.len() == left_out).then(|| mean_over(&of.model, of.max_crush_rule, own))?
     };
-    (!inner.is_empty()).then(|| Means {
+    of_inner.iter().filter_map(of_all).collect()
+}
+
+/// Means over these rows of one model; `None` without any.
+fn mean_over(model: &str, rule: MaxCrushRule, rows: Vec<&LeftOut>) -> Option<Means> {
+    let over =
+        |of: fn(&LeftOut) -> f64| rows.iter().map(|r| of(r).abs()).sum::<f64>() / rows.len() as f64;
+    (!rows.is_empty()).then(|| Means {
         model: model.into(),
-        speeds: inner.len(),
+        speeds: rows.len(),
         force_l1: over(|r| r.force_l1),
         energy_error: over(|r| r.energy_error),
         max_crush_error: over(|r| r.max_crush_error),
@@ -387,8 +412,8 @@ fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
             .into_iter()
             .filter_map(|rule| {
                 let errors: Option<Vec<f64>> =
-                    inner.iter().map(|r| Some(r.max_crush_errors.get(&rule)?.abs())).collect();
-                Some((rule, errors?.iter().sum::<f64>() / inner.len() as f64))
+                    rows.iter().map(|r| Some(r.max_crush_errors.get(&rule)?.abs())).collect();
+                Some((rule, errors?.iter().sum::<f64>() / rows.len() as f64))
             })
             .collect(),
         velocity_l1: over(|r| r.velocity_l1),

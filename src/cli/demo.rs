@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crumple::assess::choose::{Purpose, Selection};
 use crumple::assess::validate::{train_chosen, validate};
 use crumple::build::{self, BuiltRun, RunOutcome};
 use crumple::curve::Case;
@@ -179,7 +180,7 @@ impl Flow<'_> {
                 group,
                 database.cases(group),
                 &ModelKind::candidates(SEED),
-                None,
+                Selection::Best(Purpose::Vehicle),
             )?);
         }
         Ok(validations)

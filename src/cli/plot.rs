@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crumple::assess::ComparisonSettings;
+use crumple::assess::choose::Purpose;
 use crumple::assess::train::compare_train;
 use crumple::assess::validate::Choice;
 use crumple::charts::{self, HistoryOptions, Motion, Quantity};
@@ -281,7 +282,12 @@ fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
         return Ok(charts::group_curves(group, cases, args.force.unwrap_or(own)));
     };
     let bar = Bar::new(options, "leaving the speed out");
-    let chart = charts::left_out_at(group, cases, speed, Choice::Auto { seed: 0, trees: None });
+    let chart = charts::left_out_at(
+        group,
+        cases,
+        speed,
+        Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None },
+    );
     bar.end();
     Ok(chart?)
 }

@@ -5,6 +5,7 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use crumple::assess::choose::Purpose;
 use crumple::assess::validate::{self, Choice};
 use crumple::database::Database;
 use crumple::forest::{StopRule, Thresholds};
@@ -25,6 +26,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
 #[command(after_help = "Examples:
   crumple train curves.h5 -o lead.model                # of the only group
   crumple train curves.h5 --group lead-car-wall -o lead.model
+  crumple train curves.h5 --group lead-car-wall --for train -o lead.model
   crumple train curves.h5 --group lead-car-wall --paper -o ddtcm.model
   crumple train curves.h5 --group lead-car-wall --model nearest -o fdrm.model
 auto fits every model with each speed left out (crumple validate shows the table) and takes the
@@ -38,6 +40,10 @@ pub struct Args {
     /// Kind of model
     #[arg(long, value_parser = model_names(), default_value = AUTO)]
     model: String,
+    /// Where the model will be asked: at vehicles of a train also far below the speeds of the runs, so
+    /// that auto counts the ends of the range and prefers a force that follows the closing speed
+    #[arg(long = "for", value_name = "USE", value_parser = one_of(PURPOSES), default_value = "vehicle")]
+    purpose: Purpose,
     /// Number of trees [default: 50 of a forest, 500 of extra]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     trees: Option<u32>,
@@ -58,7 +64,7 @@ pub struct Args {
     stop_threshold: f64,
     /// The reference method's choices: forest of 50 trees on the states at the common
     /// interval, midpoints, Var/Mean
-    #[arg(long, conflicts_with_all = ["model", "trees", "min_samples_leaf", "thresholds", "stop", "stop_threshold"])]
+    #[arg(long, conflicts_with_all = ["model", "purpose", "trees", "min_samples_leaf", "thresholds", "stop", "stop_threshold"])]
     paper: bool,
     /// Model file to write
     #[arg(short, long)]
@@ -74,6 +80,12 @@ fn model_names() -> PossibleValuesParser {
     let models = MODELS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.about));
     PossibleValuesParser::new(iter::once(auto).chain(models))
 }
+
+/// Where a model will be asked.
+const PURPOSES: &[(&str, Purpose, &str)] = &[
+    ("vehicle", Purpose::Vehicle, "One vehicle, between the speeds of the runs"),
+    ("train", Purpose::Train, "Interfaces of a train, also beyond these speeds"),
+];
 
 /// How thresholds of splits are chosen.
 const THRESHOLDS: &[(&str, Thresholds, &str)] = &[
@@ -120,7 +132,11 @@ impl Args {
             ));
         }
         let Some(kind) = kind else {
-            return Ok(Choice::Auto { seed, trees: self.trees.map(|t| t as usize) });
+            return Ok(Choice::Auto {
+                purpose: self.purpose,
+                seed,
+                trees: self.trees.map(|t| t as usize),
+            });
         };
         Ok(Choice::Kind(kind.with_forest(|own| self.forest(own))))
     }

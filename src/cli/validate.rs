@@ -4,7 +4,7 @@ use crumple::plural::counted;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::assess::choose::{NextRun, next_run};
+use crumple::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crumple::assess::error::ValidateError;
 use crumple::assess::validate::{GroupReport, Report, add_nested, validate};
 use crumple::curve::Case;
@@ -130,7 +130,12 @@ fn validated(
     group: &str,
     cases: &[Case],
 ) -> Result<(Validation, Option<NextRun>), ValidateError> {
-    let mut validation = validate(group, cases, &ModelKind::candidates(args.seed), None)?;
+    let mut validation = validate(
+        group,
+        cases,
+        &ModelKind::candidates(args.seed),
+        Selection::Best(Purpose::Vehicle),
+    )?;
     if args.nested {
         add_nested(&mut validation, cases, args.seed)?;
     }

@@ -6,7 +6,7 @@ use super::{
     Cell, Content, KeyFigure, MethodSpeeds, Part, ReportError, ReportSettings, Section, Table,
 };
 use crate::assess::ComparisonSettings;
-use crate::assess::choose::next_run;
+use crate::assess::choose::{Purpose, Selection, next_run};
 use crate::assess::compare::{Comparison, compare, inner_speeds};
 use crate::assess::error::ValidateError;
 use crate::assess::validate::{Choice, train_chosen, validate};
@@ -67,7 +67,12 @@ fn known_or_new(
     let is_of_these = |model: &&Model| model.group == group && model.training_hash == hash;
     match models.iter().find(is_of_these).and_then(|model| model.leave_one_out.clone()) {
         Some(known) => Ok(known),
-        None => validate(group, cases, &ModelKind::candidates(settings.seed), None),
+        None => validate(
+            group,
+            cases,
+            &ModelKind::candidates(settings.seed),
+            Selection::Best(Purpose::Vehicle),
+        ),
     }
 }
 

@@ -7,10 +7,9 @@ use serde_json::value::RawValue;
 
 use super::forest_options::ForestOptions;
 use super::max_crush::MaxCrushRule;
-use super::{CaseCurve, Surrogate};
+use super::{CaseCurve, CrushLaw, ModelError, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
-use crate::forest::ForestError;
 
 /// One model: what it is called, what it needs, how it is fitted and read again.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +24,10 @@ pub struct ModelEntry {
     pub baseline: bool,
     /// Whether it sees parameters besides the speed.
     pub sees_features: bool,
+    /// Whether its force follows the closing speed at each deflection.
+    pub follows_closing: bool,
+    /// Whether it needs runs that tell a crush law with stopped mass.
+    pub needs_crush_law: bool,
     /// Fewest training curves that it answers from.
     pub least_curves: usize,
     /// The rule for the maximal crush of a model that was not validated, if speed alone differs.
@@ -37,7 +40,7 @@ pub struct ModelEntry {
 }
 
 /// Fits a model.
-pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, ForestError>;
+pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, ModelError>;
 
 /// Makes a model of its parameters in a model file.
 pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
@@ -49,12 +52,22 @@ pub(super) struct FitInput<'a> {
     pub curves: &'a [CaseCurve],
     pub force: ForceKind,
     pub forest: Option<&'a ForestOptions>,
+    /// Of the set, if the model needs one and the runs tell one.
+    pub crush_law: Option<&'a CrushLaw>,
 }
 
 impl FitInput<'_> {
     /// The forest's options.
     pub(crate) fn forest_options(&self) -> &ForestOptions {
         self.forest.expect("ModelKind gives options to each model with a forest")
+    }
+
+    /// The crush law with stopped mass.
+    ///
+    /// # Errors
+    /// [`ModelError::NoCrushLaw`] if the runs tell none.
+    pub(crate) fn crush_law(&self) -> Result<CrushLaw, ModelError> {
+        self.crush_law.cloned().ok_or(ModelError::NoCrushLaw)
     }
 }
 

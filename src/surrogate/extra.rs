@@ -11,9 +11,11 @@ use crate::forest::Thresholds;
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "extra",
     about: "Extremely randomised trees",
-    complexity: 3,
+    complexity: 4,
     baseline: false,
     sees_features: true,
+    follows_closing: false,
+    needs_crush_law: false,
     least_curves: 2,
     crush_rule: MaxCrushRule::Motion,
     forest: Some(ForestOptions::extra),

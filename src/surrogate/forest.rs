@@ -19,9 +19,11 @@ pub use super::forest_options::ForestOptions;
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "forest",
     about: "Random forest on speed and deflection (DDTCM)",
-    complexity: 4,
+    complexity: 5,
     baseline: true,
     sees_features: true,
+    follows_closing: false,
+    needs_crush_law: false,
     least_curves: 2,
     // The reference method knows only crush over speed.
     crush_rule: MaxCrushRule::Monotone,

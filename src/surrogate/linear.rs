@@ -13,6 +13,8 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     complexity: 0,
     baseline: true,
     sees_features: false,
+    follows_closing: false,
+    needs_crush_law: false,
     least_curves: 2,
     crush_rule: MaxCrushRule::Motion,
     forest: None,

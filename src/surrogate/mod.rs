@@ -8,6 +8,7 @@ pub mod band;
 mod cached;
 mod cases;
 pub mod crush_law;
+mod crush_law_model;
 pub(crate) mod curves;
 mod entry;
 mod extra;
@@ -36,6 +37,7 @@ use std::fmt::Debug;
 use serde_json::value::RawValue;
 
 pub use cases::ModelCase;
+use crush_law::CrushLaw;
 pub(crate) use curves::CaseCurve;
 pub use entry::ModelEntry;
 pub use model::{Model, ModelError};
@@ -87,6 +89,11 @@ pub(crate) trait Surrogate: Debug + Send + Sync {
     /// Whether it needs the training curves to answer.
     fn answers_from_curves(&self) -> bool {
         true
+    }
+
+    /// Whether it answers from the curves of the contact force, whichever force it gives.
+    fn answers_from_contact(&self) -> bool {
+        false
     }
 
     /// Its forest, if it is one.

@@ -101,6 +101,11 @@ pub enum ModelError {
         /// Models that see it, as a list.
         others: String,
     },
+    /// The runs tell no mass that a crush zone stops.
+    #[error(
+        "model crush-law needs runs that tell the mass which the crush zone stops: contact force and speed of a body against a wall or of two of equal mass, whose momentum agrees; this group's do not: use --model rate"
+    )]
+    NoCrushLaw,
     /// The curve of a case is no envelope.
     #[error("{0}")]
     Curve(#[from] EnvelopeError),
@@ -156,16 +161,19 @@ impl Model {
     /// sees, or its options are wrong.
     pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
         let model = Self::fit_curves(set, kind)?;
-        let crush_law = crush_law(set, &model.curves.declared);
+        let crush_law = match model.crush_law {
+            Some(law) => Some(law),
+            None => crush_law(set, &model.curves.declared),
+        };
         Ok(Self { crush_law, ..model })
     }
 
-    /// The same without a crush law, for trials that only ask for curves.
+    /// The same without a crush law that its curves do not need, for trials that only ask for curves.
     ///
     /// # Errors
     /// As of [`fit`](Self::fit).
     pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
-        Self::check_fits(set, kind)?;
+        Self::check_inputs(set, kind)?;
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
         let curves = Curves::of(&cases)?;
@@ -174,8 +182,14 @@ impl Model {
             false => Vec::new(),
         };
         let speed = |i: usize| cases[i].speed_m_per_s;
+        let needed_law = if kind.entry().needs_crush_law {
+            crush_law(set, &curves.declared).filter(CrushLaw::tells_stopped_mass)
+        } else {
+            None
+        };
         let fitted = |curves: &[CaseCurve], force: ForceKind| {
-            (kind.entry().fit)(&FitInput { set, curves, force, forest: kind.forest_options() })
+            let (forest, crush_law) = (kind.forest_options(), needed_law.as_ref());
+            (kind.entry().fit)(&FitInput { set, curves, force, forest, crush_law })
         };
         Ok(Self {
             written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
@@ -194,12 +208,12 @@ impl Model {
             },
             mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
             leave_one_out: None,
-            crush_law: None,
             fitted: fitted(&curves.declared, set.force_kind)?,
             fitted_body: match set.force_kind {
                 ForceKind::Contact => Some(fitted(&curves.body, ForceKind::Body)?),
                 ForceKind::Body => None,
             },
+            crush_law: needed_law,
             kind,
             cases,
             curves,
@@ -209,8 +223,17 @@ impl Model {
     /// Whether the model can be fitted to the set, without fitting it.
     ///
     /// # Errors
-    /// [`ModelError::TooFewCurves`] or [`ModelError::OneParameter`].
+    /// [`ModelError::TooFewCurves`], [`ModelError::OneParameter`] or [`ModelError::NoCrushLaw`].
     pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
+        Self::check_inputs(set, kind)?;
+        match kind.entry().needs_crush_law {
+            true => Self::fit_curves(set, kind).map(|_| ()),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether number and parameters of the set's cases serve the model.
+    fn check_inputs(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
         let (model, entry) = (kind.name(), kind.entry());
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
@@ -296,7 +319,11 @@ impl Model {
     /// has no others.
     pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
-            Some(body) => body.force_n(&self.curves.body, at, deflection_m),
+            Some(body) => {
+                let contact = body.answers_from_contact();
+                let curves = if contact { &self.curves.declared } else { &self.curves.body };
+                body.force_n(curves, at, deflection_m)
+            }
             None => self.force_n(at, deflection_m),
         }
     }

@@ -7,12 +7,19 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
-use super::{extra, forest, linear, nearest, rate, registered};
+use super::{crush_law_model, extra, forest, linear, nearest, rate, registered};
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
 /// line here.
-pub const MODELS: &[ModelEntry] =
-    &[nearest::ENTRY, linear::ENTRY, rate::ENTRY, registered::ENTRY, extra::ENTRY, forest::ENTRY];
+pub const MODELS: &[ModelEntry] = &[
+    nearest::ENTRY,
+    linear::ENTRY,
+    rate::ENTRY,
+    crush_law_model::ENTRY,
+    registered::ENTRY,
+    extra::ENTRY,
+    forest::ENTRY,
+];
 
 /// Most trees of a forest that is fitted only to compare it with other models.
 const CANDIDATE_TREES: usize = 50;

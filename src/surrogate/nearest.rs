@@ -9,9 +9,11 @@ use super::{CaseCurve, QueryPoint, Surrogate};
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "nearest",
     about: "The FE curve of the nearest speed (FDRM)",
-    complexity: 5,
+    complexity: 6,
     baseline: true,
     sees_features: true,
+    follows_closing: false,
+    needs_crush_law: false,
     least_curves: 1,
     crush_rule: MaxCrushRule::Motion,
     forest: None,

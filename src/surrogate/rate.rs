@@ -25,9 +25,11 @@ use super::{CaseCurve, QueryPoint, Surrogate};
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "rate",
     about: "Linear in speed, with the force following the speed at each deflection",
-    complexity: 1,
+    complexity: 2,
     baseline: false,
     sees_features: false,
+    follows_closing: true,
+    needs_crush_law: false,
     least_curves: 2,
     crush_rule: MaxCrushRule::Motion,
     forest: None,
@@ -51,6 +53,10 @@ pub(crate) struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
+    /// γ, in (s/m)^½: beyond the end of a slower neighbour its Q follows that of the next faster
+    /// curve with `(1 + γ√v)` of the impact speeds; none in the model `rate`.
+    #[serde(skip)]
+    of_impact: f64,
     #[serde(skip)]
     levels: Cached<Levels>,
 }
@@ -63,6 +69,8 @@ struct Levels {
     levels: Vec<f64>,
 }
 
+/// Of the β that fits best, this is taken: two runs that overlap also differ by how they fold.
+const SHARE: f64 = 0.5;
 /// β is looked for from 0 to this: R doubles between standing and 4 m/s.
 const MOST: f64 = 0.5;
 const STEPS: usize = 100;
@@ -83,21 +91,24 @@ impl Rate {
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
     /// curves cannot tell the two causes apart.
     pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
-        Self::of(0.5 * Self::best_sensitivity(cases))
+        Self::of(SHARE * Self::best_sensitivity(cases), 0.0)
     }
 
-    /// With a known β in (s/m)^½.
-    pub(super) fn of(sensitivity: f64) -> Self {
-        Self { sensitivity, levels: Cached::default() }
+    /// With a known β, and γ, in (s/m)^½.
+    pub(super) fn of(sensitivity: f64, of_impact: f64) -> Self {
+        Self { sensitivity, of_impact, levels: Cached::default() }
+    }
+
+    /// Half of the β that fits best, in (s/m)^½, and the γ that explains what this leaves of the
+    /// levels of neighbouring curves.
+    pub(super) fn of_speed_and_impact(cases: &[CaseCurve]) -> (f64, f64) {
+        let sensitivity = SHARE * Self::best_sensitivity(cases);
+        (sensitivity, impact_sensitivity(cases, sensitivity))
     }
 
     /// The β in (s/m)^½ that makes the quotients of neighbouring curves most alike.
     pub(super) fn best_sensitivity(cases: &[CaseCurve]) -> f64 {
-        let trial = |k: usize| MOST * k as f64 / STEPS as f64;
-        let best = (0..=STEPS)
-            .map(|k| (k, disagreement(cases, trial(k))))
-            .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
-        trial(best.0)
+        least(|k| disagreement(cases, trial(k))).map_or(0.0, trial)
     }
 
     fn factor(&self, closing_m_per_s: f64) -> f64 {
@@ -113,7 +124,14 @@ impl Rate {
         }
         let end = case.end_m();
         let fading = (-(d - end) / (FADES * end)).exp();
-        self.quotient(cases, levels, i + 1, d) * (1.0 + (levels[i] - 1.0) * fading)
+        let level = self.level_of_next(cases, i) * (1.0 + (levels[i] - 1.0) * fading);
+        self.quotient(cases, levels, i + 1, d) * level
+    }
+
+    /// What the impact speed of case `i` makes of the Q of the next faster one.
+    fn level_of_next(&self, cases: &[CaseCurve], i: usize) -> f64 {
+        let of = |i: usize| factor(self.of_impact, cases[i].speed_m_per_s);
+        of(i) / of(i + 1)
     }
 
     /// `Q(d; v)` in N at an impact speed: the force of a body that stands still. `cases`: one at
@@ -162,7 +180,7 @@ impl Rate {
             let sum = |case: usize| -> f64 {
                 (0..=POINTS).map(|k| self.quotient(cases, &levels, case, at(k))).sum()
             };
-            let (own, next) = (sum(i), sum(i + 1));
+            let (own, next) = (sum(i), self.level_of_next(cases, i) * sum(i + 1));
             if next > 0.0 {
                 levels[i] = (own / next).clamp(LEVELS.0, LEVELS.1);
             }
@@ -171,8 +189,46 @@ impl Rate {
     }
 }
 
-fn factor(sensitivity: f64, closing_m_per_s: f64) -> f64 {
+/// `1 + β√u`, 1 for bodies that part.
+pub(super) fn factor(sensitivity: f64, closing_m_per_s: f64) -> f64 {
     1.0 + sensitivity * closing_m_per_s.max(0.0).sqrt()
+}
+
+/// The `k`-th sensitivity that is tried, in (s/m)^½.
+fn trial(k: usize) -> f64 {
+    MOST * k as f64 / STEPS as f64
+}
+
+/// The first trial with the least error; `None` if no error is a number.
+fn least(error: impl Fn(usize) -> f64) -> Option<usize> {
+    let best = (0..=STEPS)
+        .map(|k| (k, error(k)))
+        .fold((STEPS + 1, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
+    (best.0 <= STEPS).then_some(best.0)
+}
+
+/// The γ by which the mean quotients of neighbouring curves, over their overlaps, differ as
+/// `1 + γ√v` of their impact speeds: least squares of the logarithms.
+fn impact_sensitivity(cases: &[CaseCurve], sensitivity: f64) -> f64 {
+    let quotient = |case: &CaseCurve, end_m: f64| -> f64 {
+        let at = |k: usize| end_m * k as f64 / POINTS as f64;
+        let q = |d: f64| case.force_at(d) / factor(sensitivity, case.closing_at(d));
+        (0..POINTS).map(|k| q(at(k))).sum()
+    };
+    let of_pair = |pair: &[CaseCurve]| {
+        let end_m = pair[0].end_m().min(pair[1].end_m());
+        let (slow, fast) = (quotient(&pair[0], end_m), quotient(&pair[1], end_m));
+        let known = slow > 0.0 && fast > 0.0;
+        known.then(|| ((slow / fast).ln(), pair[0].speed_m_per_s, pair[1].speed_m_per_s))
+    };
+    let pairs: Vec<(f64, f64, f64)> = cases.windows(2).filter_map(of_pair).collect();
+    let error = |k: usize| -> f64 {
+        let of = |&(found, slow, fast): &(f64, f64, f64)| {
+            (found - (factor(trial(k), slow) / factor(trial(k), fast)).ln()).powi(2)
+        };
+        pairs.iter().map(of).sum()
+    };
+    least(error).map_or(0.0, trial)
 }
 
 /// Mean difference of neighbouring quotients over their overlaps, in ratio to their level.
@@ -258,7 +314,7 @@ mod tests {
         let cases: Vec<CaseCurve> = [8.0, 12.0, 20.0].map(|v| made(v, 0.06, 24e3)).to_vec();
         let fitted = Rate::fit(&cases);
         assert!((fitted.sensitivity - 0.03).abs() < 0.003, "{}", fitted.sensitivity);
-        let exact = Rate { sensitivity: 0.06, levels: Cached::default() };
+        let exact = Rate::of(0.06, 0.0);
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
         let at =
@@ -280,7 +336,7 @@ mod tests {
     #[test]
     fn given_speeds_are_used() {
         let cases: Vec<CaseCurve> = [8.0, 20.0].map(|v| made(v, 0.0, 24e3)).to_vec();
-        let rate = Rate { sensitivity: 0.1, levels: Cached::default() };
+        let rate = Rate::of(0.1, 0.0);
         let at = |closing| QueryPoint {
             speed_m_per_s: 8.0,
             features: &[],

@@ -12,9 +12,11 @@ use super::{CaseCurve, QueryPoint, Surrogate};
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "registered",
     about: "Peaks matched and warped onto each other before curves are blended",
-    complexity: 2,
+    complexity: 3,
     baseline: false,
     sees_features: false,
+    follows_closing: false,
+    needs_crush_law: false,
     least_curves: 2,
     crush_rule: MaxCrushRule::Motion,
     forest: None,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
+use crate::assess::choose::Purpose;
 use crate::assess::error::{CompareError, TrainError};
 use crate::assess::methods::{ddtcm_model, fit_nsdm};
 use crate::assess::settings::ComparisonSettings;
@@ -94,7 +95,7 @@ pub(super) fn methods(
 
     let start = Instant::now();
     let best = with_models(sources, &groups, |group, cases| {
-        let choice = Choice::Auto { seed: settings.seed, trees: None };
+        let choice = Choice::Auto { purpose: Purpose::Train, seed: settings.seed, trees: None };
         Ok(validate::train(group, cases, choice)?)
     })?;
     let fit_s = start.elapsed().as_secs_f64();
