@@ -158,7 +158,9 @@ impl Flow<'_> {
     fn build(&mut self) -> Result<Database, Failure> {
         let path = self.path("curves.h5");
         let mut database = Database::default();
-        for group in FE_RUNS.dirs() {
+        let is_trained =
+            |dir: &&Dir<'_>| MODELS.iter().any(|(group, _)| dir.path() == Path::new(group));
+        for group in FE_RUNS.dirs().filter(is_trained) {
             let manifest = self.folder.join("fe").join(group.path()).join("study.toml");
             let report = build::build(&manifest, &path, |run| self.bar.step(run))?;
             for BuiltRun { outcome, .. } in report.runs {
