@@ -75,9 +75,7 @@ impl PredictedCurve {
             force_n,
         };
         curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&loading);
-        if let Some(body) = body {
-            curve.body_unloading_stiffness_n_per_m = Some(curve.stiffness_at_end(&body.loading));
-        }
+        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b.loading));
         Ok(curve)
     }
 }
