@@ -240,7 +240,7 @@ fn two_variables(model: &Model) -> Anything<String> {
     let names = speeds.map(|kmh| format!("{kmh} km/h"));
     for (k, kmh) in speeds.iter().enumerate() {
         let numbers = |line: &str| line.split(',').filter_map(|n| n.parse().ok()).collect();
-        let rows = table.lines().map(numbers).filter(|row: &Vec<f64>| row.len() == 3);
+        let rows = table.lines().map(numbers).filter(|row: &Vec<f64>| row.len() >= 3);
         let of_speed = rows.filter(|row| (row[0] * 3.6 - kmh).abs() < 0.01);
         let row: Points = of_speed.map(|row| (row[1], row[2])).collect();
         let (curve, _) = predict_beyond(model, &Query::at(kmh / 3.6))?;
@@ -256,7 +256,11 @@ fn two_variables(model: &Model) -> Anything<String> {
 
 /// The points of the CSV file as they stand, and as tools with elongation positive take them.
 fn other_tools(predicted: &ExportInput) -> Anything<String> {
-    let rows = rows(&exported(predicted, "csv", "csv")?, "d_m", "#");
+    let csv = exported(predicted, "csv", "csv")?;
+    // Deflection and force, without the edges of the band.
+    let pair = |line: &str| line.split(',').take(2).collect::<Vec<_>>().join(",");
+    let pairs: Vec<String> = csv.lines().map(pair).collect();
+    let rows = rows(&pairs.join("\n"), "d_m", "#");
     let end = rows[rows.len() - 1].0;
     let mut left = Sheet::whole("compression positive, as in the file");
     left.line(0, rows.clone());

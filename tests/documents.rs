@@ -123,7 +123,9 @@ fn documents_are_those_of_the_schemas() {
         ("forest", "train-paper", &["--speed", "42km/h", "--paper"]),
     ] {
         let document = printed(here, &[&["predict", model], arguments].concat());
-        assert_eq!(document["force_low_N"].is_array(), name != "without-band", "{name}");
+        for edge in ["force_low_N", "body_force_low_N"] {
+            assert_eq!(document[edge].is_array(), name != "without-band", "{name}");
+        }
         add(predicted, name, document);
     }
 

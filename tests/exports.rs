@@ -15,6 +15,8 @@ use crumple::formats::read::{self, ReadOptions};
 use crumple::unit::UnitSystem;
 use serde_json::{Value, json};
 
+/// The edges of both bands in a predicted curve.
+const BANDS: [&str; 4] = ["force_low_N", "force_high_N", "body_force_low_N", "body_force_high_N"];
 /// Units in which the exports of this test stand; readers of files without units are told them.
 const UNITS: &str = "mm-t-s";
 /// Exports of one curve, by file.
@@ -50,8 +52,9 @@ fn with_points(folder: &Path, name: &str, points: &[(f64, f64)]) {
     curve["deflection_m"] = json!(d);
     curve["force_N"] = json!(f);
     curve["body_force_N"] = json!(f);
-    curve.as_object_mut().unwrap().remove("force_low_N");
-    curve.as_object_mut().unwrap().remove("force_high_N");
+    for key in BANDS {
+        curve.as_object_mut().unwrap().remove(key);
+    }
     fs::write(folder.join(name), curve.to_string()).unwrap();
 }
 
@@ -183,7 +186,7 @@ fn octave_reads_the_matrices() {
     let folder = demo_folder();
     let here = folder.path();
     export(here, "lead50.json", "a.mat", &[]);
-    export(here, "lead50.json", "band.mat", &["--force", "contact", "--tail", "none"]);
+    export(here, "lead50.json", "band.mat", &["--tail", "none"]);
     let program = "load('a.mat'); x = linspace(0, max_deflection_m, 200); \
         printf('%.17g ', interp1(fd_load(:,1), fd_load(:,2), x)); \
         printf('\\n%.17g %.17g %.17g\\n', k_u, fd_unload(2,1), fd_unload(2,2)); disp(facts(1,:)); \
@@ -210,12 +213,12 @@ fn octave_reads_the_matrices() {
     assert_eq!(unloading[0], curve["body_unloading_stiffness_N_per_m"].as_f64().unwrap());
     assert_eq!(unloading[1], envelope.end_m());
     assert!(lines[2].starts_with("curve: lead-car-wall 50 km/h"));
-    assert_eq!(numbers(lines[3]), column("force_low_N"));
-    assert_eq!(numbers(lines[4]), column("force_high_N"));
+    assert_eq!(numbers(lines[3]), column("body_force_low_N"));
+    assert_eq!(numbers(lines[4]), column("body_force_high_N"));
     assert_eq!(lines[5], "1");
 }
 
-/// Tables and matrices hold the band of the contact force; of the body force none is known, which is said.
+/// Columns, matrices and tables hold the band of the force that they hold: JSON and they agree.
 #[test]
 fn bands_stand_beside_their_curves() {
     let folder = demo_folder();
@@ -223,27 +226,53 @@ fn bands_stand_beside_their_curves() {
     let curve: Value =
         serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
-    let contact = ["--force", "contact"];
-    // The matrices by our own reader: their points are those of the curve.
-    export(here, "lead50.json", "band.mat", &[&contact[..], &["--tail", "none"]].concat());
-    for (name, key) in [("fd_low", "force_low_N"), ("fd_high", "force_high_N")] {
-        let options = ReadOptions {
-            units: UnitSystem::parse("SI").ok(),
-            curve: Some(name.into()),
-            ..ReadOptions::default()
-        };
-        let (edge, _) = read::read(&here.join("band.mat"), &options).unwrap();
-        assert_eq!((edge.deflection_m, edge.force_n), (column("deflection_m"), column(key)));
+    assert_ne!(column("force_low_N"), column("body_force_low_N"));
+    // The body force is what is written unless another is asked for.
+    for (force, prefix) in [(&["--force", "contact"][..], ""), (&[], "body_")] {
+        let keys = ["force_low_N", "force_high_N"].map(|edge| format!("{prefix}{edge}"));
+        let [low, high] = keys.each_ref().map(|key| column(key));
+        let d = column("deflection_m");
+        // The matrices by our own reader: their points are those of the curve.
+        export(here, "lead50.json", "band.mat", &[force, &["--tail", "none"]].concat());
+        for (name, edge_n) in [("fd_low", &low), ("fd_high", &high)] {
+            let options = ReadOptions {
+                units: UnitSystem::parse("SI").ok(),
+                curve: Some(name.into()),
+                ..ReadOptions::default()
+            };
+            let (edge, _) = read::read(&here.join("band.mat"), &options).unwrap();
+            assert_eq!((&edge.deflection_m, &edge.force_n), (&d, edge_n), "{name} {prefix}");
+        }
+        // Columns, to nine digits.
+        export(here, "lead50.json", "band.csv", &[force, &["--tail", "none"]].concat());
+        let csv = fs::read_to_string(here.join("band.csv")).unwrap();
+        assert!(csv.contains("\nd_m,force_N,lo,hi\n"), "{csv}");
+        let rows = csv.lines().filter(|l| !l.starts_with('#')).skip(1);
+        let rows: Vec<Vec<f64>> =
+            rows.map(|row| row.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+        assert_eq!(rows.len(), d.len());
+        for (i, row) in rows.iter().enumerate() {
+            let close = |a: f64, b: f64| (a - b).abs() <= 5e-9 * b.abs();
+            assert!(close(row[2], low[i]) && close(row[3], high[i]), "{row:?}");
+            assert!(row[2] <= row[1] && row[1] <= row[3], "{row:?}");
+        }
+        table_holds_the_band(here, force, &keys, &curve);
+        for to in ["csv", "mat"] {
+            let asked = [&["--to", to, "-o", "x"], force].concat();
+            assert!(!export_notes(here, "lead50.json", &asked).contains("band"));
+        }
     }
-    let envelope =
-        |key: &str| crumple::curve::Envelope::new(column("deflection_m"), column(key)).unwrap();
-    let (low, high) = (envelope("force_low_N"), envelope("force_high_N"));
-    export(
-        here,
-        "lead.model",
-        "band.csv",
-        &[&contact[..], &["--to", "table", "--speed", "50km/h,54km/h"]].concat(),
-    );
+}
+
+/// The table of a model has at a speed the band of the curve that is predicted there.
+fn table_holds_the_band(here: &Path, force: &[&str], keys: &[String; 2], curve: &Value) {
+    let envelope = |key: &String| {
+        let column = |key: &str| serde_json::from_value(curve[key].clone()).unwrap();
+        crumple::curve::Envelope::new(column("deflection_m"), column(key)).unwrap()
+    };
+    let [low, high] = keys.each_ref().map(envelope);
+    let to_table = ["--to", "table", "--speed", "50km/h,54km/h"];
+    export(here, "lead.model", "band.csv", &[force, &to_table].concat());
     let table = fs::read_to_string(here.join("band.csv")).unwrap();
     assert!(table.contains("\nspeed_m_per_s,d_m,force_N,force_low_N,force_high_N\n"));
     assert!(table.contains("\n# band: force_low_N to force_high_N: empirical range for 90 %"));
@@ -261,38 +290,50 @@ fn bands_stand_beside_their_curves() {
         compared += 1;
     }
     assert!(compared > 900, "{compared}");
-    // None is written, and said, of the body force, of softened curves and where the model has none.
-    let notes = |input: &str, more: &[&str]| -> String {
-        let arguments = [&["export", input, "--json"][..], more].concat();
-        let said: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
-        said["notes"].to_string()
+}
+
+/// What `export` says beside what it writes.
+fn export_notes(here: &Path, input: &str, more: &[&str]) -> String {
+    let arguments = [&["export", input, "--json"][..], more].concat();
+    let said: Value = serde_json::from_str(&crumple_ok(here, &arguments)).unwrap();
+    said["notes"].to_string()
+}
+
+/// No band is written, and said, of softened curves, where the model has none, and of the body force where only that of
+/// the contact force is known, as of older files.
+#[test]
+fn a_missing_band_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = fs::read_to_string(here.join("lead50.json")).unwrap();
+    let without = |name: &str, keys: &[&str]| {
+        let mut curve: Value = serde_json::from_str(&text).unwrap();
+        keys.iter().for_each(|key| drop(curve.as_object_mut().unwrap().remove(*key)));
+        fs::write(here.join(name), curve.to_string()).unwrap();
     };
-    let of_body =
-        "written without a band: only that of the contact force is known (--force contact)";
+    without("older.json", &BANDS[2..]);
+    without("bare.json", &BANDS);
+    let contact = ["--force", "contact"];
     for to in ["csv", "mat"] {
-        assert!(notes("lead50.json", &["--to", to, "-o", "x"]).contains(of_body));
-        assert!(
-            !notes("lead50.json", &["--to", to, "-o", "x", "--force", "contact"]).contains("band")
-        );
-        let group = ["--group", "lead-car-wall", "--case", "36kmh", "--to", to, "-o", "x"];
-        assert!(!notes("curves.h5", &group).contains("band"), "a record has none");
+        let to = ["--to", to, "-o", "x"];
+        let older = export_notes(here, "older.json", &to);
+        let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained anew";
+        assert!(older.contains(of_body), "{older}");
+        let of_contact = export_notes(here, "older.json", &[&to[..], &contact].concat());
+        assert!(!of_contact.contains("band"), "{of_contact}");
+        let group = ["--group", "lead-car-wall", "--case", "36kmh"];
+        let record = export_notes(here, "curves.h5", &[&group[..], &to].concat());
+        assert!(!record.contains("band"), "a record has none");
+        for force in [&contact[..], &[]] {
+            let bare = export_notes(here, "bare.json", &[&to, force].concat());
+            assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
+        }
+        // The body force has no flank that is too steep.
+        let soft = [&to, &contact[..], &["--soften"]].concat();
+        let soft = export_notes(here, "lead50.json", &soft);
+        assert!(soft.contains("written without a band: it is not that of a softened"), "{soft}");
     }
-    assert!(
-        notes("lead.model", &["--to", "table", "-o", "x"]).contains(&format!("table: {of_body}"))
-    );
-    let soft = ["--force", "contact", "--soften", "--to", "mat", "-o", "x"];
-    assert!(
-        notes("lead50.json", &soft)
-            .contains("written without a band: it is not that of a softened")
-    );
-    // Without left-out ends there is none outside of the training speeds: those rows are no numbers.
-    let mut bare: Value = curve.clone();
-    for key in ["force_low_N", "force_high_N"] {
-        bare.as_object_mut().unwrap().remove(key);
-    }
-    fs::write(here.join("bare.json"), bare.to_string()).unwrap();
-    let bare = notes("bare.json", &["--to", "csv", "-o", "x", "--force", "contact"]);
-    assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
+    assert!(!export_notes(here, "lead.model", &["--to", "table", "-o", "x"]).contains("band"));
 }
 
 /// A Modelica package has the name of its file, so that two curves of one name keep apart in a folder.
@@ -402,8 +443,8 @@ fn h5py_reads_the_table_of_a_model() {
     fs::write(here.join("curves.json"), format!("[{}]", curves.join(","))).unwrap();
     export(here, "vehicle.model", "table.h5", &["--to", "table"]);
     export(here, "lead.model", "table.csv", &["--to", "table", "--speed", "36km/h,50km/h"]);
-    export(here, "vehicle.model", "band.h5", &["--to", "table", "--force", "contact"]);
-    let files = ["table.h5", "table.csv", "curves.json", "band.h5"];
+    export(here, "vehicle.model", "contact.h5", &["--to", "table", "--force", "contact"]);
+    let files = ["table.h5", "table.csv", "curves.json", "contact.h5"];
     let arguments = files.map(|f| here.join(f).display().to_string());
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let found = run_python(python(), "exports_table.py", &arguments);
@@ -422,7 +463,7 @@ fn h5py_reads_the_table_of_a_model() {
     assert!(worst < 1e-3, "energy of a speed's row to its maximal crush is off by {worst}");
     assert!(found["speeds"].as_u64().unwrap() >= 25);
     assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
-    assert_eq!(found["compared_bands"], 4, "{found}");
+    assert_eq!(found["compared_bands"], 8, "four speeds, two forces: {found}");
     assert!(found["worst_band"].as_f64().unwrap() < 5e-3, "{found}");
 }
 

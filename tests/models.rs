@@ -206,8 +206,150 @@ fn the_band_knows_where_it_is() {
     assert!(ask(5.0).provenance.band.is_some());
     let outside = ask(20.0);
     assert!(outside.provenance.band.is_none() && outside.force_low_n.is_none());
-    let said = outside.warnings.iter().find(|w| w.code.name() == "no_band").unwrap();
+    assert!(outside.provenance.body_band.is_none() && outside.body_force_low_n.is_none());
+    let said: Vec<_> = outside.warnings.iter().filter(|w| w.code.name() == "no_band").collect();
+    assert_eq!(said.len(), 1, "once for both forces");
+    let said = said[0];
     assert!(said.message.contains("outside the training cases' angle_deg"), "{said}");
+}
+
+/// A family whose contact force has an error of its own at each speed, which the body does not feel.
+fn family_with_odd_contact(speeds: &[f64]) -> Vec<Case> {
+    let odd = |mut made: Case| {
+        let factor = 1.0 + 0.2 * (made.speed.m_per_s * made.speed.m_per_s).sin();
+        let of = |curve: &Curve| {
+            let force_n = curve.force_n().iter().map(|f| factor * f).collect();
+            Curve::new(curve.time_s().to_vec(), curve.deflection_m().to_vec(), force_n).unwrap()
+        };
+        (made.sampled, made.original) = (of(&made.sampled), of(&made.original));
+        made
+    };
+    family(speeds).into_iter().map(odd).collect()
+}
+
+/// Root mean square of the residuals of one force at the inner speeds, left out, in ratio to the local level and over
+/// one gap, times Student's t: the half width of its band at the mean of the gaps.
+fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f64 {
+    let set = TrainingSet::new("made", cases).unwrap();
+    let inner = 1..cases.len() - 1;
+    let gap = |i: usize| cases[i + 1].speed.m_per_s - cases[i - 1].speed.m_per_s;
+    let mean_gap = inner.clone().map(gap).sum::<f64>() / inner.len() as f64;
+    let mean_square = |i: usize| {
+        let mut others = cases.to_vec();
+        let v = others.remove(i).speed.m_per_s;
+        let rest = TrainingSet::new("made", &others).unwrap();
+        let model = Model::fit(&rest, ModelKind::linear()).unwrap();
+        let curve = predict(&model, &Query::at(v).with_rule(rule)).unwrap();
+        let predicted = curve.driving(force).unwrap().loading;
+        let fe = match force {
+            ForceKind::Contact => &set.cases[i].envelope,
+            ForceKind::Body => &set.cases[i].motion.force,
+        };
+        let end = set.cases[i].envelope.end_m();
+        let steps = ((end / 0.002).ceil() as usize).max(400);
+        let at = |k: usize| end * k as f64 / steps as f64;
+        let predicted_n: Vec<f64> = (0..=steps).map(|k| predicted.force_at(at(k))).collect();
+        let half = (0.05 * (steps + 1) as f64).round() as usize;
+        let level = |k: usize| {
+            let around = &predicted_n[k.saturating_sub(half)..(k + half + 1).min(steps + 1)];
+            around.iter().sum::<f64>() / around.len() as f64
+        };
+        let first = (0..=steps).find(|&k| at(k) >= curve.deflection_m[1]).unwrap();
+        let square = |k: usize| ((fe.force_at(at(k)) - predicted_n[k]) / level(k)).powi(2);
+        (first..=steps).map(square).sum::<f64>() / (steps + 1 - first) as f64
+    };
+    let over_gap = |i: usize| mean_square(i) / (gap(i) / mean_gap).powf(1.3);
+    let student_t = [6.3138, 2.92, 2.3534][inner.len() - 1];
+    student_t * (inner.clone().map(over_gap).sum::<f64>() / inner.len() as f64).sqrt()
+}
+
+/// The band of the body force is made of its own residuals, not of the contact force's.
+#[test]
+fn the_body_force_has_a_band_of_its_own() {
+    let cases = family_with_odd_contact(&[7.0, 10.0, 13.0, 17.0, 20.0]);
+    let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
+    let validation = model.leave_one_out.as_ref().unwrap();
+    let (contact, body) = (validation.band.unwrap(), validation.body_band.unwrap());
+    assert!(contact.pointwise_share > 3.0 * body.pointwise_share, "{contact:?} {body:?}");
+    for (band, force) in [(contact, ForceKind::Contact), (body, ForceKind::Body)] {
+        let expected = half_width_by_hand(&cases, model.max_crush_rule, force);
+        let found = band.pointwise_share;
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} is not {expected}");
+        assert!(band.coverage.is_some() && band.curves == 3);
+    }
+    let (ends, inner) = (validation.body_band_outside.unwrap(), body);
+    assert_eq!((ends.curves, ends.span_m_per_s), (2, 3.0));
+    // A query's gap is narrower; the edges are those of the share, around each force.
+    let found = curve(&model, 12.0);
+    let at = found.provenance.body_band.unwrap();
+    let expected = inner.pointwise_share * (3.0 / inner.span_m_per_s).powf(0.65);
+    assert!((at.pointwise_share / expected - 1.0).abs() < 1e-12, "{at:?}");
+    let (f, low, high) = (
+        found.body_force_n.as_ref().unwrap(),
+        found.body_force_low_n.as_ref().unwrap(),
+        found.body_force_high_n.as_ref().unwrap(),
+    );
+    // Where the force is even its level is the force.
+    let flat = found.deflection_m.iter().position(|&d| d > 0.2).unwrap();
+    for edge in [high[flat] / f[flat] - 1.0, 1.0 - low[flat] / f[flat]] {
+        assert!((edge / at.pointwise_share - 1.0).abs() < 0.05, "{edge} of {at:?}");
+    }
+    // One force alone takes its own band along.
+    let alone = |force| found.of_force(force).unwrap();
+    let (of_body, of_contact) = (alone(ForceKind::Body), alone(ForceKind::Contact));
+    assert_eq!(
+        (of_body.force_low_n.as_ref(), of_body.force_high_n.as_ref()),
+        (Some(low), Some(high))
+    );
+    assert_eq!(of_body.provenance.band, found.provenance.body_band);
+    assert_eq!(of_contact.force_low_n, found.force_low_n);
+    for one in [of_body, of_contact] {
+        assert!(one.body_force_low_n.is_none() && one.provenance.body_band.is_none());
+    }
+}
+
+/// What is recorded as the body's own force has one band alone.
+#[test]
+fn a_declared_body_force_has_one_band() {
+    let mut cases = family(&[7.0, 10.0, 13.0, 17.0]);
+    cases.iter_mut().for_each(|case| case.force_kind = ForceKind::Body);
+    let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
+    let validation = model.leave_one_out.as_ref().unwrap();
+    assert!(validation.band.is_some() && validation.body_band.is_none());
+    let found = curve(&model, 12.0);
+    assert!(found.force_low_n.is_some() && found.body_force_low_n.is_none());
+    let bands: Vec<ForceKind> = found.provenance.bands().map(|(force, _)| force).collect();
+    assert_eq!(bands, [ForceKind::Body]);
+}
+
+/// Models trained before the body force had a band are read; what they lack is said.
+#[test]
+fn older_models_have_no_band_of_the_body_force() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = std::fs::read_to_string(here.join("lead.model")).unwrap();
+    let mut model: Value = serde_json::from_str(&text).unwrap();
+    let of = model["leave_one_out"].as_object_mut().unwrap();
+    assert!(of.remove("body_band").is_some() && of.remove("body_band_outside").is_some());
+    std::fs::write(here.join("older.model"), model.to_string()).unwrap();
+    let predict = |model: &str| crumple_ok(here, &["predict", model, "--speed", "50km/h"]);
+    let (newer, older) = (predict("lead.model"), predict("older.model"));
+    let said = "band of body force   not known until the model is trained anew";
+    assert!(older.contains(said) && !newer.contains(said), "{older}");
+    for (text, bands) in [(&newer, 2), (&older, 1)] {
+        assert_eq!(text.matches("\n  band                 ±").count(), bands, "{text}");
+    }
+    assert!(newer.contains("% of the local contact force: ") && newer.contains(" body force: "));
+    let scenario = "[run]\nduration = \"100ms\"\n[curves]\n\
+        c = { model = \"older.model\", force = \"body\", band = 0.5 }\n\
+        [[train]]\nname = \"A\"\nspeed = \"50km/h\"\nvehicles = [ { name = \"A1\", mass = \"24t\" } ]\n[wall]\n\
+        [contact]\ncurve = \"c\"\n";
+    std::fs::write(here.join("s.toml"), scenario).unwrap();
+    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    assert!(
+        error.contains("no band around its body force: remove band, or train the model anew"),
+        "{error}"
+    );
 }
 
 /// 500 km/h of a model trained to 72 was answered as if it were 50.
@@ -260,6 +402,10 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     let path = std::path::Path::new("other.model");
     let read = |json: &Value| Model::parse(path, &serde_json::to_vec(json).unwrap());
     assert!(curve(&read(&json).unwrap(), 9.0).provenance.band.is_some());
+    let mut wide = json.clone();
+    wide["leave_one_out"]["body_band"]["pointwise_share"] = (-0.1).into();
+    let error = read(&wide).unwrap_err().to_string();
+    assert!(error.contains("the widths or the span of its band"), "{error}");
     json["version"] = 2.into();
     assert_eq!(
         read(&json).unwrap_err().to_string(),
@@ -353,6 +499,7 @@ fn order_and_names_of_cases_change_nothing() {
         assert_eq!(a.force_n, b.force_n, "{}", options.name());
         assert_eq!(a.body_force_n, b.body_force_n, "{}", options.name());
         assert_eq!(a.force_low_n, b.force_low_n, "{}", options.name());
+        assert_eq!(a.body_force_low_n, b.body_force_low_n, "{}", options.name());
     }
 }
 
@@ -377,6 +524,7 @@ fn one_to_five_curves() {
             let validation = model.leave_one_out.unwrap();
             assert_eq!(validation.means.is_empty(), n < 3);
             assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));
+            assert_eq!(validation.body_band.map(|b| b.curves), (n >= 3).then(|| n - 2));
         }
         let auto =
             train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })

@@ -57,6 +57,10 @@ fn a_known_scatter_comes_out() {
     within(three.force_share, 0.02, 5e-3);
     within(three.force_l1, 0.04 / 3.0 * 1.5_f64.sqrt(), 5e-3);
     assert!(three.largest_force_share >= three.force_share);
+    // The force moves the body by itself; CFC 60 rounds where it begins and ends.
+    let body = three.body.unwrap();
+    within(body.force_share, 0.02, 0.15);
+    assert!(body.largest_force_share >= body.force_share);
     assert_eq!((three.degrees_of_freedom, three.speeds.len()), (2, 1));
     assert_eq!(three.speeds[0].runs, ["a", "b", "c"]);
     near(three.speeds[0].speed_m_per_s, 12.0);
@@ -65,7 +69,11 @@ fn a_known_scatter_comes_out() {
     let both = scatter_of(&cases).unwrap();
     let (first, second) = (three.force_share, both.speeds[1].force_share);
     within(second, 0.01 * 2.0_f64.sqrt(), 5e-3);
-    near(both.force_share, ((2.0 * first * first + second * second) / 3.0).sqrt());
+    let pooled = |first: f64, second: f64| ((2.0 * first * first + second * second) / 3.0).sqrt();
+    near(both.force_share, pooled(first, second));
+    let body_at = |scatter: &Scatter, k: usize| scatter.speeds[k].body.unwrap().force_share;
+    let expected = pooled(body_at(&three, 0), body_at(&both, 1));
+    near(both.body.unwrap().force_share, expected);
     assert_eq!(both.degrees_of_freedom, 3);
     near(both.velocity_l1, (2.0 * three.velocity_l1 + both.speeds[1].velocity_l1) / 3.0);
 }
@@ -148,7 +156,13 @@ fn the_scatter_is_the_floor_of_the_band() {
         near(of_scatter, 2.92 * scatter.force_share);
         assert!(band.pointwise_share >= of_scatter);
         near(band.pointwise_share, band.interpolation_share().hypot(of_scatter));
+        // That of the body force has the scatter of the body force.
+        let band = predict(&model, &Query::at(v)).unwrap().provenance.body_band.unwrap();
+        let of_scatter = band.scatter.unwrap();
+        near(of_scatter.pointwise_share, 2.92 * scatter.body.unwrap().force_share);
+        near(of_scatter.simultaneous_share, 2.92 * scatter.body.unwrap().largest_force_share);
     }
+    assert_ne!(scatter.body.unwrap().force_share, scatter.force_share);
     // The file keeps it.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.model");
@@ -170,6 +184,7 @@ fn runs_of_the_same_bytes_change_no_prediction() {
             assert_eq!(one.force_n, two.force_n);
             assert_eq!(one.body_force_n, two.body_force_n);
             assert_eq!(one.force_low_n, two.force_low_n);
+            assert_eq!(one.body_force_low_n, two.body_force_low_n);
             assert_eq!(one.unloading_stiffness_n_per_m, two.unloading_stiffness_n_per_m);
             assert_eq!((one.rebound, one.warnings), (two.rebound, two.warnings));
             let share = two.provenance.band.unwrap().scatter.unwrap().pointwise_share;
@@ -217,7 +232,10 @@ fn every_command_takes_replicates() {
     assert!(printed.contains(line) && printed.contains(": no model can remove this part"));
     // Beside the means, and at the speed itself.
     assert_eq!(printed.matches("\nFE scatter (floor)").count(), 2, "{printed}");
-    assert!(printed.contains("of the local force (interpolation ±"), "{printed}");
+    for force in ["contact", "body"] {
+        let parts = format!("of the local {force} force (interpolation ±");
+        assert!(printed.contains(&parts), "{printed}");
+    }
     let report: Value =
         serde_json::from_str(&crumple_ok(here, &["validate", "c.h5", "--json"])).unwrap();
     let scatter = &report["groups"][0]["scatter"];

@@ -12,7 +12,7 @@ use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, LeftOutSpeeds, Residuals};
 use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::predict::Prediction;
+use crate::surrogate::predict::{PredictError, Prediction};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
 
@@ -156,8 +156,8 @@ impl<'a> LeftOutCase<'a> {
         let envelope = curve.envelope()?;
         let end = self.own.envelope.end_m();
         let along = grid(end, STEPS);
-        let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
-        let (reference, predicted) = (at(&self.own.envelope), at(&envelope));
+        let (reference, predicted) =
+            (forces_n(&self.own.envelope, &along), forces_n(&envelope, &along));
         let driven_by = |force| -> Result<MotionErrors, ValidateError> {
             Ok(self.reference.errors_with(&curve.driving(force)?)?)
         };
@@ -166,14 +166,7 @@ impl<'a> LeftOutCase<'a> {
             energy_error: curve.energy_j / self.own.envelope.work() - 1.0,
             max_crush_error: curve.max_deflection_m / end - 1.0,
             peaks: peak_errors(&along, &reference, &predicted),
-            residuals: {
-                // Up to its first point a prediction rises from 0, which FE does not.
-                let first = curve.deflection_m[1];
-                let from = along.iter().position(|&d| d >= first).unwrap_or(0);
-                let ratios = band::ratios(&reference, &predicted).split_off(from);
-                let runs = self.own.runs.len();
-                Residuals { span_m_per_s: self.span_m_per_s, ratios, runs }
-            },
+            residuals: self.residuals(&curve, &along)?,
             body: driven_by(ForceKind::Body)?,
             contact: match curve.body_force_n {
                 Some(_) => Some(driven_by(ForceKind::Contact)?),
@@ -186,6 +179,34 @@ impl<'a> LeftOutCase<'a> {
             false => Err(ValidateError::NotFinite),
         }
     }
+
+    /// Residuals of each force of a predicted curve `along` FE's crush, in m.
+    fn residuals(
+        &self,
+        curve: &PredictedCurve,
+        along: &[f64],
+    ) -> Result<BTreeMap<ForceKind, Residuals>, PredictError> {
+        // Up to its first point a prediction rises from 0, which FE does not.
+        let first = curve.deflection_m[1];
+        let from = along.iter().position(|&d| d >= first).unwrap_or(0);
+        let of = |fe: &Envelope, predicted: &Envelope| Residuals {
+            span_m_per_s: self.span_m_per_s,
+            ratios: band::ratios(&forces_n(fe, along), &forces_n(predicted, along)).split_off(from),
+            runs: self.own.runs.len(),
+        };
+        let declared = of(&self.own.envelope, &curve.envelope()?);
+        let mut residuals = BTreeMap::from([(curve.provenance.force_kind, declared)]);
+        if curve.body_force_n.is_some() {
+            let body = of(&self.own.motion.force, &curve.driving_envelope()?);
+            residuals.insert(ForceKind::Body, body);
+        }
+        Ok(residuals)
+    }
+}
+
+/// The forces in N at these deflections.
+pub(super) fn forces_n(envelope: &Envelope, deflection_m: &[f64]) -> Vec<f64> {
+    deflection_m.iter().map(|&d| envelope.force_at(d)).collect()
 }
 
 /// The recipe's force, or another of the case, with the unloading that gives FE's rebound.
@@ -203,7 +224,7 @@ pub(super) struct Judged {
     pub energy_error: f64,
     pub max_crush_error: f64,
     pub peaks: Vec<PeakError>,
-    pub residuals: Residuals,
+    pub residuals: BTreeMap<ForceKind, Residuals>,
     pub body: MotionErrors,
     pub contact: Option<MotionErrors>,
 }
@@ -222,10 +243,6 @@ pub(super) struct Trial {
 impl Trial {
     pub(crate) fn left_out(&self) -> LeftOutSpeeds {
         LeftOutSpeeds::of(self.inner)
-    }
-
-    pub(crate) fn residuals(&self, rule: MaxCrushRule) -> Option<Residuals> {
-        Some(self.judged(rule)?.residuals.clone())
     }
 
     pub(crate) fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {

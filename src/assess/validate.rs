@@ -16,11 +16,11 @@ use super::choose::{NextRun, Purpose, Selection, choose};
 use super::error::ValidateError;
 use super::left_out::{LeftOutCase, Trial, query_of};
 use super::scatter::scatter;
-use crate::curve::Case;
+use crate::curve::{Case, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
-use crate::surrogate::band::{self, Band, LeftOutSpeeds, Residuals};
+use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Scatter, Validation};
+use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind, predict};
 
@@ -152,6 +152,8 @@ pub fn validate(
         }
     };
     let scatter = scatter(&set, cases);
+    let declared = set.force_kind;
+    let scatter_of = |force| scatter.as_ref()?.of_force(force, declared);
     let (floors, without_floors) = floors_of(&left_out);
     notes.extend(without_floors);
     let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
@@ -159,32 +161,24 @@ pub fn validate(
     let trials: Vec<Trial> = pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect();
 
     let inner_speeds = left_out.iter().filter(|case| case.inner).count();
-    let (mut rows, mut means, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
-    for kind in &fitting {
-        let own: Vec<&Trial> = trials.iter().filter(|t| t.model == kind.name()).collect();
-        let Some(table) = ModelTable::of(kind, &own, scatter.as_ref()) else { continue };
-        notes.extend(table.failures);
-        match mean(kind.name(), table.rule, &table.rows) {
-            Some(of) if of.speeds < inner_speeds => notes.push(without_means(kind.name())),
-            of => means.extend(of),
-        }
-        residuals.insert(kind.name(), table.residuals);
-        rows.extend(table.rows);
-    }
+    let tables = Tables::of(&fitting, &trials, inner_speeds, (declared, scatter_of(declared)));
     let (chosen, reason) = match selection {
         Selection::Named(model) => (model.to_string(), "asked for".into()),
         Selection::Best(purpose) => {
             let counted = match purpose {
-                Purpose::Vehicle => means.clone(),
-                Purpose::Train => means_with_ends(&means, &rows, left_out.len()),
+                Purpose::Vehicle => tables.means.clone(),
+                Purpose::Train => tables.means_with_ends(left_out.len()),
             };
             choose(&counted, purpose).unwrap_or_else(|| without_validation(&fitting))
         }
     };
-    let band_of = |left_out: LeftOutSpeeds| {
-        Band::of(left_out, residuals.get(chosen.as_str())?.get(&left_out)?, scatter.as_ref())
+    let [band, band_outside] = tables.bands(&chosen, declared, scatter_of(declared));
+    let [body_band, body_band_outside] = match declared {
+        ForceKind::Contact => tables.bands(&chosen, ForceKind::Body, scatter_of(ForceKind::Body)),
+        ForceKind::Body => [None; 2],
     };
-    let (band, band_outside) = (band_of(LeftOutSpeeds::Inner), band_of(LeftOutSpeeds::Ends));
+    notes.extend(tables.notes);
+    let (rows, means) = (tables.rows, tables.means);
     let group = group.into();
     Ok(Validation {
         group,
@@ -196,6 +190,8 @@ pub fn validate(
         scatter,
         band,
         band_outside,
+        body_band,
+        body_band_outside,
         notes,
     })
 }
@@ -246,31 +242,96 @@ fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String
     Ok((left_out, notes))
 }
 
+/// What the left-out speeds tell of all models.
+#[derive(Default)]
+struct Tables {
+    rows: Vec<LeftOut>,
+    means: Vec<Means>,
+    /// By model.
+    residuals: BTreeMap<&'static str, ResidualsOf>,
+    notes: Vec<String>,
+}
+
+impl Tables {
+    /// With the declared force and its scatter.
+    fn of(
+        fitting: &[ModelKind],
+        trials: &[Trial],
+        inner_speeds: usize,
+        declared: (ForceKind, Option<ForceScatter>),
+    ) -> Self {
+        let mut all = Self::default();
+        for kind in fitting {
+            let own: Vec<&Trial> = trials.iter().filter(|t| t.model == kind.name()).collect();
+            let Some(table) = ModelTable::of(kind, &own, declared) else { continue };
+            all.notes.extend(table.failures);
+            match mean(kind.name(), table.rule, &table.rows) {
+                Some(of) if of.speeds < inner_speeds => all.notes.push(without_means(kind.name())),
+                of => all.means.extend(of),
+            }
+            all.residuals.insert(kind.name(), table.residuals);
+            all.rows.extend(table.rows);
+        }
+        all
+    }
+
+    /// The means of models with an answer at every speed that is left out, over all of these.
+    fn means_with_ends(&self, left_out: usize) -> Vec<Means> {
+        let of_all = |of: &Means| {
+            let own: Vec<_> = self.rows.iter().filter(|row| row.model == of.model).collect();
+            (own.len() == left_out).then(|| mean_over(&of.model, of.max_crush_rule, own))?
+        };
+        self.means.iter().filter_map(of_all).collect()
+    }
+
+    /// The bands of one force of a model: between training speeds, and outside of them.
+    fn bands(
+        &self,
+        model: &str,
+        force: ForceKind,
+        scatter: Option<ForceScatter>,
+    ) -> [Option<Band>; 2] {
+        [LeftOutSpeeds::Inner, LeftOutSpeeds::Ends].map(|left_out| {
+            let residuals = self.residuals.get(model)?.get(&(force, left_out))?;
+            Band::of(left_out, residuals, scatter)
+        })
+    }
+}
+
+/// Residuals of each force at the inner speeds, and at the ends.
+type ResidualsOf = BTreeMap<(ForceKind, LeftOutSpeeds), Vec<Residuals>>;
+
 /// The rows of one model, by its rule for the maximal crush.
 struct ModelTable {
     rule: MaxCrushRule,
     rows: Vec<LeftOut>,
-    residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>>,
+    residuals: ResidualsOf,
     /// Why a trial has no row.
     failures: Vec<String>,
 }
 
 impl ModelTable {
-    /// `None` without any trial.
-    fn of(kind: &ModelKind, trials: &[&Trial], scatter: Option<&Scatter>) -> Option<Self> {
+    /// With the declared force and its scatter; `None` without any trial.
+    fn of(
+        kind: &ModelKind,
+        trials: &[&Trial],
+        (declared, scatter): (ForceKind, Option<ForceScatter>),
+    ) -> Option<Self> {
         let rule = best_rule(kind, trials)?;
         let mut rows = Vec::new();
-        let mut residuals: BTreeMap<LeftOutSpeeds, Vec<Residuals>> = BTreeMap::new();
+        let mut residuals = ResidualsOf::new();
         for trial in trials {
-            let (Some(row), Some(of)) = (trial.row(rule), trial.residuals(rule)) else { continue };
+            let (Some(row), Some(judged)) = (trial.row(rule), trial.judged(rule)) else { continue };
             rows.push(row);
-            residuals.entry(trial.left_out()).or_default().push(of);
+            for (force, of) in &judged.residuals {
+                residuals.entry((*force, trial.left_out())).or_default().push(of.clone());
+            }
         }
         let mut index: BTreeMap<LeftOutSpeeds, usize> = BTreeMap::new();
         for row in &mut rows {
             let left_out = LeftOutSpeeds::of(row.inner);
             let i = index.entry(left_out).or_default();
-            row.coverage = band::coverage(left_out, &residuals[&left_out], *i, scatter);
+            row.coverage = band::coverage(left_out, &residuals[&(declared, left_out)], *i, scatter);
             *i += 1;
         }
         let failures = trials.iter().filter_map(|t| t.failure(rule)).collect();
@@ -386,15 +447,6 @@ fn best_rule(kind: &ModelKind, trials: &[&Trial]) -> Option<MaxCrushRule> {
 /// Means over the inner speeds; `None` without any.
 fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
     mean_over(model, rule, rows.iter().filter(|r| r.inner).collect())
-}
-
-/// The means of models with an answer at every speed that is left out, over all of these.
-fn means_with_ends(of_inner: &[Means], rows: &[LeftOut], left_out: usize) -> Vec<Means> {
-    let of_all = |of: &Means| {
-        let own: Vec<&LeftOut> = rows.iter().filter(|row| row.model == of.model).collect();
-        (own.len() == left_out).then(|| mean_over(&of.model, of.max_crush_rule, own))?
-    };
-    of_inner.iter().filter_map(of_all).collect()
 }
 
 /// Means over these rows of one model; `None` without any.

@@ -118,7 +118,8 @@ fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
 /// The look of predictions.
 const PREDICTED: usize = 1;
 
-/// The predicted line, its band below it, and the body's force beside it.
+/// The predicted line, its band below it, and the body's force beside it, whose own band would
+/// cover that of the line: it is drawn with that force alone.
 fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
     let (d, f) = (&curve.deflection_m, &curve.force_n);
     if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {

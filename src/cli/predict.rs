@@ -193,24 +193,30 @@ fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()
     Ok(())
 }
 
-/// How far FE may lie from the curve, and what of it lies between equal runs.
-fn print_band(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+/// How far FE may lie from each force of the curve, and what of it lies between equal runs.
+fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+    for (force, band) in curve.provenance.bands() {
+        writeln!(
+            out,
+            "  band                 ±{:.1} % of the local {} force: empirical range for {:.0} % {}",
+            band.pointwise_share * 100.0,
+            force.name(),
+            band.level * 100.0,
+            rests_on(&band, curve.provenance.in_range)
+        )?;
+        let Some(scatter) = band.scatter else { continue };
+        writeln!(
+            out,
+            "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
+            band.interpolation_share() * 100.0,
+            scatter.pointwise_share * 100.0
+        )?;
+    }
     let provenance = &curve.provenance;
-    let Some(band) = &provenance.band else { return Ok(()) };
-    writeln!(
-        out,
-        "  band                 ±{:.1} % of the local force: empirical range for {:.0} % {}",
-        band.pointwise_share * 100.0,
-        band.level * 100.0,
-        rests_on(band, provenance.in_range)
-    )?;
-    let Some(scatter) = band.scatter else { return Ok(()) };
-    writeln!(
-        out,
-        "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
-        band.interpolation_share() * 100.0,
-        scatter.pointwise_share * 100.0
-    )
+    if provenance.band.is_some() && provenance.body_band.is_none() && curve.body_force_n.is_some() {
+        writeln!(out, "  band of body force   not known until the model is trained anew")?;
+    }
+    Ok(())
 }
 
 fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
@@ -249,7 +255,7 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         writeln!(out, "  energy of body force {:.2} %", share * 100.0)?;
     }
     print_unloading(out, curve)?;
-    print_band(out, curve)?;
+    print_bands(out, curve)?;
     writeln!(
         out,
         "  nearest training     {} away",

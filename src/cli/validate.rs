@@ -283,10 +283,19 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
     if let Some(scatter) = &validation.scatter {
         writeln!(out, "{group}: {}", scatter_line(scatter))?;
     }
-    for band in [&validation.band, &validation.band_outside].into_iter().flatten() {
-        writeln!(out, "{group}: {}", band_line(band))?;
+    for (force, band) in bands(validation) {
+        writeln!(out, "{group}: {}", band_line(force, band))?;
     }
     Ok(())
+}
+
+/// The bands of a validation, with the name of the force where there are two.
+fn bands(validation: &Validation) -> impl Iterator<Item = (&'static str, &Band)> {
+    let Validation { band, band_outside, body_band, body_band_outside, .. } = validation;
+    let body = [body_band, body_band_outside].into_iter().flatten();
+    let declared = [band, band_outside].into_iter().flatten();
+    let name = if body.clone().next().is_some() { "contact force" } else { "force" };
+    declared.map(move |band| (name, band)).chain(body.map(|band| ("body force", band)))
 }
 
 /// What the rows of the scatter are called.
@@ -329,8 +338,8 @@ fn scatter_line(scatter: &Scatter) -> String {
     )
 }
 
-/// A band of the validation, with the span that it is stated for.
-fn band_line(band: &Band) -> String {
+/// A band of the validation around this force, with the span that it is stated for.
+fn band_line(force: &str, band: &Band) -> String {
     let span = km_per_h(band.span_m_per_s);
     let (of, place) = match band.left_out {
         LeftOutSpeeds::Inner => (
@@ -356,7 +365,7 @@ fn band_line(band: &Band) -> String {
         None => String::new(),
     };
     format!(
-        "band ±{} of the local force{parts} {place}; empirical range for {:.0} %, from {}; {coverage}",
+        "band ±{} of the local {force}{parts} {place}; empirical range for {:.0} %, from {}; {coverage}",
         percent(band.pointwise_share),
         band.level * 100.0,
         counted(band.curves, of)

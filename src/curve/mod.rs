@@ -123,7 +123,9 @@ impl Curve {
 }
 
 /// Which force a curve is: the two differ by what is stopped inside the crush zone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ForceKind {
     /// What the obstacle feels: wall, contact side, section.

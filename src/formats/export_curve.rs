@@ -94,7 +94,9 @@ impl ExportCurve {
         };
         let no_band = match (band.is_some(), input.curve.force_low_n.is_some()) {
             (true, _) => softening.map(|_| "it is not that of a softened curve"),
-            (false, true) => Some("only that of the contact force is known (--force contact)"),
+            (false, true) => Some(
+                "only that of the contact force is known (--force contact), until the model is trained anew",
+            ),
             (false, false) => Some("the model gives none here"),
         };
         let band =

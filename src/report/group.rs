@@ -263,14 +263,14 @@ impl Validated<'_> {
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
             ("nearest FE run".into(), km_per_h(curve.provenance.nearest_training_speed_m_per_s)),
         ];
-        if let Some(band) = &curve.provenance.band {
+        for (force, band) in curve.provenance.bands() {
             rows.push((
                 format!(
                     "band, empirical {:.0} % range from {}",
                     100.0 * band.level,
                     counted(band.curves, "curve")
                 ),
-                format!("±{} of the local force", percent(band.pointwise_share)),
+                format!("±{} of the local {} force", percent(band.pointwise_share), force.name()),
             ));
             if let Some(scatter) = &band.scatter {
                 let name = "part of it from scatter between equal runs".to_string();

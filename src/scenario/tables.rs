@@ -174,8 +174,8 @@ pub struct CurveTable {
     /// Of a model, predicted curve or database case: the force that is taken; if absent the
     /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not say it: the force that it holds.
     pub force: Option<ForceKind>,
-    /// Of a model or predicted curve: member of its band, from −1 (lower edge) over 0 (the
-    /// curve) to 1 (upper edge).
+    /// Of a model or predicted curve: member of the band of the force that is taken, from −1
+    /// (lower edge) over 0 (the curve) to 1 (upper edge).
     pub band: Option<f64>,
     /// Factor on the force.
     pub scale: Option<f64>,

@@ -13,6 +13,8 @@
 //! like by no gap can change. A left-out residual is that of interpolation plus the scatter of the runs it is measured
 //! against, of n the n-th part, which is taken off its square; the half width is the root of the squares of both parts.
 //!
+//! The declared force and the body force have a band each, made in the same way of their own residuals and scatter.
+//!
 //! Outside the training speeds, the two ends that were left out tell, in proportion to the distance. Further outside than
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
 //! interfaces close far more slowly than any run by itself.
@@ -20,7 +22,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::leave_one_out::Scatter;
 use crate::dataset::is_same_speed;
 
 /// The level that bands are made for.
@@ -107,8 +108,19 @@ pub struct ScatterWidths {
     pub simultaneous_share: f64,
 }
 
+/// Scatter of one force between equal runs, in ratio to its local level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ForceScatter {
+    /// Runs at the speeds that have several, less one for the mean of each.
+    pub degrees_of_freedom: usize,
+    /// Root mean square of the residuals.
+    pub force_share: f64,
+    /// Root mean square over the runs of their largest residuals.
+    pub largest_force_share: f64,
+}
+
 impl ScatterWidths {
-    fn of(scatter: &Scatter) -> Option<Self> {
+    fn of(scatter: ForceScatter) -> Option<Self> {
         let t = student_t(scatter.degrees_of_freedom)?;
         Some(Self {
             pointwise_share: t * scatter.force_share,
@@ -182,7 +194,7 @@ impl Band {
     pub(crate) fn of(
         left_out: LeftOutSpeeds,
         curves: &[Residuals],
-        scatter: Option<&Scatter>,
+        scatter: Option<ForceScatter>,
     ) -> Option<Self> {
         let all: Vec<&Residuals> = curves.iter().collect();
         let mut band = Self::without_coverage(left_out, &all, scatter).filter(Self::is_sound)?;
@@ -197,7 +209,7 @@ impl Band {
     fn without_coverage(
         left_out: LeftOutSpeeds,
         curves: &[&Residuals],
-        scatter: Option<&Scatter>,
+        scatter: Option<ForceScatter>,
     ) -> Option<Self> {
         let t = student_t(curves.len())?;
         let n = curves.len() as f64;
@@ -315,7 +327,7 @@ pub(crate) fn coverage(
     left_out: LeftOutSpeeds,
     curves: &[Residuals],
     i: usize,
-    scatter: Option<&Scatter>,
+    scatter: Option<ForceScatter>,
 ) -> Option<f64> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
@@ -441,18 +453,12 @@ mod tests {
     /// against; a wider gap widens the former alone, and the scatter is the floor.
     #[test]
     fn scatter_is_a_part_of_its_own() {
-        let scatter = Scatter {
-            speeds: Vec::new(),
-            degrees_of_freedom: 3,
-            force_l1: 0.0,
-            velocity_l1: 0.0,
-            force_share: 0.03,
-            largest_force_share: 0.06,
-        };
+        let scatter =
+            ForceScatter { degrees_of_freedom: 3, force_share: 0.03, largest_force_share: 0.06 };
         // Interpolation 0.04; a single run scatters by 0.03, the mean of nine by 0.01.
         let one = curve(4.0, &[0.05, -0.05]);
         let nine = Residuals { runs: 9, ..curve(4.0, &[(0.0016_f64 + 0.0001).sqrt(); 2]) };
-        let band = Band::of(Inner, &[one, nine], Some(&scatter)).unwrap();
+        let band = Band::of(Inner, &[one, nine], Some(scatter)).unwrap();
         let (t2, t3) = (2.92, 2.3534);
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
         near(band.scatter.unwrap().pointwise_share, t3 * 0.03);
@@ -466,10 +472,10 @@ mod tests {
         near(band.over(1e-9).unwrap().pointwise_share, t3 * 0.03);
         // Residuals below the scatter leave nothing to interpolation, and no scatter changes nothing.
         let small = [curve(4.0, &[0.01; 2]), curve(4.0, &[0.01; 2])];
-        let band = Band::of(Inner, &small, Some(&scatter)).unwrap();
+        let band = Band::of(Inner, &small, Some(scatter)).unwrap();
         assert_eq!((band.interpolation_share(), band.coverage), (0.0, Some(1.0)));
-        let none = Scatter { force_share: 0.0, largest_force_share: 0.0, ..scatter };
-        let (with, alone) = (Band::of(Inner, &small, Some(&none)), Band::of(Inner, &small, None));
+        let none = ForceScatter { force_share: 0.0, largest_force_share: 0.0, ..scatter };
+        let (with, alone) = (Band::of(Inner, &small, Some(none)), Band::of(Inner, &small, None));
         let (with, alone) = (with.unwrap().over(7.0).unwrap(), alone.unwrap().over(7.0).unwrap());
         assert_eq!(with.pointwise_share, alone.pointwise_share);
     }

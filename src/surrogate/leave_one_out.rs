@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::band::Band;
+use super::band::{Band, ForceScatter};
 use super::max_crush::MaxCrushRule;
+use crate::curve::ForceKind;
 
 /// Errors of one model at one speed that was left out.
 ///
@@ -124,7 +125,31 @@ pub struct Scatter {
     pub force_l1: f64,
     /// The same of the closing speed.
     pub velocity_l1: f64,
-    /// Root mean square of the force's residuals in ratio to its local level, as of bands.
+    /// Root mean square of the declared force's residuals in ratio to its local level, as of bands.
+    pub force_share: f64,
+    /// Root mean square over the runs of the largest of these residuals.
+    pub largest_force_share: f64,
+    /// Both of the body force, where it is another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyScatter>,
+}
+
+impl Scatter {
+    /// That of one of the forces of a group that declares `declared`.
+    pub(crate) fn of_force(&self, force: ForceKind, declared: ForceKind) -> Option<ForceScatter> {
+        let (force_share, largest_force_share) = match force == declared {
+            true => (self.force_share, self.largest_force_share),
+            false => self.body.map(|body| (body.force_share, body.largest_force_share))?,
+        };
+        let degrees_of_freedom = self.degrees_of_freedom;
+        Some(ForceScatter { degrees_of_freedom, force_share, largest_force_share })
+    }
+}
+
+/// The scatter of the body force.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BodyScatter {
+    /// Root mean square of its residuals in ratio to its local level, as of bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -145,6 +170,9 @@ pub struct SpeedScatter {
     pub force_share: f64,
     /// As of all speeds.
     pub largest_force_share: f64,
+    /// As of all speeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyScatter>,
 }
 
 /// Leave-one-speed-out of a group: what `crumple validate` prints and a model file keeps.
@@ -165,12 +193,20 @@ pub struct Validation {
     /// How far equal runs lie apart; absent where no speed has several runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Scatter>,
-    /// Between training speeds, of the chosen model, from its residuals at the inner speeds.
+    /// Of the declared force between training speeds, from the chosen model's residuals at the
+    /// inner speeds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
-    /// Outside the training speeds, from its residuals at the ends.
+    /// The same outside the training speeds, from its residuals at the ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band_outside: Option<Band>,
+    /// Of the body force between training speeds, from its own residuals; absent if it is the
+    /// declared one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_band: Option<Band>,
+    /// The same outside the training speeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_band_outside: Option<Band>,
     /// What was left out of the table, with the reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,

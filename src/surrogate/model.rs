@@ -274,10 +274,18 @@ impl Model {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
     }
 
-    /// The band at a query's place, or why there is none although speeds were left out.
-    pub(super) fn band(&self, at: &QueryPoint<'_>) -> Result<Option<Band>, Warning> {
+    /// The band of a force at a query's place, or why there is none although speeds were left out.
+    pub(super) fn band(
+        &self,
+        at: &QueryPoint<'_>,
+        force: ForceKind,
+    ) -> Result<Option<Band>, Warning> {
         let Some(of) = &self.leave_one_out else { return Ok(None) };
-        if of.band.or(of.band_outside).is_none() {
+        let (inner, ends) = match force == self.force_kind {
+            true => (of.band, of.band_outside),
+            false => (of.body_band, of.body_band_outside),
+        };
+        if inner.or(ends).is_none() {
             return Ok(None);
         }
         if let Some((feature, ..)) = self.features_outside(at).next() {
@@ -286,7 +294,7 @@ impl Model {
             return Err(Warning::no_band(&why));
         }
         let speeds: Vec<f64> = self.cases.iter().map(|c| c.speed_m_per_s).collect();
-        match band::at(of.band, of.band_outside, &speeds, at.speed_m_per_s) {
+        match band::at(inner, ends, &speeds, at.speed_m_per_s) {
             Some(band) => Ok(Some(band)),
             None => Err(Warning::no_band(
                 "no speed that was left out tells how far FE may lie from a curve here",

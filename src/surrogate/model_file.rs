@@ -156,7 +156,10 @@ impl Model {
         if self.fitted_body.is_some() && self.force_kind == ForceKind::Body {
             return Err("it holds two forces, but its force is the body's".into());
         }
-        let bands = self.leave_one_out.iter().flat_map(|v| [v.band, v.band_outside]);
+        let bands = self
+            .leave_one_out
+            .iter()
+            .flat_map(|of| [of.band, of.band_outside, of.body_band, of.body_band_outside]);
         if !bands.flatten().all(|band| band.is_sound()) {
             return Err("the widths or the span of its band are no measurement".into());
         }

@@ -15,7 +15,7 @@
 //! of the bundled runs rises less steeply than that, so tools with one constant get the rebound and create no energy.
 //! Exports take the body force by default and state its steepest rise beside it.
 
-use super::band;
+use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predict_error::CORRECTION;
 use super::query::{Asked, over_speed};
@@ -233,6 +233,19 @@ impl<'a> Prediction<'a> {
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 
+    /// The band around one force; what was said of the other force is not said again.
+    fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
+        let asked = &self.motion.asked;
+        let band = asked.model.band(&asked.at(), force).unwrap_or_else(|warning| {
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
+            None
+        });
+        let (low_n, high_n) = band.map(|band| band.around(envelope.force_n())).unzip();
+        Banded { band, low_n, high_n }
+    }
+
     /// The curve with everything that is known of it.
     fn report(
         &self,
@@ -249,11 +262,11 @@ impl<'a> Prediction<'a> {
         let is_worse = |other: &f64| (other - 1.0).abs() > (energy - 1.0).abs();
         let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
-        let band = model.band(&at).unwrap_or_else(|warning| {
-            warnings.push(warning);
-            None
-        });
-        let (force_low_n, force_high_n) = band.map(|b| b.around(declared.force_n())).unzip();
+        let own = self.banded(model.force_kind, &declared, &mut warnings);
+        let of_body = body
+            .as_ref()
+            .map(|b| self.banded(ForceKind::Body, b, &mut warnings))
+            .unwrap_or_default();
         let end = declared.end_m();
         let mut curve = PredictedCurve {
             // Without a rebound a softer unloading than the steepest rise would create energy.
@@ -266,9 +279,11 @@ impl<'a> Prediction<'a> {
             energy_j: declared.work(),
             deflection_m: declared.deflection_m().to_vec(),
             force_n: declared.force_n().to_vec(),
-            force_low_n,
-            force_high_n,
+            force_low_n: own.low_n,
+            force_high_n: own.high_n,
             body_force_n: body.as_ref().map(|b| b.force_n().to_vec()),
+            body_force_low_n: of_body.low_n,
+            body_force_high_n: of_body.high_n,
             forest_quantiles: model
                 .forest()
                 .and_then(|forest| forest.quantiles(&at, declared.deflection_m(), band::LEVEL))
@@ -278,7 +293,11 @@ impl<'a> Prediction<'a> {
             mass_kg: asked.masses.body_kg,
             model: model.name().into(),
             warnings,
-            provenance: provenance(asked, rule, *crush, (energy, body_energy), band),
+            provenance: Provenance {
+                band: own.band,
+                body_band: of_body.band,
+                ..provenance(asked, rule, *crush, (energy, body_energy))
+            },
         };
         curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&declared);
         curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b));
@@ -292,14 +311,21 @@ struct Corrected {
     factor: Option<f64>,
 }
 
-/// Where the curve comes from and how it was checked; energies over the kinetic one are those of
+/// The band of one force and its edges in N; empty where there is none.
+#[derive(Default)]
+struct Banded {
+    band: Option<Band>,
+    low_n: Option<Vec<f64>>,
+    high_n: Option<Vec<f64>>,
+}
+
+/// Where the curve comes from and how it was checked, without its bands; energies over the kinetic one are those of
 /// the declared force and of the body's.
 fn provenance(
     asked: &Asked<'_>,
     rule: MaxCrushRule,
     crush: MaxCrush,
     (energy, body_energy): (f64, Option<f64>),
-    band: Option<band::Band>,
 ) -> Provenance {
     let (model, v) = (asked.model, asked.v);
     let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
@@ -322,7 +348,8 @@ fn provenance(
         kinetic_energy_j: asked.kinetic_energy_j,
         energy_over_kinetic: energy,
         body_energy_over_kinetic: body_energy,
-        band,
+        band: None,
+        body_band: None,
         parameters,
     }
 }

@@ -31,6 +31,12 @@ pub struct PredictedCurve {
     /// mass.
     #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_n: Option<Vec<f64>>,
+    /// Band around the body force, where the model gives one.
+    #[serde(rename = "body_force_low_N", default, skip_serializing_if = "Option::is_none")]
+    pub body_force_low_n: Option<Vec<f64>>,
+    /// Upper end of that band.
+    #[serde(rename = "body_force_high_N", default, skip_serializing_if = "Option::is_none")]
+    pub body_force_high_n: Option<Vec<f64>>,
     /// Forces between which the members of a forest's leaves lie, if the model keeps them. They
     /// tell how the training points scatter, not how far FE lies off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -134,12 +140,23 @@ pub struct Provenance {
     /// The same for the body force, where it is another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_energy_over_kinetic: Option<f64>,
-    /// The band around the force at this speed, and what it rests on.
+    /// The band around the declared force at this speed, and what it rests on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
+    /// The same of the body force, where it is another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_band: Option<Band>,
     /// Values of the model's further parameters.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Parameter>,
+}
+
+impl Provenance {
+    /// The band of each force that has one, the declared force first.
+    pub fn bands(&self) -> impl Iterator<Item = (ForceKind, Band)> {
+        let declared = self.band.map(|band| (self.force_kind, band));
+        declared.into_iter().chain(self.body_band.map(|band| (ForceKind::Body, band)))
+    }
 }
 
 impl PredictedCurve {
@@ -173,17 +190,19 @@ impl PredictedCurve {
                 self.max_deflection_m
             )));
         }
-        for (name, band) in [
+        for (name, values) in [
             ("force_low_N", &self.force_low_n),
             ("force_high_N", &self.force_high_n),
             ("body_force_N", &self.body_force_n),
+            ("body_force_low_N", &self.body_force_low_n),
+            ("body_force_high_N", &self.body_force_high_n),
         ] {
-            if let Some(band) = band
-                && band.len() != self.force_n.len()
+            if let Some(values) = values
+                && values.len() != self.force_n.len()
             {
                 return Err(PredictError::Damaged(format!(
                     "{name} has {} values, force_N {}",
-                    band.len(),
+                    values.len(),
                     self.force_n.len()
                 )));
             }
@@ -192,8 +211,8 @@ impl PredictedCurve {
         pushing("force_N", envelope)
     }
 
-    /// The curve of one force alone, with the unloading that belongs to it. What is of the
-    /// declared force only (band, quantiles) goes with that.
+    /// The curve of one force alone, with the unloading and the band that belong to it. The
+    /// quantiles are of the declared force only.
     ///
     /// # Errors
     /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
@@ -229,21 +248,25 @@ impl PredictedCurve {
         }
         curve.energy_j = envelope.work();
         curve.force_n = envelope.force_n().to_vec();
-        (curve.force_low_n, curve.force_high_n, curve.forest_quantiles) = (None, None, None);
+        (curve.force_low_n, curve.force_high_n) =
+            (curve.body_force_low_n.take(), curve.body_force_high_n.take());
+        curve.forest_quantiles = None;
         curve.drives = ForceKind::Body.drives().into();
         curve.provenance.force_kind = ForceKind::Body;
         curve.provenance.energy_over_kinetic =
             self.provenance.body_energy_over_kinetic.unwrap_or(self.provenance.energy_over_kinetic);
-        curve.provenance.band = None;
+        curve.provenance.band = self.provenance.body_band;
         curve.without_second_force();
         Ok(curve)
     }
 
     fn without_second_force(&mut self) {
         self.body_force_n = None;
+        (self.body_force_low_n, self.body_force_high_n) = (None, None);
         self.body_unloading_stiffness_n_per_m = None;
         self.body_drives = None;
         self.provenance.body_energy_over_kinetic = None;
+        self.provenance.body_band = None;
     }
 
     /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
@@ -266,12 +289,13 @@ impl PredictedCurve {
         self.driving_member(force, None)
     }
 
-    /// The same with `member` of the band's half width added, from −1 (lower edge) to 1.
+    /// The same with `member` of the half width of this force's band added, from −1 (lower edge)
+    /// to 1.
     ///
     /// # Errors
     /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] or
     /// [`PredictError::NoContactForce`] if it does not have that force; [`PredictError::Damaged`]
-    /// for a member outside these bounds or a curve without a band.
+    /// for a member outside these bounds or a force without a band.
     pub(crate) fn driving_member(
         &self,
         force: ForceKind,
@@ -283,7 +307,7 @@ impl PredictedCurve {
             (ForceKind::Body, _) => self.driving_envelope()?,
         };
         if let Some(member) = member {
-            loading = self.band_member(&loading, member)?;
+            loading = self.band_member(force, &loading, member)?;
         }
         // The force law keeps to its bounds by itself; the one constant is for other tools.
         let unloading = CurveUnloading::Stiffness(self.stiffness_at_end(&loading));
@@ -296,21 +320,35 @@ impl PredictedCurve {
         })
     }
 
-    fn band_member(&self, loading: &Envelope, member: f64) -> Result<Envelope, PredictError> {
+    /// Lower and upper edge of the band of one of its forces, in N.
+    fn edges(&self, force: ForceKind) -> (Option<&Vec<f64>>, Option<&Vec<f64>>) {
+        match force == ForceKind::Body && self.body_force_n.is_some() {
+            true => (self.body_force_low_n.as_ref(), self.body_force_high_n.as_ref()),
+            false => (self.force_low_n.as_ref(), self.force_high_n.as_ref()),
+        }
+    }
+
+    fn band_member(
+        &self,
+        force: ForceKind,
+        loading: &Envelope,
+        member: f64,
+    ) -> Result<Envelope, PredictError> {
         if !(-1.0..=1.0).contains(&member) {
             return Err(PredictError::Damaged(format!("band = {member}: expected from -1 to 1")));
         }
-        let edge = if member < 0.0 { &self.force_low_n } else { &self.force_high_n };
-        let edge = edge.as_ref().ok_or_else(|| {
-            PredictError::Damaged("there is no band around it: remove band".into())
+        let (low_n, high_n) = self.edges(force);
+        let edge_n = if member < 0.0 { low_n } else { high_n };
+        let edge_n = edge_n.ok_or_else(|| {
+            let mut why =
+                format!("there is no band around its {} force: remove band", force.name());
+            if self.force_low_n.is_some() {
+                why += ", or train the model anew";
+            }
+            PredictError::Damaged(why)
         })?;
-        let declared = self.force_n.iter().zip(edge);
-        let force_n = loading
-            .force_n()
-            .iter()
-            .zip(declared)
-            .map(|(force, (declared, edge))| (force + member.abs() * (edge - declared)).max(0.0))
-            .collect();
+        let moved = |(force, edge): (&f64, &f64)| (force + member.abs() * (edge - force)).max(0.0);
+        let force_n = loading.force_n().iter().zip(edge_n).map(moved).collect();
         Ok(Envelope::new(loading.deflection_m().to_vec(), force_n)?)
     }
 

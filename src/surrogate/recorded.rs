@@ -54,6 +54,8 @@ impl PredictedCurve {
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m.unwrap_or(steepest),
             force_low_n: None,
             force_high_n: None,
+            body_force_low_n: None,
+            body_force_high_n: None,
             forest_quantiles: None,
             drives: case.force_kind.drives().into(),
             rebound,
@@ -73,9 +75,7 @@ impl PredictedCurve {
             force_n,
         };
         curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&loading);
-        if let Some(body) = body {
-            curve.body_unloading_stiffness_n_per_m = Some(curve.stiffness_at_end(&body.loading));
-        }
+        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b.loading));
         Ok(curve)
     }
 }
@@ -133,6 +133,7 @@ fn provenance(case: &Case, work_j: f64, body_work_j: Option<f64>) -> Provenance 
         energy_over_kinetic: work_j / kinetic_energy_j,
         body_energy_over_kinetic: body_work_j.map(|work_j| work_j / kinetic_energy_j),
         band: None,
+        body_band: None,
         parameters,
     }
 }
