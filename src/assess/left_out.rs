@@ -189,10 +189,9 @@ impl<'a> LeftOutCase<'a> {
         // Up to its first point a prediction rises from 0, which FE does not.
         let first = curve.deflection_m[1];
         let from = along.iter().position(|&d| d >= first).unwrap_or(0);
-        let of = |fe: &Envelope, predicted: &Envelope| Residuals {
-            span_m_per_s: self.span_m_per_s,
-            ratios: band::ratios(&forces_n(fe, along), &forces_n(predicted, along)).split_off(from),
-            runs: self.own.runs.len(),
+        let of = |fe: &Envelope, predicted: &Envelope| {
+            let mut ratios = band::ratios(&forces_n(fe, along), &forces_n(predicted, along));
+            Residuals::new(self.span_m_per_s, ratios.split_off(from), self.own.runs.len())
         };
         let declared = of(&self.own.envelope, &curve.envelope()?);
         let mut residuals = BTreeMap::from([(curve.provenance.force_kind, declared)]);

@@ -138,7 +138,7 @@ pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, NsdmError> {
 /// alone differs.
 pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, ModelError> {
     let options = ForestOptions { seed, ..ForestOptions::paper() };
-    let mut model = Model::fit(set, ModelKind::forest(options))?;
+    let mut model = Model::fit_curves(set, ModelKind::forest(options))?;
     model.max_crush_rule = match model.features.is_empty() {
         true => MaxCrushRule::Spline,
         false => MaxCrushRule::Motion,

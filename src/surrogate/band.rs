@@ -1,8 +1,11 @@
 //! Bands: how far FE curves lay from the model at speeds it had not seen.
 //!
 //! The half width is Student's t times the root mean square of the left-out residuals, in ratio to the local level of
-//! the force. With three curves that is wide, and the band says on how many curves it rests. (A pointwise quantile of two
-//! to five residuals would be their largest and promise more than they can.)
+//! the force. (A pointwise quantile of two to five residuals would be their largest and promise more than they can.)
+//! Neighbouring residuals of a curve belong to one fold and are one observation; its folds are several. So t has the
+//! degrees of freedom of the stretches over which a curve's residuals are alike. The band that must hold a whole curve
+//! has those of the curves, and so have bands outside the training speeds, where a whole curve drifts away. Each says on
+//! how many curves it rests.
 //!
 //! A speed that is left out opens a gap about twice as wide as a query finds. So residuals are divided by the power 0.65
 //! of their gap, and the band is the result times the same power of the query's gap: the distance between the two
@@ -70,7 +73,8 @@ impl LeftOutSpeeds {
 /// Residuals are taken in ratio to the local level of the force, and to the span over which each
 /// was predicted: a left-out speed opens a wider gap than a query finds. With a handful of curves
 /// no level can be guaranteed; the range is the one that a further residual of the same kind
-/// would keep to: their root mean square times Student's t for as many curves.
+/// would keep to: their root mean square times Student's t, for as many independent stretches as the
+/// curves have; for a whole curve, and outside the training speeds, for as many curves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Band {
     /// Level that the range is stated for.
@@ -142,6 +146,31 @@ pub(crate) struct Residuals {
     pub ratios: Vec<f64>,
     /// How many runs the left-out curve is the mean of.
     pub runs: usize,
+    /// How many stretches of it lie above or below the prediction by themselves.
+    stretches: usize,
+}
+
+impl Residuals {
+    pub(crate) fn new(span_m_per_s: f64, ratios: Vec<f64>, runs: usize) -> Self {
+        Self { stretches: stretches(&ratios), span_m_per_s, ratios, runs }
+    }
+}
+
+/// How many independent values residuals at even deflections are worth: their number over the integral
+/// of their autocorrelation, to its first zero (Bartlett, Journal of the Royal Statistical Society 98,
+/// 1935); 1 at least.
+fn stretches(ratios: &[f64]) -> usize {
+    let n = ratios.len();
+    let correlated = |lag: usize| -> f64 {
+        ratios[..n - lag].iter().zip(&ratios[lag..]).map(|(a, b)| a * b).sum::<f64>()
+            / (n - lag) as f64
+    };
+    if n == 0 || correlated(0) <= 0.0 {
+        return 1;
+    }
+    let ratio = |lag: usize| correlated(lag) / correlated(0);
+    let length = 1.0 + 2.0 * (1..n).map(ratio).take_while(|r| *r > 0.0).sum::<f64>();
+    ((n as f64 / length) as usize).max(1)
 }
 
 /// The ratios `(FE − prediction) / level` at even deflections.
@@ -211,7 +240,11 @@ impl Band {
         curves: &[&Residuals],
         scatter: Option<ForceScatter>,
     ) -> Option<Self> {
-        let t = student_t(curves.len())?;
+        let t_of_curves = student_t(curves.len())?;
+        let t_of_points = match left_out {
+            LeftOutSpeeds::Inner => student_t(curves.iter().map(|r| r.stretches).sum())?,
+            LeftOutSpeeds::Ends => t_of_curves,
+        };
         let n = curves.len() as f64;
         let span_m_per_s = curves.iter().map(|r| r.span_m_per_s).sum::<f64>() / n;
         let over_span = |of: &dyn Fn(&[f64]) -> f64, scatter: Option<f64>| {
@@ -220,7 +253,7 @@ impl Band {
                 (of(&r.ratios) - of_scatter)
                     / (r.span_m_per_s / span_m_per_s).powf(2.0 * left_out.power())
             };
-            t * (curves.iter().map(of).sum::<f64>() / n).max(0.0).sqrt()
+            (curves.iter().map(of).sum::<f64>() / n).max(0.0).sqrt()
         };
         let squares = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>() / r.len().max(1) as f64;
         let largest = |r: &[f64]| r.iter().fold(0.0_f64, |m, x| m.max(x.abs())).powi(2);
@@ -229,8 +262,9 @@ impl Band {
             curves: curves.len(),
             left_out,
             span_m_per_s,
-            pointwise_share: over_span(&squares, scatter.map(|s| s.force_share)),
-            simultaneous_share: over_span(&largest, scatter.map(|s| s.largest_force_share)),
+            pointwise_share: t_of_points * over_span(&squares, scatter.map(|s| s.force_share)),
+            simultaneous_share: t_of_curves
+                * over_span(&largest, scatter.map(|s| s.largest_force_share)),
             scatter: None,
             coverage: None,
         };
@@ -331,7 +365,7 @@ pub(crate) fn coverage(
 ) -> Option<f64> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
-    let Residuals { span_m_per_s, ratios, runs } = &curves[i];
+    let Residuals { span_m_per_s, ratios, runs, .. } = &curves[i];
     let band = Band::without_coverage(left_out, &others, scatter)?.over(*span_m_per_s)?;
     let share = band.share_of_mean(*runs);
     let inside = ratios.iter().filter(|r| r.abs() <= share).count();
@@ -364,7 +398,7 @@ mod tests {
     use super::*;
 
     fn curve(span_m_per_s: f64, ratios: &[f64]) -> Residuals {
-        Residuals { span_m_per_s, ratios: ratios.to_vec(), runs: 1 }
+        Residuals::new(span_m_per_s, ratios.to_vec(), 1)
     }
 
     #[test]
