@@ -141,16 +141,9 @@ pub fn validate(
 ) -> Result<Validation, ValidateError> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, mut notes) = those_that_fit(&set, candidates);
-    let left_out = match left_out_cases(&set) {
-        Ok((left_out, more)) => {
-            notes.extend(more);
-            left_out
-        }
-        Err(too_few) => {
-            notes.push(too_few);
-            Vec::new()
-        }
-    };
+    let (left_out, not_left_out) =
+        left_out_cases(&set).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
+    notes.extend(not_left_out);
     let scatter = scatter(&set, cases);
     let declared = set.force_kind;
     let scatter_of = |force| scatter.as_ref()?.of_force(force, declared);

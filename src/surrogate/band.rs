@@ -403,7 +403,7 @@ mod tests {
 
     #[test]
     fn few_curves_give_wide_bands() {
-        let one = curve(4.0, &[0.1, -0.1, 0.1, -0.1]);
+        let one = curve(4.0, &[0.1; 4]);
         let band = |n: usize| Band::of(Inner, &vec![one.clone(); n], None).unwrap();
         assert!((band(1).pointwise_share - 0.63138).abs() < 1e-12);
         assert!((band(3).pointwise_share - 0.23534).abs() < 1e-12);
@@ -411,6 +411,25 @@ mod tests {
         assert_eq!(band(1).coverage, None);
         assert_eq!(band(2).coverage, Some(1.0));
         assert!(Band::of(Inner, &[], None).is_none());
+    }
+
+    /// A residual of one sign is one observation; waves of it are one for each of their arcs, nearly.
+    #[test]
+    fn stretches_of_one_sign_are_counted() {
+        let wave = |waves: f64| -> Vec<f64> {
+            (0..400).map(|i| (std::f64::consts::TAU * waves * f64::from(i) / 400.0).sin()).collect()
+        };
+        assert_eq!([stretches(&[]), stretches(&[0.0; 9]), stretches(&[0.2; 400])], [1; 3]);
+        // The autocorrelation of a wave is a cosine, with an integral of 1/π of a wave to both sides.
+        for waves in [5.0, 20.0] {
+            let (counted, paper) = (stretches(&wave(waves)) as f64, std::f64::consts::PI * waves);
+            assert!((counted / paper - 1.0).abs() < 0.1, "{counted} {paper}");
+        }
+        let curve = curve(4.0, &wave(5.0));
+        let band = Band::of(Inner, std::slice::from_ref(&curve), None).unwrap();
+        let t = student_t(curve.stretches).unwrap();
+        assert!((band.pointwise_share - t * 0.5_f64.sqrt()).abs() < 1e-3);
+        assert!((band.simultaneous_share - 6.3138).abs() < 1e-2, "a whole curve is one");
     }
 
     #[test]
@@ -490,7 +509,7 @@ mod tests {
         let scatter =
             ForceScatter { degrees_of_freedom: 3, force_share: 0.03, largest_force_share: 0.06 };
         // Interpolation 0.04; a single run scatters by 0.03, the mean of nine by 0.01.
-        let one = curve(4.0, &[0.05, -0.05]);
+        let one = curve(4.0, &[0.05; 2]);
         let nine = Residuals { runs: 9, ..curve(4.0, &[(0.0016_f64 + 0.0001).sqrt(); 2]) };
         let band = Band::of(Inner, &[one, nine], Some(scatter)).unwrap();
         let (t2, t3) = (2.92, 2.3534);

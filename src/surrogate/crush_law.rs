@@ -145,8 +145,8 @@ impl CrushLaw {
     /// What is wrong, to follow "the model is damaged: ".
     pub(super) fn check(&self) -> Result<(), String> {
         let Self { deflection_m: d, stopped_kg: m, residual_kg, .. } = self;
-        Rate::of(self.sensitivity, 0.0).check_sensitivity()?;
-        Rate::of(self.of_impact, 0.0).check_sensitivity()?;
+        Rate::of(self.sensitivity, None).check_sensitivity()?;
+        Rate::of(self.of_impact, None).check_sensitivity()?;
         let rises = |values: &[f64]| values.windows(2).all(|w| w[0] <= w[1]);
         let is_sound = Envelope::new(d.clone(), m.clone()).is_ok()
             && m[0] == 0.0
@@ -170,7 +170,7 @@ impl CrushLaw {
     }
 
     fn rate(&self) -> Rate {
-        Rate::of(self.sensitivity, self.of_impact)
+        Rate::of(self.sensitivity, Some(self.of_impact))
     }
 
     /// Stopped mass per deflection, in kg/m.

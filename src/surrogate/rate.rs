@@ -56,7 +56,7 @@ pub(crate) struct Rate {
     /// γ, in (s/m)^½: beyond the end of a slower neighbour its Q follows that of the next faster
     /// curve with `(1 + γ√v)` of the impact speeds; none in the model `rate`.
     #[serde(skip)]
-    of_impact: f64,
+    of_impact: Option<f64>,
     #[serde(skip)]
     levels: Cached<Levels>,
 }
@@ -76,12 +76,22 @@ const MOST: f64 = 0.5;
 const STEPS: usize = 100;
 /// Points of an overlap at which two curves are compared.
 const POINTS: usize = 200;
-/// The level of a curve at its end: the mean over this last share of it.
-const LAST: f64 = 0.15;
-/// Length over which a level fades, as a share of the curve's end.
-const FADES: f64 = 0.1;
 /// A level beyond these factors is not carried on.
 const LEVELS: (f64, f64) = (0.5, 2.0);
+
+/// How the level of a curve against the next faster one is carried on beyond its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Carried {
+    /// The level is the mean over this last share of the curve.
+    last: f64,
+    /// Length over which it fades, as a share of the curve's end.
+    fades: f64,
+}
+
+/// The level fades to that of the faster curve.
+const ALONE: Carried = Carried { last: 0.15, fades: 0.1 };
+/// The impact speed has the level; only the step at the end fades.
+const WITH_IMPACT: Carried = Carried { last: 0.005, fades: 0.05 };
 
 impl Rate {
     /// Fits β to the overlaps of neighbouring curves.
@@ -91,11 +101,11 @@ impl Rate {
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
     /// curves cannot tell the two causes apart.
     pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
-        Self::of(SHARE * Self::best_sensitivity(cases), 0.0)
+        Self::of(SHARE * Self::best_sensitivity(cases), None)
     }
 
     /// With a known β, and γ, in (s/m)^½.
-    pub(super) fn of(sensitivity: f64, of_impact: f64) -> Self {
+    pub(super) fn of(sensitivity: f64, of_impact: Option<f64>) -> Self {
         Self { sensitivity, of_impact, levels: Cached::default() }
     }
 
@@ -123,15 +133,19 @@ impl Rate {
             return case.force_at(d) / self.factor(case.closing_at(d));
         }
         let end = case.end_m();
-        let fading = (-(d - end) / (FADES * end)).exp();
+        let fading = (-(d - end) / (self.carried().fades * end)).exp();
         let level = self.level_of_next(cases, i) * (1.0 + (levels[i] - 1.0) * fading);
         self.quotient(cases, levels, i + 1, d) * level
     }
 
     /// What the impact speed of case `i` makes of the Q of the next faster one.
     fn level_of_next(&self, cases: &[CaseCurve], i: usize) -> f64 {
-        let of = |i: usize| factor(self.of_impact, cases[i].speed_m_per_s);
+        let of = |i: usize| factor(self.of_impact.unwrap_or(0.0), cases[i].speed_m_per_s);
         of(i) / of(i + 1)
+    }
+
+    fn carried(&self) -> Carried {
+        if self.of_impact.is_some() { WITH_IMPACT } else { ALONE }
     }
 
     /// `Q(d; v)` in N at an impact speed: the force of a body that stands still. `cases`: one at
@@ -176,7 +190,7 @@ impl Rate {
         let mut levels = vec![1.0; cases.len()];
         for i in (0..cases.len().saturating_sub(1)).rev() {
             let end = cases[i].end_m();
-            let at = |k: usize| end * (1.0 - LAST * k as f64 / POINTS as f64);
+            let at = |k: usize| end * (1.0 - self.carried().last * k as f64 / POINTS as f64);
             let sum = |case: usize| -> f64 {
                 (0..=POINTS).map(|k| self.quotient(cases, &levels, case, at(k))).sum()
             };
@@ -314,7 +328,7 @@ mod tests {
         let cases: Vec<CaseCurve> = [8.0, 12.0, 20.0].map(|v| made(v, 0.06, 24e3)).to_vec();
         let fitted = Rate::fit(&cases);
         assert!((fitted.sensitivity - 0.03).abs() < 0.003, "{}", fitted.sensitivity);
-        let exact = Rate::of(0.06, 0.0);
+        let exact = Rate::of(0.06, None);
         let asked = made(15.0, 0.06, 24e3);
         let d = asked.envelope().deflection_m();
         let at =
@@ -336,7 +350,7 @@ mod tests {
     #[test]
     fn given_speeds_are_used() {
         let cases: Vec<CaseCurve> = [8.0, 20.0].map(|v| made(v, 0.0, 24e3)).to_vec();
-        let rate = Rate::of(0.1, 0.0);
+        let rate = Rate::of(0.1, None);
         let at = |closing| QueryPoint {
             speed_m_per_s: 8.0,
             features: &[],

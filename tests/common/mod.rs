@@ -159,7 +159,13 @@ pub fn study_in(folder: &Path, group: &str) -> PathBuf {
 
 /// Changes a database by `edit`, as any HDF5 program may.
 pub fn edited(path: &Path, edit: impl FnOnce(&hdf5_pure::File)) {
-    let file = hdf5_pure::File::open_rw(path).unwrap();
+    let file = loop {
+        match hdf5_pure::File::open_rw(path) {
+            // A process that another test is just starting holds our locks until it runs.
+            Err(hdf5_pure::Error::FileLocked(_)) => std::thread::yield_now(),
+            opened => break opened.unwrap(),
+        }
+    };
     edit(&file);
     file.commit().unwrap();
     file.close().unwrap();
