@@ -287,8 +287,8 @@ fn the_train_set_is_compared_with_fe() {
     let speed = |row: &Value, name: &str| row["interface_speeds_m_per_s"][name].as_f64().unwrap();
     assert!((speed(&rows[4], "A2|A3") - 5.0).abs() < 1e-9);
     // The closing speeds that the interfaces have reached, in km/h.
-    assert!((speed(&rows[5], "A2|A3") * 3.6 - 8.21).abs() < 0.01);
-    assert!((speed(&rows[5], "A1|A2") * 3.6 - 10.11).abs() < 0.01);
+    assert!((speed(&rows[5], "A2|A3") * 3.6 - 8.08).abs() < 0.01);
+    assert!((speed(&rows[5], "A1|A2") * 3.6 - 9.86).abs() < 0.01);
     // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
     let error = crumple_fails(demo, 1, &["compare", "--train", "scenario.toml"]);
@@ -323,7 +323,8 @@ fn mean_decelerations_are_those_of_the_histories() {
             let longer = lasts_s / (lasts_s - 2.0 * output_s);
             if ["A4", "B4", "W1"].contains(&vehicle) {
                 // The contact ends and begins again, which makes the mean of the histories longer.
-                assert!((1.13..1.64).contains(&ratio), "{name} {vehicle}: {summary} for {mean}");
+                let held = longer < ratio && summary < most;
+                assert!(held, "{name} {vehicle}: {summary} for {mean}, {most} at most");
             } else {
                 let held = 0.999 < ratio && ratio < longer;
                 assert!(held, "{name} {vehicle}: {summary} for {mean}, {lasts_s} s");
