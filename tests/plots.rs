@@ -215,7 +215,10 @@ fn every_kind_of_file_is_drawn() {
             ],
         ),
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
-        ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
+        (
+            "lead50.json --force body",
+            &["lead-car-wall at 50 km/h: body force by the model crush-law"],
+        ),
         ("scenario.toml --quantity energy", &["kinetic", "dissipated", "energy [MJ]", "time [ms]"]),
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
         ("train-set.toml --train", &["A1", "A3", "FE", "best_local", "speed [m/s]"]),

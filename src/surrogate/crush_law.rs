@@ -256,30 +256,40 @@ fn stopped_by_momentum(curve: &CaseCurve, mass_kg: f64) -> Vec<(f64, f64)> {
 fn rates_kg_per_m(nodes_m: &[f64], states: &[Vec<(f64, f64)>], most: &[f64]) -> Vec<f64> {
     let n = nodes_m.len() - 1;
     let (mut a, mut b) = (vec![vec![0.0; n]; n], vec![0.0; n]);
+    let length_m = |i: usize| nodes_m[i + 1] - nodes_m[i];
     for states in states.iter().filter(|s| !s.is_empty()) {
         let weight = 1.0 / states.len() as f64;
+        // Of the states inside each segment: number, stopped masses, ways into it, and their products.
+        let mut inside = vec![[0.0; 5]; n];
         for &(d, stopped_kg) in states {
-            // The length of each segment up to d.
-            let lengths: Vec<f64> = (0..n)
-                .take_while(|&i| nodes_m[i] < d)
-                .map(|i| d.min(nodes_m[i + 1]) - nodes_m[i])
-                .collect();
-            for (i, p) in lengths.iter().enumerate() {
-                b[i] += weight * p * stopped_kg;
-                for (j, q) in lengths.iter().enumerate() {
-                    a[i][j] += weight * p * q;
-                }
+            let i = nodes_m[1..n].partition_point(|node| *node < d);
+            let way_m = d - nodes_m[i];
+            let sums = [1.0, stopped_kg, way_m, way_m * way_m, way_m * stopped_kg];
+            inside[i].iter_mut().zip(sums).for_each(|(sum, x)| *sum += weight * x);
+        }
+        // A state has the whole length of each segment behind it, and its way into its own.
+        let (mut beyond, mut beyond_kg) = (0.0, 0.0);
+        for i in (0..n).rev() {
+            let [number, kg, ways_m, squares_m2, products] = inside[i];
+            let l = length_m(i);
+            b[i] += l * beyond_kg + products;
+            a[i][i] += l * l * beyond + squares_m2;
+            for k in 0..i {
+                let both = length_m(k) * (l * beyond + ways_m);
+                a[i][k] += both;
+                a[k][i] += both;
             }
+            beyond += number;
+            beyond_kg += kg;
         }
     }
     let smoothing = states.len() as f64 / n as f64;
-    let step = |i: usize| nodes_m[i + 1] - nodes_m[i];
     let middle = |i: usize| 0.5 * (nodes_m[i] + nodes_m[i + 1]);
     for i in 1..n - 1 {
         // By how far the middle of three leaves the line through the others, times its length.
         let share = (middle(i) - middle(i - 1)) / (middle(i + 1) - middle(i - 1));
         let row = [(i - 1, 1.0 - share), (i, -1.0), (i + 1, share)];
-        let weight = smoothing * (2.0 * step(i)).powi(2);
+        let weight = smoothing * (2.0 * length_m(i)).powi(2);
         for (r, p) in row {
             for (c, q) in row {
                 a[r][c] += weight * p * q;

@@ -118,7 +118,8 @@ impl Rate {
 
     /// The β in (s/m)^½ that makes the quotients of neighbouring curves most alike.
     pub(super) fn best_sensitivity(cases: &[CaseCurve]) -> f64 {
-        least(|k| disagreement(cases, trial(k))).map_or(0.0, trial)
+        let overlaps: Vec<Overlap> = cases.windows(2).map(Overlap::of).collect();
+        least(|k| disagreement(&overlaps, trial(k))).map_or(0.0, trial)
     }
 
     fn factor(&self, closing_m_per_s: f64) -> f64 {
@@ -245,22 +246,38 @@ fn impact_sensitivity(cases: &[CaseCurve], sensitivity: f64) -> f64 {
     least(error).map_or(0.0, trial)
 }
 
+/// Forces in N and roots of the closing speeds of two neighbouring curves over their overlap.
+struct Overlap {
+    end_m: f64,
+    /// Of the slower and the faster curve at each point.
+    points: Vec<[(f64, f64); 2]>,
+}
+
+impl Overlap {
+    fn of(pair: &[CaseCurve]) -> Self {
+        let end_m = pair[0].end_m().min(pair[1].end_m());
+        let point = |k: usize| {
+            let d = end_m * k as f64 / POINTS as f64;
+            let of = |c: &CaseCurve| (c.force_at(d), c.closing_at(d).max(0.0).sqrt());
+            [of(&pair[0]), of(&pair[1])]
+        };
+        Self { end_m, points: (1..=POINTS).map(point).collect() }
+    }
+}
+
 /// Mean difference of neighbouring quotients over their overlaps, in ratio to their level.
-fn disagreement(cases: &[CaseCurve], sensitivity: f64) -> f64 {
+fn disagreement(overlaps: &[Overlap], sensitivity: f64) -> f64 {
     let mut sum = 0.0;
-    for pair in cases.windows(2) {
-        let end = pair[0].end_m().min(pair[1].end_m());
+    for Overlap { end_m, points } in overlaps {
         let (mut difference, mut level) = (0.0, 0.0);
-        for k in 1..=POINTS {
-            let d = end * k as f64 / POINTS as f64;
-            let q = |c: &CaseCurve| c.force_at(d) / factor(sensitivity, c.closing_at(d));
-            let (a, b) = (q(&pair[0]), q(&pair[1]));
+        for point in points {
+            let [a, b] = point.map(|(force_n, root)| force_n / (1.0 + sensitivity * root));
             difference += (a - b).abs();
             level += 0.5 * (a.abs() + b.abs());
         }
         if level > 0.0 {
             // Long overlaps say more than short ones.
-            sum += end * difference / level;
+            sum += end_m * difference / level;
         }
     }
     sum
