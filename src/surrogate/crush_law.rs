@@ -274,11 +274,11 @@ fn rates_kg_per_m(nodes_m: &[f64], states: &[Vec<(f64, f64)>], most: &[f64]) -> 
             let l = length_m(i);
             b[i] += l * beyond_kg + products;
             a[i][i] += l * l * beyond + squares_m2;
-            for k in 0..i {
+            (0..i).for_each(|k| {
                 let both = length_m(k) * (l * beyond + ways_m);
                 a[i][k] += both;
                 a[k][i] += both;
-            }
+            });
             beyond += number;
             beyond_kg += kg;
         }
