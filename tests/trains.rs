@@ -333,7 +333,7 @@ fn mean_decelerations_are_those_of_the_histories() {
     }
     let wall = json(&crumple_ok(demo, &["simulate", "scenario.toml", "--json", "-q"]));
     let g = wall["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
-    assert!((g - 10.54).abs() < 0.01, "{g} g from 50 km/h");
+    assert!((g - 10.73).abs() < 0.01, "{g} g from 50 km/h");
 }
 
 /// A run that is too short for its mean deceleration says so, by every method.
