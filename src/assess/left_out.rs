@@ -9,7 +9,7 @@ use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
-use crate::surrogate::band::{self, LeftOutSpeeds, Residuals};
+use crate::surrogate::band::{self, Residuals};
 use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::{PredictError, Prediction};
@@ -121,63 +121,74 @@ impl<'a> LeftOutCase<'a> {
     }
 
     /// Predicts the case by one model and every rule for the maximal crush.
-    pub(super) fn trial(&self, kind: ModelKind) -> Trial {
-        let judged = || -> Result<Vec<_>, ValidateError> {
+    pub(super) fn trial(&self, kind: ModelKind) -> Trial<'_> {
+        let to_text = |error: ValidateError| error.to_string();
+        let answers = || -> Result<Answers, ValidateError> {
             let model = Model::fit_curves(&self.rest, kind)
                 .map_err(|error| ValidateError::NotFitted(error.to_string()))?;
             let query = query_of(self.case, &model);
             // Body force and motion are the same by all rules.
             let prediction = Prediction::new(&model, &query)?;
-            let by = |rule| self.judged(prediction.curve(rule)?);
-            Ok(MaxCrushRule::ALL.map(|rule| (rule, by(rule))).into())
+            let by = |rule| self.answer(prediction.curve(rule)?);
+            Ok(MaxCrushRule::ALL.map(|rule| (rule, by(rule).map_err(to_text))).into())
         };
-        let predictions = match judged() {
-            Ok(judged) => judged
-                .into_iter()
-                .map(|(rule, judged)| (rule, judged.map_err(|e| e.to_string())))
-                .collect(),
-            Err(error) => MaxCrushRule::ALL.map(|rule| (rule, Err(error.to_string()))).into(),
-        };
-        self.trial_of(kind.name(), predictions)
+        let answers = answers().unwrap_or_else(|error| {
+            MaxCrushRule::ALL.map(|rule| (rule, Err(error.to_string()))).into()
+        });
+        Trial { model: kind.name(), held: self, answers }
     }
 
-    pub(super) fn trial_of(&self, model: &'static str, predictions: Predictions) -> Trial {
-        Trial {
-            model,
-            case: self.own.name.clone(),
-            speed_m_per_s: self.own.speed_m_per_s,
-            inner: self.inner,
-            predictions,
+    /// A predicted curve with its errors of crush and energy.
+    pub(super) fn answer(&self, curve: PredictedCurve) -> Result<Answer, ValidateError> {
+        let fe = &self.own.envelope;
+        let answer = Answer {
+            energy_error: curve.energy_j / fe.work() - 1.0,
+            max_crush_error: curve.max_deflection_m / fe.end_m() - 1.0,
+            curve,
+        };
+        match answer.energy_error.is_finite() && answer.max_crush_error.is_finite() {
+            true => Ok(answer),
+            false => Err(ValidateError::NotFinite),
         }
     }
 
-    /// The errors of a predicted curve.
-    pub(super) fn judged(&self, curve: PredictedCurve) -> Result<Judged, ValidateError> {
+    /// The row of an answer of `model`, but for the coverage and the other rules.
+    fn judged(&self, model: &str, answer: &Answer) -> Result<Judged, ValidateError> {
+        let Answer { curve, energy_error, max_crush_error } = answer;
         let envelope = curve.envelope()?;
-        let end = self.own.envelope.end_m();
-        let along = grid(end, STEPS);
+        let along = grid(self.own.envelope.end_m(), STEPS);
         let (reference, predicted) =
             (forces_n(&self.own.envelope, &along), forces_n(&envelope, &along));
+        let force_l1 = l1_ratio(&reference, &predicted);
+        if !force_l1.is_finite() {
+            return Err(ValidateError::NotFinite);
+        }
         let driven_by = |force| -> Result<MotionErrors, ValidateError> {
             Ok(self.reference.errors_with(&curve.driving(force)?)?)
         };
-        let judged = Judged {
-            force_l1: l1_ratio(&reference, &predicted),
-            energy_error: curve.energy_j / self.own.envelope.work() - 1.0,
-            max_crush_error: curve.max_deflection_m / end - 1.0,
-            peaks: peak_errors(&along, &reference, &predicted),
-            residuals: self.residuals(&curve, &along)?,
-            body: driven_by(ForceKind::Body)?,
-            contact: match curve.body_force_n {
-                Some(_) => Some(driven_by(ForceKind::Contact)?),
-                None => None,
-            },
+        let body = driven_by(ForceKind::Body)?;
+        let contact = match curve.body_force_n {
+            Some(_) => Some(driven_by(ForceKind::Contact)?),
+            None => None,
         };
-        let numbers = [judged.force_l1, judged.energy_error, judged.max_crush_error];
-        match numbers.iter().all(|n| n.is_finite()) {
-            true => Ok(judged),
-            false => Err(ValidateError::NotFinite),
-        }
+        let row = LeftOut {
+            model: model.into(),
+            case: self.own.name.clone(),
+            speed_m_per_s: self.own.speed_m_per_s,
+            inner: self.inner,
+            force_l1,
+            energy_error: *energy_error,
+            max_crush_error: *max_crush_error,
+            max_crush_errors: BTreeMap::new(),
+            peaks: peak_errors(&along, &reference, &predicted),
+            velocity_l1: body.velocity_l1,
+            acceleration_l1: body.acceleration_l1,
+            acceleration_unfiltered_l1: body.acceleration_unfiltered_l1,
+            contact_velocity_l1: contact.map(|c| c.velocity_l1),
+            contact_acceleration_l1: contact.map(|c| c.acceleration_l1),
+            coverage: None,
+        };
+        Ok(Judged { row, residuals: self.residuals(curve, &along)? })
     }
 
     /// Residuals of each force of a predicted curve `along` FE's crush, in m.
@@ -217,63 +228,50 @@ pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> DrivingCurv
     )
 }
 
-/// Errors of one prediction.
-pub(super) struct Judged {
-    pub force_l1: f64,
+/// A prediction by one rule for the maximal crush.
+pub(super) struct Answer {
+    curve: PredictedCurve,
     pub energy_error: f64,
     pub max_crush_error: f64,
-    pub peaks: Vec<PeakError>,
+}
+
+/// One model at one case by every rule that was asked, or why that has no answer.
+pub(super) type Answers = BTreeMap<MaxCrushRule, Result<Answer, String>>;
+
+/// A row of the table, and what bands are made of.
+pub(super) struct Judged {
+    pub row: LeftOut,
     pub residuals: BTreeMap<ForceKind, Residuals>,
-    pub body: MotionErrors,
-    pub contact: Option<MotionErrors>,
 }
 
-/// One model at one case by every rule, or why that has no answer.
-pub(super) type Predictions = BTreeMap<MaxCrushRule, Result<Judged, String>>;
-
-pub(super) struct Trial {
+/// A model at a left-out case.
+pub(super) struct Trial<'a> {
     pub model: &'static str,
-    case: String,
-    speed_m_per_s: f64,
-    pub inner: bool,
-    pub predictions: Predictions,
+    pub held: &'a LeftOutCase<'a>,
+    pub answers: Answers,
 }
 
-impl Trial {
-    pub(crate) fn left_out(&self) -> LeftOutSpeeds {
-        LeftOutSpeeds::of(self.inner)
+impl Trial<'_> {
+    pub(crate) fn answer(&self, rule: MaxCrushRule) -> Option<&Answer> {
+        self.answers.get(&rule)?.as_ref().ok()
     }
 
-    pub(crate) fn judged(&self, rule: MaxCrushRule) -> Option<&Judged> {
-        self.predictions.get(&rule)?.as_ref().ok()
-    }
-
-    /// Why there is no row.
-    pub(crate) fn failure(&self, rule: MaxCrushRule) -> Option<String> {
-        let error = self.predictions.get(&rule)?.as_ref().err()?;
-        Some(format!("{} at {}: no row: {error}", self.model, km_per_h(self.speed_m_per_s)))
-    }
-
-    pub(crate) fn row(&self, rule: MaxCrushRule) -> Option<LeftOut> {
-        let by_rule = self.judged(rule)?;
-        let crush = |rule| Some((rule, self.judged(rule)?.max_crush_error));
-        Some(LeftOut {
-            model: self.model.into(),
-            case: self.case.clone(),
-            speed_m_per_s: self.speed_m_per_s,
-            inner: self.inner,
-            force_l1: by_rule.force_l1,
-            energy_error: by_rule.energy_error,
-            max_crush_error: by_rule.max_crush_error,
-            max_crush_errors: MaxCrushRule::ALL.into_iter().filter_map(crush).collect(),
-            peaks: by_rule.peaks.clone(),
-            velocity_l1: by_rule.body.velocity_l1,
-            acceleration_l1: by_rule.body.acceleration_l1,
-            acceleration_unfiltered_l1: by_rule.body.acceleration_unfiltered_l1,
-            contact_velocity_l1: by_rule.contact.map(|c| c.velocity_l1),
-            contact_acceleration_l1: by_rule.contact.map(|c| c.acceleration_l1),
-            coverage: None,
-        })
+    /// Its row by a rule: only this one's curve is run and compared along the crush.
+    ///
+    /// # Errors
+    /// Says why there is no row.
+    pub(crate) fn judged(&self, rule: MaxCrushRule) -> Result<Judged, String> {
+        let judged = match self.answers.get(&rule) {
+            Some(Ok(answer)) => self.held.judged(self.model, answer).map_err(|e| e.to_string()),
+            Some(Err(error)) => Err(error.clone()),
+            None => Err(format!("the rule {} was not asked", rule.name())),
+        };
+        let speed = km_per_h(self.held.own.speed_m_per_s);
+        let Judged { row, residuals } =
+            judged.map_err(|error| format!("{} at {speed}: no row: {error}", self.model))?;
+        let crush = |rule| Some((rule, self.answer(rule)?.max_crush_error));
+        let max_crush_errors = MaxCrushRule::ALL.into_iter().filter_map(crush).collect();
+        Ok(Judged { row: LeftOut { max_crush_errors, ..row }, residuals })
     }
 }
 

@@ -3,12 +3,11 @@
 use crate::plural::counted;
 use std::time::Instant;
 
-use super::choose::Purpose;
 use super::error::CompareError;
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
 use super::settings::ComparisonSettings;
-use super::validate::{Choice, train};
+use super::validate::choose_and_fit;
 use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
 use crate::nsdm::{self, NsdmError, Target};
@@ -166,8 +165,7 @@ pub(super) fn best(
     seed: u64,
 ) -> Result<Method, CompareError> {
     let start = Instant::now();
-    let model =
-        train(group, others, Choice::Auto { purpose: Purpose::Vehicle, seed, trees: None })?;
+    let model = choose_and_fit(group, others, seed)?;
     let fit_s = start.elapsed().as_secs_f64();
     let (curve, predict_s) = predicted(left_out, &model, None)?;
     let driving = curve.driving(ForceKind::Body)?;

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::choose::{NextRun, Purpose, Selection, choose};
 use super::error::ValidateError;
-use super::left_out::{LeftOutCase, Trial, query_of};
+use super::left_out::{Answers, Judged, LeftOutCase, Trial, query_of};
 use super::scatter::scatter;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
@@ -100,6 +100,33 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Valid
     }
 }
 
+/// The model that `auto` chooses for a vehicle, by what it is chosen by and no more: there is no validation in
+/// it, hence no band, and ends of the range are not left out.
+///
+/// # Errors
+/// As [`train`].
+pub(super) fn choose_and_fit(
+    group: &str,
+    cases: &[Case],
+    seed: u64,
+) -> Result<Model, ValidateError> {
+    let set = TrainingSet::new(group, cases)?;
+    let (fitting, _) = those_that_fit(&set, &ModelKind::candidates(seed));
+    let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
+    left_out.retain(|case| case.inner);
+    let trials = trials(&fitting, &left_out);
+    let tables = Tables::of(&fitting, &trials, left_out.len(), (set.force_kind, None));
+    let (chosen, _) =
+        choose(&tables.means, Purpose::Vehicle).unwrap_or_else(|| without_validation(&fitting));
+    let all = ModelKind::all(seed);
+    let kind = all.into_iter().find(|kind| kind.name() == chosen).expect("it is among all");
+    let mut model = Model::fit(&set, kind)?;
+    if let Some(means) = tables.means.iter().find(|m| m.model == chosen) {
+        model.max_crush_rule = means.max_crush_rule;
+    }
+    Ok(model)
+}
+
 /// Fits the model of `kept` that a validation of these cases chose.
 ///
 /// # Errors
@@ -149,10 +176,7 @@ pub fn validate(
     let scatter_of = |force| scatter.as_ref()?.of_force(force, declared);
     let (floors, without_floors) = floors_of(&left_out);
     notes.extend(without_floors);
-    let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
-        fitting.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
-    let trials: Vec<Trial> = pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect();
-
+    let trials = trials(&fitting, &left_out);
     let inner_speeds = left_out.iter().filter(|case| case.inner).count();
     let tables = Tables::of(&fitting, &trials, inner_speeds, (declared, scatter_of(declared)));
     let (chosen, reason) = match selection {
@@ -235,6 +259,13 @@ fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String
     Ok((left_out, notes))
 }
 
+/// Every model at every case, in this order.
+fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<Trial<'a>> {
+    let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
+        kinds.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
+    pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect()
+}
+
 /// What the left-out speeds tell of all models.
 #[derive(Default)]
 struct Tables {
@@ -249,13 +280,13 @@ impl Tables {
     /// With the declared force and its scatter.
     fn of(
         fitting: &[ModelKind],
-        trials: &[Trial],
+        trials: &[Trial<'_>],
         inner_speeds: usize,
         declared: (ForceKind, Option<ForceScatter>),
     ) -> Self {
         let mut all = Self::default();
         for kind in fitting {
-            let own: Vec<&Trial> = trials.iter().filter(|t| t.model == kind.name()).collect();
+            let own: Vec<&Trial<'_>> = trials.iter().filter(|t| t.model == kind.name()).collect();
             let Some(table) = ModelTable::of(kind, &own, declared) else { continue };
             all.notes.extend(table.failures);
             match mean(kind.name(), table.rule, &table.rows) {
@@ -307,17 +338,24 @@ impl ModelTable {
     /// With the declared force and its scatter; `None` without any trial.
     fn of(
         kind: &ModelKind,
-        trials: &[&Trial],
+        trials: &[&Trial<'_>],
         (declared, scatter): (ForceKind, Option<ForceScatter>),
     ) -> Option<Self> {
         let rule = best_rule(kind, trials)?;
         let mut rows = Vec::new();
         let mut residuals = ResidualsOf::new();
-        for trial in trials {
-            let (Some(row), Some(judged)) = (trial.row(rule), trial.judged(rule)) else { continue };
-            rows.push(row);
-            for (force, of) in &judged.residuals {
-                residuals.entry((*force, trial.left_out())).or_default().push(of.clone());
+        let mut failures = Vec::new();
+        let judged: Vec<_> = trials.par_iter().map(|trial| trial.judged(rule)).collect();
+        for judged in judged {
+            match judged {
+                Ok(Judged { row, residuals: of }) => {
+                    for (force, of) in of {
+                        let left_out = LeftOutSpeeds::of(row.inner);
+                        residuals.entry((force, left_out)).or_default().push(of);
+                    }
+                    rows.push(row);
+                }
+                Err(error) => failures.push(error),
             }
         }
         let mut index: BTreeMap<LeftOutSpeeds, usize> = BTreeMap::new();
@@ -327,7 +365,6 @@ impl ModelTable {
             row.coverage = band::coverage(left_out, &residuals[&(declared, left_out)], *i, scatter);
             *i += 1;
         }
-        let failures = trials.iter().filter_map(|t| t.failure(rule)).collect();
         Some(Self { rule, rows, residuals, failures })
     }
 }
@@ -360,34 +397,35 @@ pub fn add_nested(
     // Cases that cannot be left out have been noted.
     let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
     left_out.retain(|case| case.inner);
-    let trials: Vec<Trial> = left_out
+    let trials: Vec<Trial<'_>> = left_out
         .par_iter()
         .map(|held| {
             let v = held.own.speed_m_per_s;
             let others: Vec<Case> =
                 cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
-            let predictions = train(
-                &group,
-                &others,
-                Choice::Auto { purpose: Purpose::Vehicle, seed, trees: None },
-            )
-            .and_then(|model| {
+            let predicted = choose_and_fit(&group, &others, seed).and_then(|model| {
                 let curve = predict(&model, &query_of(held.case, &model))?;
                 let rule = curve.provenance.max_crush_rule;
                 let rule = rule.expect("a prediction says its rule");
-                Ok((rule, held.judged(curve)?))
-            })
-            .map_or_else(
-                |error| BTreeMap::from([(MaxCrushRule::Motion, Err(error.to_string()))]),
-                |(rule, judged)| BTreeMap::from([(rule, Ok(judged))]),
+                Ok((rule, held.answer(curve)?))
+            });
+            let answer = predicted.map_or_else(
+                |error| (MaxCrushRule::Motion, Err(error.to_string())),
+                |(rule, answer)| (rule, Ok(answer)),
             );
-            held.trial_of("auto", predictions)
+            Trial { model: "auto", held, answers: Answers::from([answer]) }
         })
         .collect();
     // Each has one rule.
-    let of = |trial: &Trial| trial.predictions.keys().next().copied();
-    let rows: Vec<LeftOut> = trials.iter().filter_map(|t| t.row(of(t)?)).collect();
-    validation.notes.extend(trials.iter().filter_map(|t| t.failure(of(t)?)));
+    let of = |trial: &Trial<'_>| trial.answers.keys().next().copied();
+    let (mut rows, mut failures) = (Vec::new(), Vec::new());
+    for trial in &trials {
+        match trial.judged(of(trial).expect("it has one")) {
+            Ok(judged) => rows.push(judged.row),
+            Err(error) => failures.push(error),
+        }
+    }
+    validation.notes.extend(failures);
     let rule = trials.first().and_then(of).unwrap_or(MaxCrushRule::Motion);
     match mean("auto", rule, &rows) {
         Some(of) if of.speeds < left_out.len() => validation.notes.push(without_means("auto")),
@@ -412,9 +450,9 @@ fn without_validation(fitting: &[ModelKind]) -> (String, String) {
 /// The rule with the smallest mean error of crush and energy over the inner speeds, as the
 /// crush decides both; the reference method keeps its spline. A rule with an answer at more speeds
 /// goes before; `None` without any trial.
-fn best_rule(kind: &ModelKind, trials: &[&Trial]) -> Option<MaxCrushRule> {
+fn best_rule(kind: &ModelKind, trials: &[&Trial<'_>]) -> Option<MaxCrushRule> {
     let errors = |rule: MaxCrushRule, of_inner: bool| -> Vec<f64> {
-        let of = trials.iter().filter(|t| t.inner == of_inner).filter_map(|t| t.judged(rule));
+        let of = trials.iter().filter(|t| t.held.inner == of_inner).filter_map(|t| t.answer(rule));
         of.map(|j| j.max_crush_error.abs() + j.energy_error.abs()).collect()
     };
     let missing = |rule: MaxCrushRule| {
