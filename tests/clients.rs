@@ -252,7 +252,7 @@ fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
 fn forest_is_as_accurate_as_scikit_learn_on_a_smooth_function() {
     // Quasi-random points (generalised golden ratio) in the unit square.
     let point = |i: usize, step: f64| (0.5 + step * i as f64).fract();
-    let records = Array2::from_shape_fn((2_000, 2), |(i, k)| {
+    let records = Array2::from_shape_fn((700, 2), |(i, k)| {
         point(i, [0.754_877_666_246_692_7, 0.569_840_290_998_053_3][k])
     });
     let targets = records.map_axis(Axis(1), |r| (6.0 * r[0]).sin() + r[1] * r[1] * r[0]);
