@@ -356,6 +356,19 @@ fn dependencies_have_fixed_minor_versions() {
 
 /// Schemas are generated from the types. To write them again:
 /// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
+/// What the fuzzer is built on are the dependencies of the program's own build.
+#[test]
+fn the_fuzzer_is_built_on_the_same_profile() {
+    let profile = |path: &str| {
+        let text = fs::read_to_string(root().join(path)).unwrap();
+        let file: toml::Table = text.parse().unwrap();
+        let mut release = file["profile"]["release"].as_table().unwrap().clone();
+        release.remove("package");
+        release
+    };
+    assert_eq!(profile("Cargo.toml"), profile("tests/fuzz/Cargo.toml"));
+}
+
 #[test]
 fn schemas_are_those_of_the_types() {
     let schemas = [

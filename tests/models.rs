@@ -650,8 +650,8 @@ fn several_parameters() {
     let auto =
         train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
             .unwrap();
-    let notes = auto.leave_one_out.unwrap().notes;
-    assert!(notes.iter().any(|n| n.starts_with("linear: ")), "{notes:?}");
+    let unsuited = auto.leave_one_out.unwrap().unsuited;
+    assert!(unsuited.iter().any(|n| n.starts_with("linear: ")), "{unsuited:?}");
 }
 
 /// Masses that differ become a parameter by themselves.
@@ -890,6 +890,10 @@ fn the_choice_for_trains_counts_the_ends() {
     let error = crumple_fails(demo.path(), 1, &arguments);
     assert!(error.contains("model crush-law needs runs that tell the mass"), "{error}");
     assert!(!demo.path().join("no.model").exists());
+    // That a group is not for one of the models is said, but is nothing to be warned of.
+    let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict"];
+    let table = crumple_ok(demo.path(), &validated);
+    assert!(table.contains("lead-car-pair: without crush-law: "), "{table}");
 }
 
 /// Left-out errors of the bundled groups: the crush law where the runs tell one, and what is said of them in the

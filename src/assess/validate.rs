@@ -167,10 +167,9 @@ pub fn validate(
     selection: Selection<'_>,
 ) -> Result<Validation, ValidateError> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, mut notes) = those_that_fit(&set, candidates);
-    let (left_out, not_left_out) =
+    let (fitting, unsuited) = those_that_fit(&set, candidates);
+    let (left_out, mut notes) =
         left_out_cases(&set).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
-    notes.extend(not_left_out);
     let scatter = scatter(&set, cases);
     let declared = set.force_kind;
     let scatter_of = |force| scatter.as_ref()?.of_force(force, declared);
@@ -209,6 +208,7 @@ pub fn validate(
         band_outside,
         body_band,
         body_band_outside,
+        unsuited,
         notes,
     })
 }
@@ -227,14 +227,14 @@ fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
 
 /// The candidates that can be fitted to the set, and why the others cannot.
 fn those_that_fit(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec<String>) {
-    let (mut fitting, mut notes) = (Vec::new(), Vec::new());
+    let (mut fitting, mut unsuited) = (Vec::new(), Vec::new());
     for &kind in candidates {
         match Model::check_fits(set, kind) {
             Ok(()) => fitting.push(kind),
-            Err(error) => notes.push(format!("{}: {error}", kind.name())),
+            Err(error) => unsuited.push(format!("{}: {error}", kind.name())),
         }
     }
-    (fitting, notes)
+    (fitting, unsuited)
 }
 
 /// Every case left out in turn, with notes on those that cannot be.

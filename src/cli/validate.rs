@@ -280,6 +280,9 @@ pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<(
         output::table(out, &heading, &rows)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
+    for model in &validation.unsuited {
+        writeln!(out, "{group}: without {model}")?;
+    }
     if let Some(scatter) = &validation.scatter {
         writeln!(out, "{group}: {}", scatter_line(scatter))?;
     }

@@ -163,6 +163,7 @@ impl Validated<'_> {
                 percent(scatter.velocity_l1)
             )));
         }
+        parts.extend(validation.unsuited.iter().map(|of| Part::Text(format!("Without {of}."))));
         for note in &validation.notes {
             content.warn(format!("{group}: {note}"));
         }

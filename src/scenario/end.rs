@@ -12,7 +12,7 @@ use crate::curve::{CurveUnloading, DrivingCurve, Envelope};
 use crate::multibody::{
     Damping, DampingError, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
 };
-use crate::surrogate::crush_law::{CrushCurve, CrushLaw};
+use crate::surrogate::crush_law::{CrushCurve, CrushLaw, per_crush_force};
 use crate::surrogate::{Model, QueryPoint};
 use crate::unit::SpeedKind;
 
@@ -64,9 +64,6 @@ impl Coordinates {
 
 /// Least share of the give of end and plates together that is the end's.
 const LEAST_OF_END: f64 = 0.1;
-/// Least share of a vehicle's mass that is never stopped: lighter vehicles than the model's have
-/// no crush zones as heavy.
-const LEAST_FREE: f64 = 0.5;
 
 /// The end of a vehicle whose neighbours close at `closing_m_per_s`.
 ///
@@ -130,10 +127,10 @@ pub(super) fn crush_between(
     let (law, at) = crush_curve(model, speed_m_per_s)?;
     // Of two equal masses half is what moves along their deflection.
     let moved_kg = if slot.role == Role::Wall { slot.mass_kg } else { 0.5 * slot.mass_kg };
-    let free_kg = |d: f64| (moved_kg - at.stopped_kg.force_at(d)).max(LEAST_FREE * moved_kg);
+    let factor = |d: f64| per_crush_force(at.stopped_kg.force_at(d), moved_kg);
     let deflection_m = at.standing_n.deflection_m().to_vec();
     let points = deflection_m.iter().zip(at.standing_n.force_n());
-    let force_n = points.map(|(&d, f)| f * scale * moved_kg / free_kg(d)).collect();
+    let force_n = points.map(|(&d, f)| f * scale * factor(d)).collect();
     let stiffness = model.unloading_n_per_m(speed_m_per_s).map(|k| k * scale);
     let unloading = CurveUnloading::of(stiffness);
     let curve = DrivingCurve::bare(Envelope::new(deflection_m, force_n)?);

@@ -26,6 +26,15 @@ use crate::dataset::grid;
 use crate::piecewise;
 use crate::signal::bounded;
 
+/// Least share of the moved mass that is never stopped: lighter vehicles than those of the runs have
+/// no crush zones as heavy.
+const LEAST_FREE: f64 = 0.5;
+
+/// What a body of one mass feels for each newton of crush force: `M / (M − m_s)`.
+pub(crate) fn per_crush_force(stopped_kg: f64, mass_kg: f64) -> f64 {
+    mass_kg / (mass_kg - stopped_kg).max(LEAST_FREE * mass_kg)
+}
+
 /// What a group's runs say of the mass that is stopped, and of the force behind it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrushLaw {

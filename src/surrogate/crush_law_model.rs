@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::crush_law::CrushLaw;
+use super::crush_law::{CrushLaw, per_crush_force};
 use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
@@ -40,15 +40,10 @@ struct OfCrushLaw {
     law: CrushLaw,
 }
 
-/// Least share of the moved mass that is never stopped: lighter vehicles than those of the runs have
-/// no crush zones as heavy.
-const LEAST_FREE: f64 = 0.5;
-
 impl OfCrushLaw {
     /// What a body of one mass feels for each newton of crush force.
     fn per_crush_force(&self, deflection_m: f64, mass_kg: f64) -> f64 {
-        let free_kg = mass_kg - self.law.stopped_at(deflection_m);
-        mass_kg / free_kg.max(LEAST_FREE * mass_kg)
+        per_crush_force(self.law.stopped_at(deflection_m), mass_kg)
     }
 
     /// Closing speeds in m/s at increasing deflections, of a body that the law itself slows down from the

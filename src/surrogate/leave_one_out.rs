@@ -207,6 +207,9 @@ pub struct Validation {
     /// The same outside the training speeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_band_outside: Option<Band>,
+    /// Models that this group's runs do not suit, with the reason: no fault of any run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unsuited: Vec<String>,
     /// What was left out of the table, with the reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
