@@ -354,9 +354,7 @@ fn dependencies_have_fixed_minor_versions() {
     }
 }
 
-/// Schemas are generated from the types. To write them again:
-/// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
-/// What the fuzzer is built on are the dependencies of the program's own build.
+/// The fuzzer takes the dependencies of the program's own build, which one profile alone allows.
 #[test]
 fn the_fuzzer_is_built_on_the_same_profile() {
     let profile = |path: &str| {
@@ -369,6 +367,8 @@ fn the_fuzzer_is_built_on_the_same_profile() {
     assert_eq!(profile("Cargo.toml"), profile("tests/fuzz/Cargo.toml"));
 }
 
+/// Schemas are generated from the types. To write them again:
+/// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
 #[test]
 fn schemas_are_those_of_the_types() {
     let schemas = [
