@@ -77,7 +77,7 @@ def wrong_order(fmu, kind):
         refuses(s, f"{kind} output set", lambda: s.set(1.0, "force"))
         setter = s.i.setReal if fmu.version == 2 else s.i.setFloat64
         getter = s.i.getReal if fmu.version == 2 else s.i.getFloat64
-        for reference in [0 if fmu.version == 2 else 8, 2, 99, 2**32 - 1]:
+        for reference in [0 if fmu.version == 2 else 10, 2, 99, 2**32 - 1]:
             refuses(s, f"{kind} get of {reference}", lambda: getter([reference]))
             refuses(s, f"{kind} set of {reference}", lambda: setter([reference], [1.0]))
         refuses(s, f"{kind} several, one unknown", lambda: setter([1, 99], [0.3, 1.0]))

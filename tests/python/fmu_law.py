@@ -3,8 +3,9 @@
     python fmu_law.py FMU PAIRS.json
 
 PAIRS.json holds deflections, largest deflections and our force and energies, as bits. Prints a JSON
-object: pairs, how many of the numbers differ, the largest relative difference, and the largest
-difference of the directional derivatives from central differences, in the scale of the largest.
+object: pairs, how many of the numbers differ, the largest relative difference, the largest difference of
+the directional derivatives from central differences, in the scale of the largest, and how far the force
+is from a straight line between two knots, in shares of the largest force.
 """
 
 import json
@@ -26,10 +27,21 @@ def central(spring, name, deflection, width):
     return left, right
 
 
+def bent(spring, deflection):
+    """How far the force at a deflection is from the line between the knots beside it."""
+    spring.set(deflection)
+    force, past, before = spring.get("force", "past_knot", "before_knot")
+    ends = []
+    for d in [deflection - 0.999 * past, deflection + 0.999 * before]:
+        spring.set(d)
+        ends.append(spring.get("force"))
+    return abs(ends[0] + (ends[1] - ends[0]) * past / (past + before) - force)
+
+
 def main(path, pairs):
     asked = json.load(open(pairs))
     numbers = {key: [from_bits(text) for text in asked[key]] for key in ["deflection", "largest"]}
-    different, worst = 0, 0.0
+    different, worst, bends, top = 0, 0.0, [], 0.0
     slopes = {name: [] for name in QUANTITIES}
     with Unpacked(path) as fmu, Spring(fmu, "cs") as spring:
         fresh = spring.i.getFMUState()
@@ -43,12 +55,16 @@ def main(path, pairs):
                     ours = from_bits(asked[name][k])
                     different += 1
                     worst = max(worst, abs(value - ours) / max(abs(ours), 1e-300))
+            top = max(top, from_bits(asked["force"][k]))
+            if k % EVERY == 1 and d < largest:
+                bends.append(bent(spring, d))
             if k % EVERY != 1 or d <= 1e-3:
                 continue
             for on_envelope in [False, True]:
                 if on_envelope:
                     # Nothing is remembered: the same deflection is the largest.
                     spring.i.setFMUState(fresh)
+                    bends.append(bent(spring, d))
                 for name in QUANTITIES:
                     spring.set(d)
                     partial = spring.partial(name)
@@ -66,6 +82,8 @@ def main(path, pairs):
         "different": different,
         "worst": worst,
         "derivative": off,
+        "bent": max(bends) / top,
+        "pieces": len(bends),
         "slopes": sum(map(len, slopes.values())),
     }))
 

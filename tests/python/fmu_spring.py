@@ -8,6 +8,7 @@ import pathlib
 import shutil
 import struct
 import tempfile
+from ctypes import c_double
 
 import fmpy
 from fmpy.fmi1 import FMICallException  # noqa: F401, for those who import this
@@ -127,6 +128,23 @@ class Spring:
             self.time += step
             self.i.setTime(self.time)
             self.i.completedIntegratorStep()
+
+    def knots(self):
+        """The event indicators of model exchange."""
+        z = (c_double * 2)()
+        self.i.getEventIndicators(z, 2)
+        return list(z)
+
+    def accept(self, time):
+        """Accepts a point of model exchange; whether the FMU asks for an event there."""
+        self.time = time
+        self.i.setTime(time)
+        answer = self.i.completedIntegratorStep()
+        return bool(answer[0])
+
+    def event(self):
+        self.i.enterEventMode()
+        self.continuous()
 
     def partial(self, unknown, known="deflection"):
         return self.i.getDirectionalDerivative([self.vr[unknown]], [self.vr[known]], [1.0])[0]

@@ -10,6 +10,8 @@ enum Role {
     /// With the variables that it follows from: always those of initialization; the parameter is
     /// none of the others, since it is set at events only.
     Output(&'static [u32]),
+    /// Changes its sign where a straight piece of the law ends.
+    EventIndicator,
 }
 
 struct Variable {
@@ -25,7 +27,7 @@ const DEFLECTION: u32 = 1;
 const FORCE_SCALE: u32 = 7;
 
 /// In this order FMI 2 counts them from 1.
-const VARIABLES: [Variable; 6] = [
+const VARIABLES: [Variable; 8] = [
     Variable {
         name: "deflection",
         reference: DEFLECTION,
@@ -68,6 +70,20 @@ const VARIABLES: [Variable; 6] = [
         unit: None,
         description: "Factor of force and energies, above 0",
     },
+    Variable {
+        name: "past_knot",
+        reference: 8,
+        role: Role::EventIndicator,
+        unit: Some("m"),
+        description: "Deflection beyond the lower end of its straight piece of the law, at most 1",
+    },
+    Variable {
+        name: "before_knot",
+        reference: 9,
+        role: Role::EventIndicator,
+        unit: Some("m"),
+        description: "Deflection left to the upper end of its straight piece of the law, at most 1",
+    },
 ];
 
 const LOG_CATEGORIES: &str = r#"  <LogCategories>
@@ -95,7 +111,8 @@ pub(super) fn model_description(
     );
     match version {
         FmiVersion::Fmi2 => format!(
-            "{head}\n<fmiModelDescription fmiVersion=\"2.0\" guid=\"{token}\" {about} numberOfEventIndicators=\"0\">\n{}{}{LOG_CATEGORIES}{}</fmiModelDescription>\n",
+            "{head}\n<fmiModelDescription fmiVersion=\"2.0\" guid=\"{token}\" {about} numberOfEventIndicators=\"{}\">\n{}{}{LOG_CATEGORIES}{}</fmiModelDescription>\n",
+            VARIABLES.iter().filter(|v| matches!(v.role, Role::EventIndicator)).count(),
             interfaces_2(name, sources),
             units(false),
             variables_2(),
@@ -158,6 +175,9 @@ fn role(role: &Role) -> (&'static str, Option<&'static str>) {
         Role::Output(_) => {
             (r#"causality="output" variability="continuous" initial="calculated""#, None)
         }
+        Role::EventIndicator => {
+            (r#"causality="local" variability="continuous" initial="calculated""#, None)
+        }
     }
 }
 
@@ -209,8 +229,12 @@ fn variables_3() -> String {
     };
     let (outputs, _) = unknowns(|reference, known| unknown("Output", reference, known));
     let (_, initial) = unknowns(|reference, known| unknown("InitialUnknown", reference, known));
+    let indicators: String = (VARIABLES.iter())
+        .filter(|variable| matches!(variable.role, Role::EventIndicator))
+        .map(|variable| unknown("EventIndicator", variable.reference, &[DEFLECTION]))
+        .collect();
     format!(
-        "  <ModelVariables>\n{variables}  </ModelVariables>\n  <ModelStructure>\n{outputs}{initial}  </ModelStructure>\n"
+        "  <ModelVariables>\n{variables}  </ModelVariables>\n  <ModelStructure>\n{outputs}{initial}{indicators}  </ModelStructure>\n"
     )
 }
 

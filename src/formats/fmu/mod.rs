@@ -88,12 +88,13 @@ struct Binary {
 const BINARIES: &[Binary] = &include!(concat!(env!("OUT_DIR"), "/fmu_binaries.rs"));
 
 /// Sources of the component beside the table, as they go into the archive.
-const SOURCES: [(&str, &str); 12] = [
+const SOURCES: [(&str, &str); 13] = [
     ("derivative.c", include_str!("c/derivative.c")),
     ("fmi2.c", include_str!("c/fmi2.c")),
     ("fmi3.c", include_str!("c/fmi3.c")),
     ("fmi3_none.c", include_str!("c/fmi3_none.c")),
     ("instance.c", include_str!("c/instance.c")),
+    ("knots.c", include_str!("c/knots.c")),
     ("law.c", include_str!("c/law.c")),
     ("law.h", include_str!("c/law.h")),
     ("names.h", include_str!("c/names.h")),

@@ -14,6 +14,11 @@ static int partial(const state_t *now, uint32_t unknown, uint32_t known, double 
     if (known != VR_DEFLECTION && known != VR_FORCE_SCALE) {
         return 0;
     }
+    if (unknown == VR_PAST_KNOT || unknown == VR_BEFORE_KNOT) {
+        double sign = unknown == VR_PAST_KNOT ? 1.0 : -1.0;
+        *value = known == VR_DEFLECTION ? sign : 0.0;
+        return 1;
+    }
     switch (unknown) {
     case VR_FORCE:
         *value = known == VR_DEFLECTION ? now->force_scale * slopes.force

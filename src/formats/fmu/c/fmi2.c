@@ -87,7 +87,7 @@ FMI2(ExitInitializationMode)(component_t c) {
     spring_t *spring = c;
     int said = spring_in(spring, "fmi2ExitInitializationMode", MODE_INITIALIZATION);
     if (said == SAID_OK) {
-        spring_remember(spring); /* a spring may be compressed at the start */
+        spring_settle(spring); /* a spring may be compressed at the start */
         spring->now.mode = spring->now.kind == CO_SIMULATION ? MODE_STEP : MODE_EVENT;
     }
     return said;
@@ -179,7 +179,7 @@ FMI2(NewDiscreteStates)(component_t c, event_info_t *info) {
     event_info_t nothing = {0, 0, 0, 0, 0, 0.0};
     int said = spring_in(c, "fmi2NewDiscreteStates", MODE_EVENT);
     if (said == SAID_OK) {
-        spring_remember(c); /* an input may have jumped at the event */
+        spring_settle(c); /* an input may have jumped at the event */
         *info = nothing;
     }
     return said;
@@ -195,7 +195,7 @@ FMI2(CompletedIntegratorStep)(component_t c, int is_final, int *enter_event_mode
     *enter_event_mode = 0;
     *terminate = 0;
     if (said == SAID_OK) {
-        spring_remember(c);
+        *enter_event_mode = spring_accept(c);
     }
     return said;
 }
@@ -215,8 +215,7 @@ FMI2(GetDerivatives)(component_t c, double derivatives[], size_t n) {
 }
 
 FMI2(GetEventIndicators)(component_t c, double indicators[], size_t n) {
-    (void)indicators;
-    return spring_none(c, "fmi2GetEventIndicators", n);
+    return spring_indicators(c, "fmi2GetEventIndicators", indicators, n);
 }
 
 FMI2(GetContinuousStates)(component_t c, double x[], size_t n) {

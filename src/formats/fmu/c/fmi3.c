@@ -81,7 +81,7 @@ FMI3(ExitInitializationMode)(instance_t c) {
     int said = spring_in(spring, "fmi3ExitInitializationMode", MODE_INITIALIZATION);
     if (said == SAID_OK) {
         int is_stepping = spring->now.kind == CO_SIMULATION && !spring->now.events_used;
-        spring_remember(spring); /* a spring may be compressed at the start */
+        spring_settle(spring); /* a spring may be compressed at the start */
         spring->now.mode = is_stepping ? MODE_STEP : MODE_EVENT;
     }
     return said;
@@ -174,7 +174,7 @@ FMI3(GetAdjointDerivative)(instance_t c, const reference_t unknown[], size_t unk
     return spring_backward(c, function, unknown, unknowns, known, knowns, seed, result);
 }
 
-/* Events: the importer's alone, since the spring has none of its own. */
+/* Events: the importer's, and in model exchange those at the knots of the law. */
 
 FMI3(EvaluateDiscreteStates)(instance_t c) {
     return spring_in(c, "fmi3EvaluateDiscreteStates", MODE_INITIALIZATION | MODE_EVENT);
@@ -187,7 +187,7 @@ FMI3(UpdateDiscreteStates)(instance_t c, bool *update_needed, bool *terminate,
     *update_needed = *terminate = *nominals_changed = *values_changed = *has_next_event = false;
     *next_event_time = 0.0;
     if (said == SAID_OK) {
-        spring_remember(c); /* an input may have jumped at the event */
+        spring_settle(c); /* an input may have jumped at the event */
     }
     return said;
 }
@@ -208,9 +208,18 @@ FMI3(CompletedIntegratorStep)(instance_t c, bool is_final, bool *enter_event_mod
     (void)is_final;
     *enter_event_mode = *terminate = false;
     if (said == SAID_OK) {
-        spring_remember(c);
+        *enter_event_mode = spring_accept(c) != 0;
     }
     return said;
+}
+
+FMI3(GetNumberOfEventIndicators)(instance_t c, size_t *n) {
+    *n = INDICATORS;
+    return c == NULL ? SAID_ERROR : SAID_OK;
+}
+
+FMI3(GetEventIndicators)(instance_t c, double indicators[], size_t n) {
+    return spring_indicators(c, "fmi3GetEventIndicators", indicators, n);
 }
 
 FMI3(SetTime)(instance_t c, double time) {

@@ -142,12 +142,7 @@ FMI3(GetVariableDependencies)(instance_t c, reference_t dependent, size_t elemen
     return spring_none(c, "fmi3GetVariableDependencies", 1);
 }
 
-/* Continuous states and event indicators. */
-FMI3(GetNumberOfEventIndicators)(instance_t c, size_t *n) {
-    *n = 0;
-    return spring_none(c, "fmi3GetNumberOfEventIndicators", 0);
-}
-
+/* Continuous states. */
 FMI3(GetNumberOfContinuousStates)(instance_t c, size_t *n) {
     *n = 0;
     return spring_none(c, "fmi3GetNumberOfContinuousStates", 0);
@@ -160,7 +155,6 @@ FMI3(GetNumberOfContinuousStates)(instance_t c, size_t *n) {
     }
 NO_STATES(SetContinuousStates, const double)
 NO_STATES(GetContinuousStateDerivatives, double)
-NO_STATES(GetEventIndicators, double)
 NO_STATES(GetContinuousStates, double)
 NO_STATES(GetNominalsOfContinuousStates, double)
 

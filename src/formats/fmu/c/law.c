@@ -238,3 +238,27 @@ law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double larg
     slopes.dissipated = top.force - slopes.stored;
     return slopes;
 }
+
+law_piece_t law_piece(const crumple_table_t *t, double deflection, double largest) {
+    law_piece_t piece = {-LAW_FAR, 0.0};
+    branch_t branch;
+    uint32_t i;
+    int is_below = (t->flags & CRUMPLE_HAS_MEMORY) && deflection < largest;
+    if (!is_below && deflection < 0.0) {
+        return piece;
+    }
+    if (!is_below) {
+        i = on_envelope(t, deflection).piece;
+        piece.from = t->deflection[i];
+        piece.to = i + 1 < t->points ? t->deflection[i + 1] : LAW_FAR;
+        return piece;
+    }
+    branch = branch_from(t, largest);
+    piece.to = larger(largest - branch.length, 0.0);
+    if (deflection > piece.to && branch.length > 0.0) {
+        i = shape_piece(t, (largest - deflection) / branch.length);
+        piece.from = larger(largest - t->shape_length[i + 1] * branch.length, 0.0);
+        piece.to = largest - t->shape_length[i] * branch.length;
+    }
+    return piece;
+}

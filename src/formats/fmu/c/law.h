@@ -4,6 +4,15 @@
 
 #include "table.h"
 
+/* Deflections between which the force is one straight line, as long as it does not turn on the
+ * envelope; LAW_FAR where there is no end. */
+typedef struct {
+    double from;
+    double to;
+} law_piece_t;
+
+#define LAW_FAR 1e300
+
 /* Derivatives by the deflection, where the largest deflection follows it if it is at least that. */
 typedef struct {
     double force;
@@ -22,6 +31,10 @@ void law_energies(const crumple_table_t *t, double deflection, double largest, d
 
 /* On the envelope and at its points, the slopes towards larger deflections. */
 law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double largest);
+
+/* The piece of the law at a deflection; on a knot, the one on the side where the law leads from it:
+ * above it on the envelope, below it on a branch. */
+law_piece_t law_piece(const crumple_table_t *t, double deflection, double largest);
 
 CRUMPLE_INSIDE_END
 

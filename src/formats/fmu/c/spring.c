@@ -42,7 +42,7 @@ void spring_remember(spring_t *spring) {
 int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
                double *values) {
     const state_t *now;
-    double stored, dissipated;
+    double stored, dissipated, knots[INDICATORS];
     size_t i;
     int said = spring_in(spring, function, MODE_INSTANTIATED | MODES_TO_GET);
     if (said != SAID_OK || n == 0) {
@@ -53,8 +53,10 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
     }
     now = &spring->now;
     law_energies(&crumple_table, now->input[0], largest_with(now), &stored, &dissipated);
+    spring_knots(spring, knots);
     for (i = 0; i < n; i++) {
-        if (now->mode == MODE_INSTANTIATED && vr[i] >= VR_FORCE && vr[i] <= VR_LARGEST_DEFLECTION) {
+        int is_output = vr[i] >= VR_FORCE && vr[i] <= VR_BEFORE_KNOT && vr[i] != VR_FORCE_SCALE;
+        if (now->mode == MODE_INSTANTIATED && is_output) {
             return spring_say_of(spring, function, vr[i], "has no value before initialization");
         }
         switch (vr[i]) {
@@ -68,6 +70,8 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
         case VR_DISSIPATED_ENERGY: values[i] = now->force_scale * dissipated; break;
         case VR_LARGEST_DEFLECTION: values[i] = largest_with(now); break;
         case VR_FORCE_SCALE: values[i] = now->force_scale; break;
+        case VR_PAST_KNOT: values[i] = knots[0]; break;
+        case VR_BEFORE_KNOT: values[i] = knots[1]; break;
         default: return spring_say_of(spring, function, vr[i], "is no variable of this type");
         }
     }

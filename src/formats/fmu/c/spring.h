@@ -7,7 +7,7 @@
 
 #include "law.h"
 
-#define STATE_LAYOUT 1u
+#define STATE_LAYOUT 2u
 
 /* Value references, the same in both versions; time is a variable in FMI 3 only. 2 is kept for a
  * second input, `deflection_rate`, should the law come to depend on it: nothing else moves then. */
@@ -18,8 +18,13 @@ enum {
     VR_STORED_ENERGY = 4,
     VR_DISSIPATED_ENERGY = 5,
     VR_LARGEST_DEFLECTION = 6,
-    VR_FORCE_SCALE = 7
+    VR_FORCE_SCALE = 7,
+    VR_PAST_KNOT = 8,
+    VR_BEFORE_KNOT = 9
 };
+
+/* The event indicators: VR_PAST_KNOT and VR_BEFORE_KNOT. */
+#define INDICATORS 2
 
 /* Numbers of fmi2Status and fmi3Status. */
 enum { SAID_OK = 0, SAID_WARNING = 1, SAID_DISCARD = 2, SAID_ERROR = 3 };
@@ -49,6 +54,7 @@ typedef struct {
     double input[2];    /* deflection */
     double rates[2][2]; /* first and second derivative of each input, for the next step */
     double memory[2];   /* largest deflection at an accepted point, 0 at least */
+    law_piece_t piece;  /* of the last event of model exchange: its ends are the next events */
     double force_scale;
 } state_t;
 
@@ -107,6 +113,20 @@ int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr,
 
 /* The present point is accepted: the memory moves here and nowhere else. */
 void spring_remember(spring_t *spring);
+
+/* The same at an event, from which on the piece of the law counts that the present point is on. */
+void spring_settle(spring_t *spring);
+
+/* The same at the end of an integrator's step; 1 if the point lies on another piece than at the last
+ * event, so that an event is due. */
+int spring_accept(spring_t *spring);
+
+/* How far in m the deflection lies beyond the lower end of its piece and before the upper one; at
+ * most 1. Below 0 after the end has been crossed. */
+void spring_knots(const spring_t *spring, double knots[INDICATORS]);
+
+/* The same as event indicators of model exchange. */
+int spring_indicators(spring_t *spring, const char *function, double indicators[], size_t n);
 
 int spring_step(spring_t *spring, const char *function, double point, double step);
 
