@@ -12,8 +12,8 @@ use crumple::forest::{StopRule, Thresholds};
 use crumple::surrogate::forest::ForestOptions;
 use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{MODELS, Model, ModelKind};
-use crumple::unit::km_per_h;
+use crumple::surrogate::{CrushLaw, MODELS, Model, ModelKind};
+use crumple::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
 
 use super::arguments::one_of;
@@ -114,6 +114,7 @@ struct Document<'a> {
     training_hash: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     out_of_bag: Option<crumple::forest::OutOfBag>,
+    crush_law: &'a Option<CrushLaw>,
     validation: &'a Option<Validation>,
 }
 
@@ -204,6 +205,7 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
             training_speeds_m_per_s: speeds().collect(),
             training_hash: &model.training_hash,
             out_of_bag,
+            crush_law: &model.crush_law,
             validation: &model.leave_one_out,
         })?;
     } else {
@@ -213,6 +215,20 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
             if let Some(oob) = out_of_bag {
                 let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
                 writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;
+            }
+            if let Some(law) = model.crush_law.as_ref().filter(|law| law.tells_stopped_mass()) {
+                let (end_m, stopped_kg) = law.in_all();
+                let of = match model.speed_kind {
+                    SpeedKind::Wall => "",
+                    SpeedKind::Closing => {
+                        " of the reduced mass, half of what one of two equal ends has,"
+                    }
+                };
+                writeln!(
+                    out,
+                    "crush law: the crush zone stops {stopped_kg:.0} kg{of} over {end_m:.3} m; the runs' momentum says so within {:.0} kg (root mean square)",
+                    law.residual_kg
+                )?;
             }
             if let Some(validation) = &model.leave_one_out {
                 super::validate::print_means(out, validation)?;

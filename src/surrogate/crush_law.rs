@@ -143,6 +143,13 @@ impl CrushLaw {
         self.stopped_kg.iter().any(|&m| m > 0.0)
     }
 
+    /// The deflection in m over which mass is stopped, and how much in kg.
+    pub fn in_all(&self) -> (f64, f64) {
+        let all_kg = self.stopped_kg[self.stopped_kg.len() - 1];
+        let i = self.stopped_kg.iter().position(|&m| m >= all_kg).unwrap_or(0);
+        (self.deflection_m[i], all_kg)
+    }
+
     /// The law that takes the contact force for the crush force, with its own β.
     pub(super) fn without_stopped_mass(&self, contact: &[CaseCurve]) -> Self {
         Self { stopped_kg: vec![0.0; self.stopped_kg.len()], ..self.clone() }.with_rate_of(contact)

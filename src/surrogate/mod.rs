@@ -37,7 +37,7 @@ use std::fmt::Debug;
 use serde_json::value::RawValue;
 
 pub use cases::ModelCase;
-use crush_law::CrushLaw;
+pub use crush_law::CrushLaw;
 pub(crate) use curves::CaseCurve;
 pub use entry::ModelEntry;
 pub use model::{Model, ModelError};
