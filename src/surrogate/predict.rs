@@ -145,7 +145,7 @@ impl<'a> Motion<'a> {
         let unloading = over_speed(model, asked.v, |c| c.unloading_stiffness_n_per_m);
         let mut warnings = model.warnings(&asked.at());
         warnings.extend(asked.warnings(unloading, loading.work() / asked.kinetic_energy_j));
-        let stiffness_n_per_m = match asked.rebound(loading.force_at(loading.end_m())) {
+        let stiffness_n_per_m = match asked.rebound(&loading) {
             Some(rebound) => rebound.stiffness_n_per_m,
             None => unloading.unwrap_or(0.0).max(loading.max_slope()),
         };
@@ -274,7 +274,7 @@ impl<'a> Prediction<'a> {
             body_unloading_stiffness_n_per_m: None,
             drives: model.force_kind.drives().into(),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
-            rebound: asked.rebound(body.as_ref().unwrap_or(&declared).force_at(end)),
+            rebound: asked.rebound(body.as_ref().unwrap_or(&declared)),
             max_deflection_m: end,
             energy_j: declared.work(),
             deflection_m: declared.deflection_m().to_vec(),

@@ -8,7 +8,7 @@ use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predict_error::PredictError;
 use super::predicted::Rebound;
 use super::warning::{Warning, is_far_outside, outside_of};
-use super::{Model, QueryPoint};
+use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
 use crate::dataset::{MASS, OTHER_MASS, feature_values};
@@ -16,6 +16,10 @@ use crate::unit::Speed;
 
 /// Deviation of the mass from the training runs' that needs no warning.
 const SAME_MASS: f64 = 1e-3;
+/// Share of a curve over which the force before its largest crush is averaged.
+const LAST: f64 = 0.05;
+/// Factor between that force and the runs', either way, beyond which nothing more follows for the rebound.
+const MOST_FOLD: f64 = 4.0;
 
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,11 +146,12 @@ impl<'a> Asked<'a> {
         })
     }
 
-    /// The rebound after the body's force was `top_n` at the maximal crush.
-    pub(crate) fn rebound(&self, top_n: f64) -> Option<Rebound> {
+    /// The rebound from the end of the body's force over its deflection.
+    pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
-        let speed = rebound_speed(self.model, self.v)?;
+        let top_n = body.force_at(body.end_m());
+        let speed = rebound_speed(self.model, self.v, last_force_n(body))?;
         Some(Rebound {
             speed_m_per_s: speed * (trained_kg / self.mass_kg).sqrt(),
             stiffness_n_per_m: rebound_stiffness_n_per_m(top_n, trained_kg, speed)?,
@@ -176,12 +181,34 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// The speed of separation, as a power of the impact speed between training speeds, and
-/// the outermost share of it beyond them.
-fn rebound_speed(model: &Model, v: f64) -> Option<f64> {
-    let logarithm = |c: &ModelCase| Some((c.rebound_speed_m_per_s? / c.speed_m_per_s).ln());
-    let share = over_speed_by(model, v.ln(), |c| Some((c.speed_m_per_s.ln(), logarithm(c)?)))?;
-    Some(v * share.exp())
+/// The speed of separation. Its share of the impact speed is a power of that speed between training
+/// speeds, and held beyond them. The energy given back then follows the root of the mean force before the
+/// largest crush, against what the runs have there: a structure behind one fold gives back the same
+/// whatever the force of that fold, the fold itself in proportion to it or more, and the runs cannot
+/// tell how much is whose.
+fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
+    let (declared, body) = model.curves();
+    let curves = if body.is_empty() { declared } else { body };
+    let known = |(case, curve): (&ModelCase, &CaseCurve)| {
+        let share = case.rebound_speed_m_per_s? / case.speed_m_per_s;
+        Some((case.speed_m_per_s.ln(), share.ln(), last_force_n(curve.envelope())))
+    };
+    let known: Vec<_> = model.cases.iter().zip(curves).filter_map(known).collect();
+    let share = over(known.iter().map(|&(ln_v, ln_share, _)| (ln_v, ln_share)), v.ln())?.exp();
+    let forces = known.iter().filter(|(_, _, force_n)| *force_n > 0.0);
+    let of_runs_n = over(forces.map(|(ln_v, _, force_n)| (*ln_v, force_n.ln())), v.ln());
+    let fold = match of_runs_n {
+        Some(ln_n) if last_n > 0.0 => (last_n / ln_n.exp()).clamp(1.0 / MOST_FOLD, MOST_FOLD),
+        _ => 1.0,
+    };
+    // The speed goes with the root of the energy.
+    Some(v * share * fold.powf(0.25))
+}
+
+/// Mean force in N over the last part of a curve: its very end is a matter of the fold's phase.
+fn last_force_n(curve: &Envelope) -> f64 {
+    let from_m = (1.0 - LAST) * curve.end_m();
+    (curve.work() - curve.work_to(from_m)) / (curve.end_m() - from_m)
 }
 
 /// A value of the cases interpolated linearly in speed, held at both ends; the mean of
@@ -191,16 +218,13 @@ pub(super) fn over_speed(
     v: f64,
     value: impl Fn(&ModelCase) -> Option<f64>,
 ) -> Option<f64> {
-    over_speed_by(model, v, |c| Some((c.speed_m_per_s, value(c)?)))
+    over(model.cases.iter().filter_map(|c| Some((c.speed_m_per_s, value(c)?))), v)
 }
 
-fn over_speed_by(
-    model: &Model,
-    x: f64,
-    point: impl Fn(&ModelCase) -> Option<(f64, f64)>,
-) -> Option<f64> {
+/// The same of points in order of x.
+fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
     let mut known: Vec<(f64, f64, f64)> = Vec::new();
-    for (x, y) in model.cases.iter().filter_map(point) {
+    for (x, y) in points {
         match known.last_mut() {
             Some(last) if last.0 == x => {
                 last.1 += y;
