@@ -7,15 +7,16 @@ use crate::curve::{Envelope, EnvelopeError};
 
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
 /// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
-/// Whyatt, Cartographic Journal 30, 1993). `kept` is the index of a point that stays, such as the
-/// maximal crush; the forces up to it are then scaled so that the energy to it is the same.
+/// Whyatt, Cartographic Journal 30, 1993). The forces at the others are then those of the least squares
+/// over the whole curve, which keep the energy of every stretch. `kept` is the index of a point that stays,
+/// such as the maximal crush; the forces up to it are scaled so that the energy to it is the same.
 ///
 /// # Errors
 /// [`EnvelopeError`] if the result is no envelope.
 pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let left = kept_points(d, f, most.max(3), kept);
-    let mut force_n: Vec<f64> = left.iter().map(|&i| f[i]).collect();
+    let mut force_n = least_squares(d, f, &left, kept);
     let deflection_m: Vec<f64> = left.iter().map(|&i| d[i]).collect();
     let plain = Envelope::new(deflection_m.clone(), force_n.clone())?;
     let scale = curve.work_to(d[kept]) / plain.work_to(d[kept]);
@@ -24,6 +25,44 @@ pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, E
         force_n[..until].iter_mut().for_each(|f| *f *= scale);
     }
     Envelope::new(deflection_m, force_n)
+}
+
+/// The forces at the points that are `left`, so that the lines between them have the least squares over the
+/// whole curve; those of the ends and of `kept` stay, and none gets below 0 that was not.
+fn least_squares(d: &[f64], f: &[f64], left: &[usize], kept: usize) -> Vec<f64> {
+    let n = left.len();
+    // ∫φᵢφₖ of the hat functions φ, and ∫Fφᵢ, as rows of a matrix with three diagonals.
+    let (mut below, mut diagonal, mut above) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut right = vec![0.0; n];
+    for k in 0..n - 1 {
+        let (from, to) = (left[k], left[k + 1]);
+        let length_m = d[to] - d[from];
+        diagonal[k] += length_m / 3.0;
+        diagonal[k + 1] += length_m / 3.0;
+        above[k] = length_m / 6.0;
+        below[k + 1] = length_m / 6.0;
+        for i in from..to {
+            let share = |i: usize| (d[i] - d[from]) / length_m;
+            let step_m = d[i + 1] - d[i];
+            let product =
+                |a: f64, b: f64| step_m / 6.0 * (f[i] * (2.0 * a + b) + f[i + 1] * (a + 2.0 * b));
+            right[k] += product(1.0 - share(i), 1.0 - share(i + 1));
+            right[k + 1] += product(share(i), share(i + 1));
+        }
+    }
+    for k in (0..n).filter(|&k| k == 0 || k == n - 1 || left[k] == kept) {
+        (below[k], diagonal[k], above[k], right[k]) = (0.0, 1.0, 0.0, f[left[k]]);
+    }
+    for k in 1..n {
+        let factor = below[k] / diagonal[k - 1];
+        diagonal[k] -= factor * above[k - 1];
+        right[k] -= factor * right[k - 1];
+    }
+    for k in (0..n).rev() {
+        let next = right.get(k + 1).copied().unwrap_or(0.0);
+        right[k] = (right[k] - above[k] * next) / diagonal[k];
+    }
+    right.iter().zip(left).map(|(force, &i)| force.max(f[i].min(0.0))).collect()
 }
 
 /// Indices of the points that are left when the one with the smallest triangle is removed again and
