@@ -1,5 +1,7 @@
 //! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
 
+mod stopped;
+
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,6 +15,8 @@ use crate::curve::loading::loading_branch;
 use crate::curve::replicates::mean_of;
 use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
+
+pub(crate) use stopped::STEPS;
 
 /// One case as models see it: a run, or the mean of runs that differ in nothing.
 #[derive(Clone, Debug, PartialEq)]

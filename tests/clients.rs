@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::common::{
-    build_fixture, crumple_ok, demo_folder, fixture, is_thorough, python, python_of,
+    build_fixture, crumple_ok, demo_folder, fixture, is_thorough, python, python_of, root,
 };
 use crumple::curve::Envelope;
 use crumple::database::Database;
@@ -123,6 +123,35 @@ fn h5py_reads_what_db_show_prints() {
         *order,
         serde_json::json!(["12kmh", "18kmh", "25kmh", "36kmh", "48kmh", "60kmh", "72kmh"])
     );
+}
+
+/// The Python of schemas/curve_database.md runs as it stands there; its crush force is the contact force
+/// less what stops mass, which is most at the tip.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn h5py_runs_the_lines_of_the_layouts_description() {
+    let folder = tempfile::tempdir().unwrap();
+    build_fixture(folder.path(), "lead-car-wall");
+    let text = std::fs::read_to_string(root().join("schemas/curve_database.md")).unwrap();
+    let blocks: Vec<&str> = text.split("```python\n").skip(1).collect();
+    assert_eq!(blocks.len(), 2);
+    for (block, expected) in blocks.iter().zip(["/lead-car-wall/48kmh", "["]) {
+        let program = block.split("```").next().unwrap();
+        let mut python = python();
+        let output = python.args(["-c", program]).current_dir(folder.path()).output().unwrap();
+        let printed = String::from_utf8_lossy(&output.stdout);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && printed.contains(expected), "{printed}{error}");
+    }
+    let check = "import sys; exec(sys.argv[1]); f = case['force_N'][:]; n = d.argmax() + 1\n\
+        c = f - rate * u**2; print(rate[1], (f[1:n] - c[1:n]).max() / f.max(), abs(f - c)[n // 2 : n].max() / f.max())";
+    let program = blocks[1].split("```").next().unwrap();
+    let output = python().args(["-c", check, program]).current_dir(folder.path()).output().unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let numbers: Vec<f64> =
+        printed.lines().last().unwrap().split(' ').map(|n| n.parse().unwrap()).collect();
+    assert!(numbers[0] > 1e3, "kg per m at the tip: {numbers:?}");
+    assert!((0.1..1.0).contains(&numbers[1]) && numbers[2] < numbers[1], "{numbers:?}");
 }
 
 #[test]

@@ -225,6 +225,86 @@ fn db_check_finds_nothing_in_what_was_just_built() {
     }
 }
 
+/// Whether `db check` finds nothing.
+fn is_sound(here: &Path) -> bool {
+    crumple_in(here, &["db", "check", "curves.h5", "--strict"]).status.success()
+}
+
+/// The stopped mass that the file at `path` has for lead-car-wall: its deflections, masses, rates and residual.
+fn stopped_mass(path: &Path) -> Option<[Vec<f64>; 4]> {
+    let attributes = Hdf5::open(path).unwrap().root().group(WALL).unwrap().attrs().unwrap();
+    let of = |name: &str| match attributes.get(&format!("stopped_mass_{name}"))? {
+        AttrValue::F64Array(values) => Some(values.clone()),
+        other => Some(vec![other.as_f64()?]),
+    };
+    Some([of("deflection_m")?, of("kg")?, of("rate_kg_per_m")?, of("residual_kg")?])
+}
+
+/// A group's stopped mass stands in its file, that of the model trained on it; it changes with the cases,
+/// whether the file is written anew or edited, and goes with those that tell it.
+#[test]
+fn the_stopped_mass_stands_in_the_database() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = build_fixture(here, WALL);
+    build_fixture(here, "lead-car-pair");
+    let built = stopped_mass(&path).unwrap();
+    let [d, m, rate, residual] = &built;
+    crumple_ok(here, &["train", "curves.h5", "--group", WALL, "--model", "rate", "-o", "a.model"]);
+    let model = json(&fs::read_to_string(here.join("a.model")).unwrap());
+    let of_model = |key: &str| -> Vec<f64> {
+        serde_json::from_value(model["crush_law"][key].clone()).unwrap()
+    };
+    assert_eq!((d, m), (&of_model("deflection_m"), &of_model("stopped_kg")));
+    assert_eq!(model["crush_law"]["residual_kg"], residual[0]);
+    for i in 0..d.len() - 1 {
+        assert!((m[i + 1] - m[i] - rate[i] * (d[i + 1] - d[i])).abs() < 1e-9 * m[m.len() - 1]);
+    }
+    let pair = Hdf5::open(&path).unwrap().root().group("lead-car-pair").unwrap().attrs().unwrap();
+    assert_eq!(pair.keys().collect::<Vec<_>>(), ["cases"], "its noses bend into each other");
+    let listed = crumple_ok(here, &["db", "ls", "curves.h5"]);
+    let said = format!("the crush zone stops {:.0} kg over ", m[m.len() - 1]);
+    assert_eq!(listed.matches(&said).count(), 1, "{listed}");
+    // Written anew, then edited because something of others is in it.
+    crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "72kmh"]);
+    let without = stopped_mass(&path).unwrap();
+    assert!(without != built && is_sound(here));
+    edited(&path, |file| file.root().set_attr("theirs", AttrValue::F64(1.0)).unwrap());
+    crumple_ok(
+        here,
+        &["build", fixture("fe/lead-car-wall/study.toml").to_str().unwrap(), "-o", "curves.h5"],
+    );
+    assert!(stopped_mass(&path).unwrap() == built && is_sound(here));
+    for case in ["18kmh", "25kmh", "36kmh", "48kmh", "60kmh", "72kmh"] {
+        crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", case]);
+    }
+    assert_eq!(stopped_mass(&path), None, "one run tells none");
+    assert!(is_sound(here));
+}
+
+/// A stopped mass that is not that of the cases is found, and made good by the next change.
+#[test]
+fn db_check_finds_a_stopped_mass_of_other_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = build_fixture(here, WALL);
+    let (built, bytes) = (stopped_mass(&path).unwrap(), fs::read(&path).unwrap());
+    for (name, value) in [
+        ("stopped_mass_kg", AttrValue::F64Array(vec![0.0, 1.0])),
+        ("stopped_mass_kg", AttrValue::F64Array(built[1].iter().map(|m| 1.1 * m).collect())),
+        ("stopped_mass_residual_kg", AttrValue::VarLenString("none".into())),
+    ] {
+        fs::write(&path, &bytes).unwrap();
+        edited(&path, |file| file.root().group(WALL).unwrap().set_attr(name, value).unwrap());
+        let found = findings(here);
+        let message = found[0]["message"].as_str().unwrap();
+        assert_eq!((found.len(), &found[0]["code"]), (1, &"stopped_mass_differs".into()));
+        assert!(message.starts_with(&format!("the group's {name} is not that of its cases")));
+        crumple_ok(here, &["db", "tag", "curves.h5", "--group", WALL, "--add", "seen"]);
+        assert!(is_sound(here) && stopped_mass(&path).unwrap() == built);
+    }
+}
+
 #[test]
 fn db_check_names_the_value_that_was_changed() {
     let folder = tempfile::tempdir().unwrap();

@@ -29,9 +29,9 @@ const MAY_NAME: [(&str, &[&str]); 36] = [
     ("rating", &["guess", "curve", "signal", "history", "table"]),
     ("study", &["guess", "curve", "solver", "history", "manifest", "file", "unit"]),
     ("history_hdf5", &["solver", "history", "hdf5", "file", "unit"]),
-    ("database", &["guess", "curve", "signal", "history", "hdf5", "file", "unit"]),
-    ("build", &["study", "database", "curve", "manifest", "file", "clock"]),
     ("dataset", &["curve", "unit"]),
+    ("database", &["guess", "dataset", "curve", "signal", "history", "hdf5", "file", "unit"]),
+    ("build", &["study", "database", "curve", "manifest", "file", "clock"]),
     ("curate", &["dataset", "database", "curve", "signal", "file", "unit"]),
     (
         "surrogate",

@@ -25,6 +25,7 @@ mod report;
 mod run_channels;
 mod shell;
 mod simulate;
+mod stopped_mass;
 mod sweep;
 mod terminal;
 mod train;

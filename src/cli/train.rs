@@ -13,13 +13,13 @@ use crumple::surrogate::forest::ForestOptions;
 use crumple::surrogate::leave_one_out::Validation;
 use crumple::surrogate::max_crush::MaxCrushRule;
 use crumple::surrogate::{CrushLaw, MODELS, Model, ModelKind};
-use crumple::unit::{SpeedKind, km_per_h};
+use crumple::unit::km_per_h;
 use serde::Serialize;
 
 use super::arguments::one_of;
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input, stopped_mass};
 
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
@@ -216,19 +216,9 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
                 let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
                 writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;
             }
-            if let Some(law) = model.crush_law.as_ref().filter(|law| law.tells_stopped_mass()) {
-                let (end_m, stopped_kg) = law.in_all();
-                let of = match model.speed_kind {
-                    SpeedKind::Wall => "",
-                    SpeedKind::Closing => {
-                        " of the reduced mass, half of what one of two equal ends has,"
-                    }
-                };
-                writeln!(
-                    out,
-                    "crush law: the crush zone stops {stopped_kg:.0} kg{of} over {end_m:.3} m; the runs' momentum says so within {:.0} kg (root mean square)",
-                    law.residual_kg
-                )?;
+            let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
+            if let Some(stopped) = stopped.filter(|stopped| stopped.is_told()) {
+                writeln!(out, "{}", stopped_mass::said(stopped, model.speed_kind))?;
             }
             if let Some(validation) = &model.leave_one_out {
                 super::validate::print_means(out, validation)?;

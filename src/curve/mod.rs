@@ -14,6 +14,7 @@ pub(crate) mod made_of;
 pub mod recipe;
 pub(crate) mod replicates;
 pub mod retrace;
+pub(crate) mod stopped_mass;
 
 use std::collections::BTreeMap;
 
@@ -24,6 +25,7 @@ use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
 pub use driving::{CurveUnloading, DrivingCurve};
 pub use envelope::{Envelope, EnvelopeError};
+pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
 ///

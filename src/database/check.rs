@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
-use super::{DatabaseError, listed};
+use super::{DatabaseError, group, listed};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
 use crate::hdf5::{AttrValue, Group};
@@ -52,6 +52,7 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
     let mut checked = Checked::default();
     for group in raw.groups()? {
         let mut readable = Vec::new();
+        let before = checked.findings.len();
         for (name, case) in &group.cases {
             checked.cases += 1;
             let mut findings =
@@ -75,7 +76,14 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
             }
         }
         super::sort(&mut readable);
+        // Of cases that are not what was written the stopped mass is another.
+        let is_altered = |f: &Finding| f.code == "altered" || DAMAGE.contains(&f.code);
+        let is_as_written = readable.len() == group.cases.len()
+            && !checked.findings[before..].iter().any(is_altered);
         of_group(&group, &readable, &mut checked.findings);
+        if is_as_written {
+            of_stopped_mass(&raw, &group.name, &readable, &mut checked.findings)?;
+        }
     }
     Ok(checked)
 }
@@ -383,6 +391,30 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
         );
         add(by_speed[0], "case_order", message);
     }
+}
+
+/// The group's stopped mass is that of its cases.
+fn of_stopped_mass(
+    opened: &Opened<'_>,
+    name: &str,
+    cases: &[Case],
+    list: &mut Vec<Finding>,
+) -> Result<(), DatabaseError> {
+    let (Some(first), attributes) = (cases.first(), opened.group_attributes(name)?) else {
+        return Ok(());
+    };
+    if let Some((attribute, why)) = group::differs(&attributes, name, cases) {
+        let message = format!(
+            "the group's {attribute} is not that of its cases ({why}): the next change of the group by crumple writes it anew"
+        );
+        Findings { group: name, case: &first.name, list }.add(
+            "stopped_mass_differs",
+            None,
+            None,
+            message,
+        );
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use std::fs;
 use std::path::Path;
 
 use super::foreign::{self, Item, is_of_dimensions, listed};
-use super::layout::{self, CASE_ATTRIBUTES, CASES, Columns, Content, ORIGINAL, VERSION};
+use super::group::{self, GROUP_ATTRIBUTES};
+use super::layout::{self, CASE_ATTRIBUTES, Columns, Content, ORIGINAL, VERSION};
 use super::{CasePath, Database, DatabaseError};
 use crate::curve::Case;
 use crate::file::{self, write_by_path};
@@ -145,8 +146,9 @@ impl Moves {
         }
         for group in old.groups().filter(|group| new.cases(group).is_empty()) {
             let found = root.group(group)?;
-            if found.attr_datatypes()?.contains_key(CASES) {
-                found.remove_attr(CASES)?;
+            let there = found.attr_datatypes()?;
+            for name in GROUP_ATTRIBUTES.iter().filter(|name| there.contains_key(**name)) {
+                found.remove_attr(name)?;
             }
         }
         file.commit()?;
@@ -218,11 +220,11 @@ impl Edit<'_> {
         let there: HashSet<String> = root.groups()?.into_iter().collect();
         let moved: HashSet<&CasePath> = self.moves.all.values().collect();
         for name in self.new.groups() {
+            let attributes = group::attributes(name, self.new.cases(name));
             let group = match there.contains(name) {
-                true => root.group(name)?,
-                false => root.create_group(name)?,
+                true => replace_group_attributes(root.group(name)?, attributes)?,
+                false => with_attributes(root.create_group(name)?, attributes)?,
             };
-            group.set_attr(CASES, layout::case_names(self.new.cases(name)))?;
             let before: HashMap<&str, &Case> =
                 self.old.cases(name).iter().map(|case| (case.name.as_str(), case)).collect();
             for case in self.new.cases(name) {
@@ -272,6 +274,30 @@ fn has_same_curves(a: &Case, b: &Case) -> bool {
         && a.original == b.original
         && a.closing_speed_m_per_s == b.closing_speed_m_per_s
         && a.masses == b.masses
+}
+
+fn with_attributes(
+    group: Group,
+    attributes: Vec<(&'static str, AttrValue)>,
+) -> Result<Group, EditError> {
+    for (name, value) in attributes {
+        group.set_attr(name, value)?;
+    }
+    Ok(group)
+}
+
+fn replace_group_attributes(
+    group: Group,
+    mut attributes: Vec<(&'static str, AttrValue)>,
+) -> Result<Group, EditError> {
+    let there = group.attrs()?;
+    for name in GROUP_ATTRIBUTES.iter().filter(|name| there.contains_key(**name)) {
+        if !attributes.iter().any(|(n, _)| n == name) {
+            group.remove_attr(name)?;
+        }
+    }
+    attributes.retain(|(name, value)| !there.get(*name).is_some_and(|t| group::is_same(t, value)));
+    with_attributes(group, attributes)
 }
 
 fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditError> {

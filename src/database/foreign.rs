@@ -3,7 +3,8 @@
 use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
-use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, CASES, FoundGroup, ORIGINAL, Opened, ROOT};
+use super::group::GROUP_ATTRIBUTES;
+use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, FoundGroup, ORIGINAL, Opened, ROOT};
 use super::{CasePath, DatabaseError};
 use crate::hdf5::{self, Dataset, Group, dimensions};
 
@@ -64,7 +65,8 @@ pub(super) fn found(opened: &Opened<'_>) -> Result<BTreeSet<Item>, DatabaseError
         foreign.members("", &root, |name| ROOT.contains(&name), &names, &[])?;
         for FoundGroup { name, cases, .. } in &ours {
             let names = cases.iter().map(|(name, _)| name.as_str()).collect();
-            foreign.members(name, &root.group(name)?, |name| name == CASES, &names, &[])?;
+            let is_ours = |name: &str| GROUP_ATTRIBUTES.contains(&name);
+            foreign.members(name, &root.group(name)?, is_ours, &names, &[])?;
             for (case, group) in cases {
                 foreign.of_case(&format!("{name}/{case}"), group)?;
             }

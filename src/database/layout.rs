@@ -5,6 +5,7 @@ use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
+use super::group::{self, CASES};
 use super::{CasePath, Database, DatabaseError, damaged_curve};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
@@ -24,8 +25,6 @@ pub(crate) const OLDEST: i64 = 2;
 
 /// Attributes of the root that are this layout's.
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
-/// Attribute of a group that lists its cases in order of speed.
-pub(crate) const CASES: &str = "cases";
 /// Group of a case with the curve at the solver's rate.
 pub(crate) const ORIGINAL: &str = "original";
 /// Attribute of a case with the BLAKE3 hashes of what it holds.
@@ -282,7 +281,9 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
     }
     for (name, cases) in &database.groups {
         let mut group = file.create_group(name);
-        group.set_attr(CASES, case_names(cases));
+        for (attribute, value) in group::attributes(name, cases) {
+            group.set_attr(attribute, value);
+        }
         for case in cases {
             let content = with_hashes(database, case)?;
             let mut builder = group.create_group(&case.name);
@@ -397,6 +398,15 @@ impl<'a> Opened<'a> {
             }
         }
         Ok(groups)
+    }
+
+    /// The attributes of a group.
+    pub(crate) fn group_attributes(
+        &self,
+        name: &str,
+    ) -> Result<HashMap<String, AttrValue>, DatabaseError> {
+        let group = self.check(name, self.file.root().group(name))?;
+        self.check(name, group.attrs())
     }
 
     /// The names that a group's attribute `cases` lists.

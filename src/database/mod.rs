@@ -25,6 +25,7 @@
 pub mod check;
 mod edit;
 mod foreign;
+mod group;
 mod layout;
 pub(crate) mod names;
 
@@ -34,7 +35,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::curve::from_table::IMPORTED;
-use crate::curve::{Case, CurveError, Origin};
+use crate::curve::{Case, CurveError, Origin, StoppedMass};
 use crate::file::{WriteError, write_whole};
 use crate::guess;
 
@@ -432,6 +433,12 @@ impl Database {
             .map(|case| (self.altered.remove(&CasePath::of(&case)), case))
             .map(|(a, c)| (c, a))
             .collect()
+    }
+
+    /// The mass that the crush zone of a group stops at each deflection, as its cases tell it now; `None` if
+    /// there is no such group, or its cases tell none.
+    pub fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
+        group::stopped_mass(group, self.cases(group))
     }
 
     /// All cases, by group, speed and name.

@@ -1,5 +1,7 @@
 //! Least squares with unknowns between 0 and an upper bound.
 
+use super::cholesky::{Cholesky, dot};
+
 /// Where an unknown stands.
 #[derive(Clone, Copy, PartialEq)]
 enum Stand {
@@ -70,37 +72,16 @@ fn step_to_bound(
     true
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The solution of the equations of the free unknowns, with the others where they are, by Cholesky.
+/// The solution of the equations of the free unknowns, with the others where they are.
 fn solve_free(a: &[Vec<f64>], b: &[f64], x: &[f64], stands: &[Stand]) -> Vec<f64> {
     let free: Vec<usize> = (0..b.len()).filter(|&i| stands[i] == Stand::Free).collect();
     let held: Vec<usize> = (0..b.len()).filter(|&i| stands[i] == Stand::AtUpper).collect();
     let right = |r: usize| b[free[r]] - held.iter().map(|&k| a[free[r]][k] * x[k]).sum::<f64>();
-    let n = free.len();
-    let mut l = vec![vec![0.0; n]; n];
-    for r in 0..n {
-        for c in 0..=r {
-            let rest = a[free[r]][free[c]] - dot(&l[r][..c], &l[c][..c]);
-            l[r][c] = match r == c {
-                true => rest.max(f64::MIN_POSITIVE).sqrt(),
-                false => rest / l[c][c],
-            };
-        }
-    }
-    let mut y = vec![0.0; n];
-    for r in 0..n {
-        y[r] = (right(r) - dot(&l[r][..r], &y[..r])) / l[r][r];
-    }
-    for r in (0..n).rev() {
-        let above: f64 = (r + 1..n).map(|k| l[k][r] * y[k]).sum();
-        y[r] = (y[r] - above) / l[r][r];
-    }
+    let right: Vec<f64> = (0..free.len()).map(right).collect();
+    let solved = Cholesky::of(free.len(), |r, c| a[free[r]][free[c]]).solve(&right);
     let mut x = x.to_vec();
-    for (&i, y) in free.iter().zip(y) {
-        x[i] = y;
+    for (&i, found) in free.iter().zip(solved) {
+        x[i] = found;
     }
     x
 }

@@ -2,6 +2,7 @@
 
 mod bounded;
 pub(crate) mod cfc;
+mod cholesky;
 mod derivative;
 mod integral;
 mod l1;
@@ -10,6 +11,7 @@ pub(crate) mod resample;
 
 pub(crate) use bounded::bounded;
 pub use cfc::CfcError;
+pub(crate) use cholesky::Cholesky;
 pub use derivative::derivative;
 pub(crate) use integral::integral;
 pub use l1::l1_ratio;

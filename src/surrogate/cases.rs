@@ -5,10 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::CaseCurve;
 use super::cached::Cached;
 use crate::curve::{EnvelopeError, ForceKind};
-use crate::dataset::{TrainingCase, grid};
+use crate::dataset::{STEPS, TrainingCase, grid};
 
-/// Fewest steps of a stored curve: short crushes need more than one each 2 mm.
-const STEPS: usize = 200;
 /// Forces beyond this are damage, not measurement.
 const LARGEST_N: f64 = 1e15;
 
@@ -30,7 +28,7 @@ pub struct ModelCase {
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Speed of separation when the body force has first fallen to zero.
+    /// Speed of separation after the body force has first fallen to zero.
     #[serde(default)]
     pub rebound_speed_m_per_s: Option<f64>,
     /// Empty in files of version 1.

@@ -35,11 +35,6 @@ impl CaseCurve {
         &self.envelope
     }
 
-    /// Whether its closing speeds are known.
-    pub(crate) fn knows_closing(&self) -> bool {
-        self.closing.is_some()
-    }
-
     /// The same curve with forces in N made of its deflections and forces, which are finite.
     pub(crate) fn map_forces(&self, force_n: impl Fn(f64, f64) -> f64) -> Self {
         let (d, f) = (self.envelope.deflection_m(), self.envelope.force_n());

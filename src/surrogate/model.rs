@@ -22,8 +22,6 @@ use crate::file::WriteError;
 use crate::forest::ForestError;
 use crate::unit::{SpeedKind, UnitSystem};
 
-/// Masses of a pair that differ by no more are those of equal bodies, as a share.
-const EVEN: f64 = 0.01;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR: f64 = 0.25;
 
@@ -183,7 +181,7 @@ impl Model {
         };
         let speed = |i: usize| cases[i].speed_m_per_s;
         let needed_law = if kind.entry().needs_crush_law {
-            crush_law(set, &curves.declared).filter(CrushLaw::tells_stopped_mass)
+            crush_law(set, &curves.declared).filter(|law| law.stopped.is_told())
         } else {
             None
         };
@@ -362,7 +360,7 @@ impl Model {
         let of = |(case, curve): (&ModelCase, &CaseCurve)| {
             let top_n = curve.force_at(curve.end_m());
             let law = self.crush_law.as_ref();
-            let free_kg = moved_kg - law.map_or(0.0, |law| law.stopped_at(curve.end_m()));
+            let free_kg = moved_kg - law.map_or(0.0, |law| law.stopped.at(curve.end_m()));
             let rebound = case.rebound_speed_m_per_s;
             let stiffness = rebound.and_then(|v| rebound_stiffness_n_per_m(top_n, free_kg, v));
             Some((case.speed_m_per_s, stiffness.or(case.unloading_stiffness_n_per_m)?))
@@ -424,11 +422,7 @@ impl Model {
     }
 }
 
-/// The crush law of a group whose runs differ in speed alone: a contact force on one body, or
-/// between two of the same mass.
+/// The crush law of a group whose runs may tell a stopped mass.
 fn crush_law(set: &TrainingSet, contact: &[CaseCurve]) -> Option<CrushLaw> {
-    let is_even =
-        set.masses.other_kg.is_none_or(|other| (other / set.masses.body_kg - 1.0).abs() <= EVEN);
-    let is_told = set.force_kind == ForceKind::Contact && set.features.is_empty() && is_even;
-    is_told.then(|| CrushLaw::fit(contact, set.masses.effective_kg()))?
+    set.stopped_mass().map(|stopped| CrushLaw::of(stopped, contact))
 }

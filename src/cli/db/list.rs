@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::curve::Case;
+use crumple::curve::{Case, StoppedMass};
 use crumple::database::Database;
 use crumple::dataset::of_one_kind;
 use serde::Serialize;
 
 use super::chosen::Chosen;
 use super::row::CaseRow;
+use super::stopped_mass::said;
 use super::{CommandResult, GlobalOptions, Outcome, output};
 
 /// A database, and which of its cases.
@@ -25,6 +26,9 @@ pub struct Args {
 #[derive(Serialize)]
 pub struct Groups<T> {
     pub groups: BTreeMap<String, Vec<T>>,
+    /// The mass that the crush zone of a group stops, where its cases tell it.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub stopped_mass: BTreeMap<String, StoppedMass>,
     /// What no command can use a group for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -48,13 +52,19 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     for warning in &warnings {
         options.warn(warning);
     }
+    let told = |group: &String| Some((group.clone(), database.stopped_mass(group)?));
+    let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(told).collect();
     let outcome = if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned };
     if options.json {
-        output::print_json(&Groups { groups, warnings })?;
+        output::print_json(&Groups { groups, stopped_mass, warnings })?;
     } else {
         output::print(|out| {
             groups.iter().try_for_each(|(group, rows)| {
                 print_group(out, group, rows)?;
+                if let Some(stopped) = stopped_mass.get(group) {
+                    let kind = database.cases(group)[0].speed.kind;
+                    writeln!(out, "{}", said(stopped, kind))?;
+                }
                 writeln!(out)
             })
         })?;

@@ -79,7 +79,11 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
         for case in cases {
             groups.entry(case.group.clone()).or_default().push(FullCase::of(case)?);
         }
-        output::print_json(&Groups { groups, warnings: Vec::new() })?;
+        output::print_json(&Groups {
+            groups,
+            stopped_mass: BTreeMap::new(),
+            warnings: Vec::new(),
+        })?;
         return Ok(Outcome::Clean);
     }
     output::print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;

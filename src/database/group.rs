@@ -1,0 +1,90 @@
+//! Attributes of a group: its cases in order, and the mass that its crush zone stops, which follows from
+//! them and is written anew with each change.
+
+use std::collections::HashMap;
+
+use super::layout::case_names;
+use crate::curve::{Case, ForceKind, StoppedMass};
+use crate::dataset::TrainingSet;
+use crate::hdf5::AttrValue;
+
+/// Attribute of a group that lists its cases in order of speed.
+pub(super) const CASES: &str = "cases";
+const DEFLECTION: &str = "stopped_mass_deflection_m";
+const STOPPED: &str = "stopped_mass_kg";
+const RATE: &str = "stopped_mass_rate_kg_per_m";
+const RESIDUAL: &str = "stopped_mass_residual_kg";
+/// Every attribute that a group can have; what else it has is others'.
+pub(super) const GROUP_ATTRIBUTES: [&str; 5] = [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL];
+
+/// The attributes of a group with these cases, in order of speed.
+pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrValue)> {
+    let mut all = vec![(CASES, case_names(cases))];
+    if let Some(stopped) = stopped_mass(name, cases) {
+        all.extend(of_stopped_mass(&stopped));
+    }
+    all
+}
+
+/// The mass that the crush zone of a group stops; `None` if its cases do not tell one.
+pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
+    let first = cases.first()?;
+    // Looked at before anything is filtered: a group may have thousands of cases.
+    let may_tell = first.force_kind == ForceKind::Contact
+        && cases.iter().all(|c| c.masses == first.masses && c.parameters == first.parameters);
+    let set = may_tell.then(|| TrainingSet::new(name, cases).ok())??;
+    set.stopped_mass().filter(StoppedMass::is_told)
+}
+
+fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
+    let nodes = &stopped.deflection_m;
+    // λ from each node to the next one; 0 from the last.
+    let rates = nodes.iter().map(|&d| stopped.rate_kg_per_m(d)).collect();
+    [
+        (DEFLECTION, AttrValue::F64Array(nodes.clone())),
+        (STOPPED, AttrValue::F64Array(stopped.stopped_kg.clone())),
+        (RATE, AttrValue::F64Array(rates)),
+        (RESIDUAL, AttrValue::F64(stopped.residual_kg)),
+    ]
+}
+
+/// The first attribute of a stopped mass that is not what the cases tell, with what it is instead; a group
+/// of an earlier version, which has none, differs in nothing.
+pub(super) fn differs(
+    found: &HashMap<String, AttrValue>,
+    name: &str,
+    cases: &[Case],
+) -> Option<(&'static str, &'static str)> {
+    if GROUP_ATTRIBUTES[1..].iter().all(|name| !found.contains_key(*name)) {
+        return None;
+    }
+    let told = stopped_mass(name, cases).map(|stopped| of_stopped_mass(&stopped));
+    let Some(told) = told else { return Some((STOPPED, "the cases tell none")) };
+    told.into_iter().find_map(|(name, value)| match found.get(name) {
+        None => Some((name, "it is missing")),
+        Some(there) if !is_like(there, &value) => Some((name, "the cases tell another")),
+        Some(_) => None,
+    })
+}
+
+/// Share of the largest number by which stored numbers may differ from what the cases tell.
+const LIKE: f64 = 1e-9;
+
+fn is_like(a: &AttrValue, b: &AttrValue) -> bool {
+    let (a, b) = (numbers(a), numbers(b));
+    let scale = b.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= LIKE * scale)
+}
+
+fn numbers(value: &AttrValue) -> Vec<f64> {
+    match value {
+        AttrValue::F64(number) => vec![*number],
+        AttrValue::F64Array(numbers) => numbers.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether both hold the same bits; lists of names always count as others.
+pub(super) fn is_same(a: &AttrValue, b: &AttrValue) -> bool {
+    !numbers(b).is_empty() && numbers(a) == numbers(b)
+}
