@@ -552,7 +552,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     assert_eq!(keyword[1], "lead-car-wall 50 km/h (wall)");
     assert_eq!(
         keyword[2],
-        "       101         0       1.0       1.0       0.0       0.0         0      1063"
+        "       101         0       1.0       1.0       0.0       0.0         0      1061"
     );
     let f = column("body_force_N");
     for (i, (d, f)) in d.iter().zip(&f).enumerate() {

@@ -200,7 +200,7 @@ const HEAD: &str = "[run]\nduration = \"150ms\"\n[curves]\nnose = { model = \"le
 
 /// FE's contact force at a training speed, driven by the crush law, gives FE's velocity within 0.8 %
 /// from contact to 30 ms after the largest crush, from 7.2 km/h against the wall on; at 4.5 and 6 km/h
-/// within 1.2 %.
+/// within 1.2 %; in the mean of a group's inner speeds within 1 %.
 #[test]
 fn fes_contact_force_gives_fes_velocity() {
     let database = Database::read(&MODELS.path().join("curves.h5")).unwrap();
@@ -209,6 +209,7 @@ fn fes_contact_force_gives_fes_velocity() {
         [("lead-car-wall", 24.0, "nose", 1.0), ("vehicle-pair", 20.24, "end", 0.5)]
     {
         let cases = database.group(Path::new("curves.h5"), group).unwrap();
+        let mut inner = Vec::new();
         for (i, case) in cases.iter().enumerate() {
             let v = case.speed.m_per_s * per_wall;
             let text = format!(
@@ -236,9 +237,12 @@ fn fes_contact_force_gives_fes_velocity() {
                 off += (p - fe * per_wall).abs();
                 all += (fe * per_wall).abs();
             }
+            let error = off / all;
+            if (1..cases.len() - 1).contains(&i) {
+                inner.push(error);
+            }
             // Below, the whole crush is a few millimetres, and most of the time is rebound.
             if case.speed.m_per_s * per_wall >= 1.25 {
-                let error = off / all;
                 // Of the two slowest FE's own body force in this model leaves 1.1 and 1.0 %: most of
                 // their time is rebound, and it is no straight line.
                 let most = if v >= 2.0 { 0.008 } else { 0.012 };
@@ -246,6 +250,8 @@ fn fes_contact_force_gives_fes_velocity() {
                 held += 1;
             }
         }
+        let mean = inner.iter().sum::<f64>() / inner.len() as f64;
+        assert!(mean < 0.01, "{group}: {:.2} % in the mean of the inner speeds", 100.0 * mean);
     }
     assert_eq!(held, 7 + 7);
 }

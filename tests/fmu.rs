@@ -36,12 +36,16 @@ const HELD: [(f64, [f64; 4]); 3] = [
     (1.0, [2.26, 13.3, 0.77, 5.9]),
 ];
 /// Restitution of the same run by the law itself.
-const RESTITUTION: f64 = 0.0966;
+const RESTITUTION: f64 = 0.0975;
 
-/// Largest errors of plain Verlet at 0.05 ms, of motion and force, on the curve of `crush-law`, and of the
-/// rebound by Runge-Kutta at 0.75 ms without events; both as docs/feeding/fmi.md says.
-const PLAIN_ON_KINKS: [f64; 2] = [3e-6, 2e-5];
-const RK4_ON_KINKS: f64 = 3.3e-3;
+/// Largest errors of plain Verlet, of motion and force: at 0.05 ms on predicted curves, and at 0.025 ms on a
+/// recorded one; as docs/feeding/fmi.md says.
+const PLAIN_ON_PREDICTED: [f64; 2] = [1e-6, 1e-5];
+const PLAIN_ON_RECORDED: [f64; 2] = [1e-6, 1e-4];
+/// Largest error of the rebound by Runge-Kutta at 0.75 ms without events on the curve of `crush-law`, and on
+/// that of the forest.
+const RK4: f64 = 4e-4;
+const RK4_ON_FOREST: f64 = 1.1e-3;
 
 fn run_python(script: &str, arguments: &[&str]) -> Value {
     crate::common::run_python(python_of("CRUMPLE_PYTHON_FMU"), script, arguments)
@@ -307,9 +311,9 @@ fn one_mass_moves_as_in_our_own_runs() {
     let crush_law = predicted(ModelKind::named("crush-law", 0).unwrap());
     // With the largest errors of plain Verlet, of motion and force.
     let laws = [
-        ("predicted", forest, 5e-5, [1e-6, 1e-5]),
-        ("crush-law", crush_law, 5e-5, PLAIN_ON_KINKS),
-        ("recorded", recorded(), 2.5e-5, [1e-6, 1e-4]),
+        ("predicted", forest, 5e-5, PLAIN_ON_PREDICTED),
+        ("crush-law", crush_law, 5e-5, PLAIN_ON_PREDICTED),
+        ("recorded", recorded(), 2.5e-5, PLAIN_ON_RECORDED),
     ];
     for (name, law, step_s, plain) in laws {
         let history = |run: &Run| {
@@ -356,7 +360,7 @@ fn one_mass_moves_as_in_our_own_runs() {
             assert!((340.0..380.0).contains(&number("/events/count")), "{name}");
             match name {
                 "predicted" => costs_are_those_of_the_document(&found, version),
-                "crush-law" => assert!((number("/rk4/of_reference") - RK4_ON_KINKS).abs() < 5e-5),
+                "crush-law" => assert!(number("/rk4/of_reference").abs() < RK4, "{found}"),
                 _ => {}
             }
         }
@@ -382,7 +386,7 @@ fn costs_are_those_of_the_document(found: &Value, version: FmiVersion) {
         }
     }
     assert!(is_said(found["restitution"].as_f64().unwrap(), RESTITUTION));
-    assert!(found["rk4"]["of_reference"].as_f64().unwrap().abs() < 1.1e-3, "{found}");
+    assert!(found["rk4"]["of_reference"].as_f64().unwrap().abs() < RK4_ON_FOREST, "{found}");
 }
 
 /// The document has the numbers that the test of the masters holds.
@@ -396,10 +400,16 @@ fn the_document_says_what_held_inputs_cost() {
         assert!(text.contains(&row), "docs/feeding/fmi.md has no row {row}");
     }
     assert!(text.contains(&format!("restitution of {RESTITUTION}")));
-    let plain = format!("plain Verlet at 0.05 ms {:.4} % ", 100.0 * PLAIN_ON_KINKS[0]);
-    assert!(text.contains(&plain), "docs/feeding/fmi.md does not say {plain}");
-    let rk4 = format!("Runge-Kutta at 0.75 ms {:.2} %", 100.0 * RK4_ON_KINKS);
-    assert!(text.contains(&rk4), "docs/feeding/fmi.md does not say {rk4}");
+    let [motion, force] = PLAIN_ON_RECORDED.map(|share| 100.0 * share);
+    for said in [
+        format!(
+            "at 0.025 ms within {motion:.4} % of position and speed, but {force:.2} % of the force"
+        ),
+        format!("within {:.2} % of the rebound on the forest's", 100.0 * RK4_ON_FOREST),
+        format!("within {:.2} % on that of `crush-law`", 100.0 * RK4),
+    ] {
+        assert!(text.contains(&said), "docs/feeding/fmi.md does not say {said}");
+    }
 }
 
 /// The .dll under wine gives the bits of the .so.

@@ -14,8 +14,8 @@ pub struct BodyMotion {
     pub force: Envelope,
     /// Closing speed in m/s over deflection: an envelope by its shape, not a force.
     pub closing_speed: Envelope,
-    /// Speed of separation in m/s when the body force has first fallen to zero after the
-    /// largest deflection; `None` if the record ends before.
+    /// Speed of separation in m/s, the mean over the 5 ms after the body force has first fallen to zero
+    /// behind the largest deflection; `None` if the record ends before.
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
@@ -58,7 +58,9 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
             Curve::new(sampled.time_s().to_vec(), sampled.deflection_m().to_vec(), values).ok()?;
         Some(loading_branch(&curve).ok()?.envelope)
     };
-    let rebound = (end + 1..speeds.len()).find(|&i| force_n[i] <= 0.0).map(|i| -speeds[i]);
+    let rebound = (end + 1..speeds.len())
+        .find(|&i| force_n[i] <= 0.0)
+        .map(|i| separation_m_per_s(sampled.time_s(), speeds, i));
     Some(BodyMotion {
         closing_speed: over_deflection(speeds.clone())?,
         force: over_deflection(force_n)?.pushing(),
@@ -80,7 +82,14 @@ pub(crate) struct RecordedForce {
 
 /// The body still swings after it has left the obstacle: its speed of separation is the mean
 /// over this time, in s.
-const SEPARATION_S: f64 = 0.020;
+const SEPARATION_S: f64 = 0.005;
+
+/// Speed of separation of closing speeds whose body has parted at state `from`.
+fn separation_m_per_s(time_s: &[f64], closing_m_per_s: &[f64], from: usize) -> f64 {
+    let until = time_s.iter().take_while(|&&time| time <= time_s[from] + SEPARATION_S).count();
+    let after = &closing_m_per_s[from..until];
+    -after.iter().sum::<f64>() / after.len() as f64
+}
 
 /// Near the largest deflection the force still swings in time while the deflection hardly
 /// moves: over the last share of it one mean force stands for all, lest the rebound depend on
@@ -134,10 +143,7 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
             break;
         }
     }
-    let separation = parted.map(|from| {
-        let until = t.iter().take_while(|&&time| time <= t[from] + SEPARATION_S).count();
-        -v[from..until].iter().sum::<f64>() / (until - from) as f64
-    });
+    let separation = parted.map(|from| separation_m_per_s(t, v, from));
     Some(RecordedForce {
         loading: Envelope::new(deflection_m, force_n).ok()?.pushing(),
         unloading_deflection_m,

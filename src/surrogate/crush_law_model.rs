@@ -12,7 +12,8 @@ use super::crush_law::{CrushLaw, per_crush_force};
 use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
-use crate::curve::ForceKind;
+use crate::curve::{Envelope, ForceKind};
+use crate::dataset::{TrainingCase, TrainingSet};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "crush-law",
@@ -28,7 +29,8 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     forest: None,
     fit: |input| {
         let law = input.crush_law()?;
-        Ok(Arc::new(OfCrushLaw { law, force: input.force }))
+        let interval_s = interval_s(input.set);
+        Ok(Arc::new(OfCrushLaw { law, force: input.force, interval_s }))
     },
     load: loaded::<OfCrushLaw>,
 };
@@ -37,13 +39,54 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfCrushLaw {
     force: ForceKind,
+    /// Mean interval of the runs' states in s. What a slow run has within it, over a short way, is nothing
+    /// that a faster one could show.
+    #[serde(default)]
+    interval_s: f64,
     law: CrushLaw,
 }
+
+fn interval_s(set: &TrainingSet) -> f64 {
+    let of = |case: &TrainingCase| {
+        let time_s = case.case.sampled.time_s();
+        (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64
+    };
+    set.cases.iter().map(of).sum::<f64>() / set.cases.len() as f64
+}
+
+/// Means of a force, given at increasing deflections, over the way that a body goes within `interval_s` at
+/// its closing speed there. Before the contact the force is taken for the opposite of that behind it, so
+/// that it still begins at 0.
+fn over_interval(
+    interval_s: f64,
+    along_m: &[f64],
+    force_n: &[f64],
+    closing_m_per_s: &[f64],
+) -> Vec<f64> {
+    let (Some(&end_m), Ok(force)) =
+        (along_m.last(), Envelope::new(along_m.to_vec(), force_n.to_vec()))
+    else {
+        return force_n.to_vec();
+    };
+    let mean_n = |((&d, &f), u): ((&f64, &f64), &f64)| {
+        let half_m = (0.5 * interval_s * u).min(end_m - d);
+        match half_m > LEAST_WAY_M {
+            true => {
+                (force.work_to(d + half_m) - force.work_to((d - half_m).abs())) / (2.0 * half_m)
+            }
+            false => f,
+        }
+    };
+    along_m.iter().zip(force_n).zip(closing_m_per_s).map(mean_n).collect()
+}
+
+/// Over a shorter way a mean is the force itself, and the difference of works their rounding.
+const LEAST_WAY_M: f64 = 1e-6;
 
 impl OfCrushLaw {
     /// What a body of one mass feels for each newton of crush force.
     fn per_crush_force(&self, deflection_m: f64, mass_kg: f64) -> f64 {
-        per_crush_force(self.law.stopped_at(deflection_m), mass_kg)
+        per_crush_force(self.law.stopped.at(deflection_m), mass_kg)
     }
 
     /// Closing speeds in m/s at increasing deflections, of a body that the law itself slows down from the
@@ -88,14 +131,18 @@ impl Surrogate for OfCrushLaw {
                 &own
             }
         };
-        let force = |((&d, &q), &u): ((&f64, &f64), &f64)| {
-            let crush_n = q * self.law.factor(u);
-            match self.force {
-                ForceKind::Contact => crush_n + self.law.rate_kg_per_m(d) * u * u,
-                ForceKind::Body => crush_n * self.per_crush_force(d, at.mass_kg),
-            }
+        let crush_n: Vec<f64> =
+            standing_n.iter().zip(closing).map(|(q, &u)| q * self.law.factor(u)).collect();
+        // A contact's spikes are as short as that; a body does not feel them.
+        let crush_n = match self.force {
+            ForceKind::Contact => crush_n,
+            ForceKind::Body => over_interval(self.interval_s, deflection_m, &crush_n, closing),
         };
-        deflection_m.iter().zip(&standing_n).zip(closing).map(force).collect()
+        let force = |((&d, &crush_n), &u): ((&f64, &f64), &f64)| match self.force {
+            ForceKind::Contact => crush_n + self.law.stopped.rate_kg_per_m(d) * u * u,
+            ForceKind::Body => crush_n * self.per_crush_force(d, at.mass_kg),
+        };
+        deflection_m.iter().zip(&crush_n).zip(closing).map(force).collect()
     }
 
     fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {
@@ -113,11 +160,11 @@ impl Surrogate for OfCrushLaw {
 
 #[cfg(test)]
 mod tests {
-    use super::super::crush_law::made::{MASS_KG, made, motion};
+    use super::super::crush_law::made::{MASS_KG, law, made, motion};
     use super::*;
 
     fn model(force: ForceKind, cases: &[CaseCurve]) -> OfCrushLaw {
-        OfCrushLaw { force, law: CrushLaw::fit(cases, MASS_KG).unwrap() }
+        OfCrushLaw { force, interval_s: 0.0, law: law(cases, MASS_KG) }
     }
 
     /// Runs of the law itself: a speed between them comes out in both forces and in the motion.
@@ -160,9 +207,9 @@ mod tests {
         };
         let (contact_n, body_n) = (contact.force_n(&cases, &at, &d), body.force_n(&cases, &at, &d));
         for i in 0..2 {
-            let stopped = contact.law.stopped_at(d[i]);
+            let stopped = contact.law.stopped.at(d[i]);
             let crush_n = body_n[i] * (MASS_KG - stopped) / MASS_KG;
-            let of_stopping = contact.law.rate_kg_per_m(d[i]) * u[i] * u[i];
+            let of_stopping = contact.law.stopped.rate_kg_per_m(d[i]) * u[i] * u[i];
             assert!((contact_n[i] - crush_n - of_stopping).abs() < 1e-6 * contact_n[i]);
         }
         assert!(contact_n[0] > 1.05 * body_n[0], "at 50 mm mass is being stopped");

@@ -5,6 +5,7 @@
 //! deflections.
 
 pub mod band;
+mod blend;
 mod cached;
 mod cases;
 pub mod crush_law;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cases::ModelCase;
-use super::curves::interpolate_held;
+use super::curves::{interpolate_held, neighbours};
 use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predict_error::PredictError;
 use super::predicted::Rebound;
@@ -18,8 +18,8 @@ use crate::unit::Speed;
 const SAME_MASS: f64 = 1e-3;
 /// Share of a curve over which the force before its largest crush is averaged.
 const LAST: f64 = 0.05;
-/// Factor between that force and the runs', either way, beyond which nothing more follows for the rebound.
-const MOST_FOLD: f64 = 4.0;
+/// Power of that force with which the speed of separation goes: the energy given back with its root.
+const OF_LAST_FORCE: f64 = 0.25;
 
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -181,28 +181,48 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// The speed of separation. Its share of the impact speed is a power of that speed between training
-/// speeds, and held beyond them. The energy given back then follows the root of the mean force before the
-/// largest crush, against what the runs have there: a structure behind one fold gives back the same
-/// whatever the force of that fold, the fold itself in proportion to it or more, and the runs cannot
-/// tell how much is whose.
+/// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the largest crush, `a` and `b` by
+/// least squares of the runs' ratios to it. A structure behind one fold gives back the same energy whatever
+/// the force of that fold, the fold itself in proportion to it; the runs cannot tell how much is whose, and
+/// the root lies between. What a run has beside the line fades with the square of the nearness in speed.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };
+    let of_force = |force_n: f64| if force_n > 0.0 { force_n.powf(OF_LAST_FORCE) } else { 0.0 };
     let known = |(case, curve): (&ModelCase, &CaseCurve)| {
-        let share = case.rebound_speed_m_per_s? / case.speed_m_per_s;
-        Some((case.speed_m_per_s.ln(), share.ln(), last_force_n(curve.envelope())))
+        let per_force = case.rebound_speed_m_per_s? / of_force(last_force_n(curve.envelope()));
+        per_force.is_finite().then_some((case.speed_m_per_s, per_force))
     };
-    let known: Vec<_> = model.cases.iter().zip(curves).filter_map(known).collect();
-    let share = over(known.iter().map(|&(ln_v, ln_share, _)| (ln_v, ln_share)), v.ln())?.exp();
-    let forces = known.iter().filter(|(_, _, force_n)| *force_n > 0.0);
-    let of_runs_n = over(forces.map(|(ln_v, _, force_n)| (*ln_v, force_n.ln())), v.ln());
-    let fold = match of_runs_n {
-        Some(ln_n) if last_n > 0.0 => (last_n / ln_n.exp()).clamp(1.0 / MOST_FOLD, MOST_FOLD),
-        _ => 1.0,
+    let known: Vec<(f64, f64)> = model.cases.iter().zip(curves).filter_map(known).collect();
+    let line = relative_line(&known)?;
+    let beside: Vec<(f64, f64)> = known.iter().map(|&(v, y)| (v, (y / line(v)).ln())).collect();
+    let speeds: Vec<f64> = beside.iter().map(|p| p.0).collect();
+    let (low, high, share) = neighbours(&speeds, v);
+    let beside = (1.0 - share).powi(2) * beside[low].1 + share.powi(2) * beside[high].1;
+    let v_held = v.clamp(speeds[0], speeds[speeds.len() - 1]);
+    let held = line(v_held) * beside.exp() * v / v_held;
+    Some((of_force(last_n) * held).min(v))
+}
+
+/// `a + b v` with the least squares of its ratios to the points, which are above 0; their mean if it were
+/// not above 0 at all of them.
+fn relative_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64> {
+    let weigh = |(v, y): &(f64, f64)| [1.0 / (y * y), v / (y * y), v * v / (y * y), 1.0 / y, v / y];
+    let mut sums = [0.0; 5];
+    points.iter().for_each(|p| sums.iter_mut().zip(weigh(p)).for_each(|(sum, x)| *sum += x));
+    let [one, of_v, of_square, right, right_v] = sums;
+    let determinant = one * of_square - of_v * of_v;
+    let level = right / one;
+    let line = match determinant > 1e-9 * one * of_square {
+        true => {
+            let b = (one * right_v - of_v * right) / determinant;
+            ((right - b * of_v) / one, b)
+        }
+        false => (level, 0.0),
     };
-    // The speed goes with the root of the energy.
-    Some(v * share * fold.powf(0.25))
+    let is_sound = points.iter().all(|&(v, _)| line.0 + line.1 * v > 0.0);
+    let (a, b) = if is_sound { line } else { (level, 0.0) };
+    (level.is_finite() && level > 0.0).then_some(move |v: f64| a + b * v)
 }
 
 /// Mean force in N over the last part of a curve: its very end is a matter of the fold's phase.

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use super::blend::Blend;
 use super::cached::Cached;
 use super::curves::neighbours;
 use super::entry::{ModelEntry, loaded};
@@ -53,8 +54,8 @@ pub(crate) struct Rate {
     /// β, in (s/m)^½.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     sensitivity: f64,
-    /// γ, in (s/m)^½: beyond the end of a slower neighbour its Q follows that of the next faster
-    /// curve with `(1 + γ√v)` of the impact speeds; none in the model `rate`.
+    /// γ, in (s/m)^½: the Q of the runs go with `1 + γ√v` of their impact speeds, and what is left of them is
+    /// blended; none in the model `rate`.
     #[serde(skip)]
     of_impact: Option<f64>,
     #[serde(skip)]
@@ -93,6 +94,9 @@ const ALONE: Carried = Carried { last: 0.15, fades: 0.1 };
 /// The impact speed has the level; only the step at the end fades.
 const WITH_IMPACT: Carried = Carried { last: 0.005, fades: 0.05 };
 
+/// After so many lengths what is left is below rounding.
+const LENGTHS: f64 = 37.0;
+
 impl Rate {
     /// Fits β to the overlaps of neighbouring curves.
     ///
@@ -128,15 +132,8 @@ impl Rate {
 
     /// `Q` of case `i`, carried on beyond its end.
     fn quotient(&self, cases: &[CaseCurve], levels: &[f64], i: usize, d: f64) -> f64 {
-        let case = &cases[i];
-        if case.reaches(d) || i + 1 == cases.len() {
-            // Beyond the fastest curve its end is held, where it stood.
-            return case.force_at(d) / self.factor(case.closing_at(d));
-        }
-        let end = case.end_m();
-        let fading = (-(d - end) / (self.carried().fades * end)).exp();
-        let level = self.level_of_next(cases, i) * (1.0 + (levels[i] - 1.0) * fading);
-        self.quotient(cases, levels, i + 1, d) * level
+        let last = (i..cases.len() - 1).find(|&k| cases[k].reaches(d)).unwrap_or(cases.len() - 1);
+        (i..=last).rev().fold(0.0, |next_n, k| self.carried_n(cases, levels, k, d, next_n))
     }
 
     /// What the impact speed of case `i` makes of the Q of the next faster one.
@@ -158,13 +155,78 @@ impl Rate {
         deflection_m: &[f64],
     ) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
-        let (low, high, share) = neighbours(&speeds, speed_m_per_s);
         let levels = self.levels(cases);
+        if let Some(of_impact) = self.of_impact {
+            return self.blended_n(cases, &levels, of_impact, speed_m_per_s, deflection_m);
+        }
+        let (low, high, share) = neighbours(&speeds, speed_m_per_s);
         let standing_n = |d: f64| {
             let of = |i| self.quotient(cases, &levels, i, d);
             if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
         };
         deflection_m.iter().map(|&d| standing_n(d)).collect()
+    }
+
+    /// The `Q` of all runs, freed of the impact speed, blended and given it again. Beyond the end of a run
+    /// the faster ones blend alone, after a length over which it fades.
+    fn blended_n(
+        &self,
+        cases: &[CaseCurve],
+        levels: &[f64],
+        of_impact: f64,
+        speed_m_per_s: f64,
+        deflection_m: &[f64],
+    ) -> Vec<f64> {
+        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
+        let v = speed_m_per_s.clamp(speeds[0], speeds[speeds.len() - 1]);
+        let blend = Blend::of(&speeds);
+        let of_impact = |speed: f64| factor(of_impact, speed);
+        let weights: Vec<Vec<f64>> = (0..cases.len())
+            .map(|first| {
+                let of = blend.weights(first, v);
+                of.iter().zip(&speeds).map(|(w, &s)| w * of_impact(v) / of_impact(s)).collect()
+            })
+            .collect();
+        let mut now = vec![0.0; cases.len()];
+        let mut standing_n = |d: f64| {
+            let is_gone = |i: &usize| self.fading(&cases[*i], d) == 0.0;
+            let first = (0..cases.len() - 1).rev().find(is_gone).map_or(0, |i| i + 1);
+            now.copy_from_slice(&weights[first]);
+            for (case, faster) in cases[first..].iter().zip(&weights[first + 1..]) {
+                let fading = self.fading(case, d);
+                let fade = |(w, after): (&mut f64, &f64)| *w = fading * *w + (1.0 - fading) * after;
+                now.iter_mut().zip(faster).for_each(fade);
+            }
+            let (mut next_n, mut sum_n) = (0.0, 0.0);
+            for i in (first..cases.len()).rev() {
+                next_n = self.carried_n(cases, levels, i, d, next_n);
+                sum_n += now[i] * next_n;
+            }
+            sum_n.max(0.0)
+        };
+        deflection_m.iter().map(|&d| standing_n(d)).collect()
+    }
+
+    /// What is left of a run at a deflection, as a share that fades beyond its end.
+    fn fading(&self, case: &CaseCurve, d: f64) -> f64 {
+        let end = case.end_m();
+        let lengths = (d - end) / (self.carried().fades * end);
+        match lengths {
+            ..=0.0 => 1.0,
+            ..LENGTHS => (-lengths).exp(),
+            _ => 0.0,
+        }
+    }
+
+    /// `Q` of case `i`, beyond its end from `next_n`, that of the next faster one.
+    fn carried_n(&self, cases: &[CaseCurve], levels: &[f64], i: usize, d: f64, next_n: f64) -> f64 {
+        let case = &cases[i];
+        if case.reaches(d) || i + 1 == cases.len() {
+            // Beyond the fastest curve its end is held, where it stood.
+            return case.force_at(d) / self.factor(case.closing_at(d));
+        }
+        let level = 1.0 + (levels[i] - 1.0) * self.fading(case, d);
+        next_n * self.level_of_next(cases, i) * level
     }
 
     /// Whether β is one that a fit gives.

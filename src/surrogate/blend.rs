@@ -1,0 +1,126 @@
+//! How much of each run goes into a value at another impact speed.
+//!
+//! The values of the runs are taken for a smooth function of the impact speed with noise, a Gaussian
+//! process of unknown mean (ordinary kriging: Rasmussen and Williams, Gaussian Processes for Machine
+//! Learning, 2006, sections 2.2, 2.7 and 4.2): where a run stands out from what the others tell, its fold
+//! happened to, and the neighbours need not. What a run has beside the smooth function fades with the
+//! square of the nearness in speed, so that at its own speed a run comes out as it is.
+
+use super::curves::neighbours;
+use crate::signal::Cholesky;
+
+/// Length over which the runs are alike, in ratio to the range of their speeds.
+const LENGTH: f64 = 1.5;
+/// Variance of what is a run's own, in ratio to that of the smooth function.
+const OWN: f64 = 0.02;
+
+/// The runs of a group, by their increasing impact speeds.
+pub(super) struct Blend<'a> {
+    speeds_m_per_s: &'a [f64],
+    length_m_per_s: f64,
+}
+
+impl<'a> Blend<'a> {
+    /// Of one speed at least.
+    pub(super) fn of(speeds_m_per_s: &'a [f64]) -> Self {
+        let range = speeds_m_per_s[speeds_m_per_s.len() - 1] - speeds_m_per_s[0];
+        Self { speeds_m_per_s, length_m_per_s: LENGTH * range }
+    }
+
+    /// The weights of the runs from the `first` on, 0 for those before, at an impact speed within or
+    /// beyond theirs: there those of the outermost. Their sum is 1.
+    pub(super) fn weights(&self, first: usize, speed_m_per_s: f64) -> Vec<f64> {
+        let all = self.speeds_m_per_s;
+        let runs = &all[first..];
+        let v = speed_m_per_s.clamp(all[0], all[all.len() - 1]);
+        let mut weights = vec![0.0; all.len()];
+        if let [_] = runs {
+            weights[first] = 1.0;
+            return weights;
+        }
+        let smooth = self.smooth(runs);
+        weights[first..].copy_from_slice(&smooth(v));
+        let (low, high, share) = neighbours(all, v);
+        for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
+            if run >= first && nearness > 0.0 {
+                weights[run] += nearness;
+                let told = smooth(all[run]);
+                weights[first..].iter_mut().zip(told).for_each(|(w, told)| *w -= nearness * told);
+            }
+        }
+        weights
+    }
+
+    /// The weights of the smooth function at a speed.
+    fn smooth<'b>(&'b self, runs: &'b [f64]) -> impl Fn(f64) -> Vec<f64> + 'b {
+        let n = runs.len();
+        let alike = |a: f64, b: f64| matern((a - b).abs() / self.length_m_per_s);
+        let equations =
+            Cholesky::of(n, move |r, c| alike(runs[r], runs[c]) + if r == c { OWN } else { 0.0 });
+        let of_mean = equations.solve(&vec![1.0; n]);
+        let mean_sum: f64 = of_mean.iter().sum();
+        move |v: f64| {
+            let right: Vec<f64> = runs.iter().map(|&run| alike(run, v)).collect();
+            let known = equations.solve(&right);
+            let lacking = (1.0 - known.iter().sum::<f64>()) / mean_sum;
+            known.iter().zip(&of_mean).map(|(known, mean)| known + lacking * mean).collect()
+        }
+    }
+}
+
+/// The correlation of Matérn with ν = 5/2 over a distance in lengths.
+fn matern(distance: f64) -> f64 {
+    let x = 5.0_f64.sqrt() * distance;
+    (1.0 + x + x * x / 3.0) * (-x).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEEDS: [f64; 5] = [3.0, 5.0, 7.0, 12.0, 20.0];
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-12
+    }
+
+    #[test]
+    fn weights_add_up_to_one_and_a_run_comes_out_as_it_is() {
+        let blend = Blend::of(&SPEEDS);
+        for first in 0..SPEEDS.len() {
+            for v in [1.0, 3.0, 4.2, 7.0, 15.0, 20.0, 40.0] {
+                let weights = blend.weights(first, v);
+                assert!(close(weights.iter().sum(), 1.0), "from {first} at {v}: {weights:?}");
+                assert!(weights[..first].iter().all(|w| *w == 0.0));
+            }
+            for run in first..SPEEDS.len() {
+                let weights = blend.weights(first, SPEEDS[run]);
+                let is_run = |(i, w): (usize, &f64)| close(*w, if i == run { 1.0 } else { 0.0 });
+                assert!(weights.iter().enumerate().all(is_run), "{run} from {first}: {weights:?}");
+            }
+        }
+        assert_eq!(Blend::of(&[8.0]).weights(0, 9.0), [1.0]);
+    }
+
+    #[test]
+    fn between_runs_a_smooth_function_is_followed_and_weights_are_continuous() {
+        let blend = Blend::of(&SPEEDS);
+        let of = |v: f64| 1.0 + 0.05 * v - 0.001 * v * v;
+        for v in [4.0, 6.0, 9.0, 16.0] {
+            let weights = blend.weights(0, v);
+            let found: f64 = weights.iter().zip(SPEEDS).map(|(w, s)| w * of(s)).sum();
+            assert!((found / of(v) - 1.0).abs() < 0.01, "{found} instead of {} at {v}", of(v));
+        }
+        for v in SPEEDS {
+            let (below, above) = (blend.weights(0, v - 1e-9), blend.weights(0, v + 1e-9));
+            assert!(below.iter().zip(&above).all(|(b, a)| (b - a).abs() < 1e-6), "at {v}");
+        }
+    }
+
+    /// One run that stands out moves the middle between two runs by less than half.
+    #[test]
+    fn what_is_a_runs_own_fades_towards_its_neighbours() {
+        let middle = Blend::of(&SPEEDS).weights(0, 6.0);
+        assert!(middle[1] < 0.5 && middle[2] < 0.5, "{middle:?}");
+    }
+}
