@@ -93,8 +93,8 @@ mod tests {
                 assert!(close(weights.iter().sum(), 1.0), "from {first} at {v}: {weights:?}");
                 assert!(weights[..first].iter().all(|w| *w == 0.0));
             }
-            for run in first..SPEEDS.len() {
-                let weights = blend.weights(first, SPEEDS[run]);
+            for (run, &speed) in SPEEDS.iter().enumerate().skip(first) {
+                let weights = blend.weights(first, speed);
                 let is_run = |(i, w): (usize, &f64)| close(*w, if i == run { 1.0 } else { 0.0 });
                 assert!(weights.iter().enumerate().all(is_run), "{run} from {first}: {weights:?}");
             }
