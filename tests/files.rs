@@ -269,12 +269,24 @@ fn the_stopped_mass_stands_in_the_database() {
     crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "72kmh"]);
     let without = stopped_mass(&path).unwrap();
     assert!(without != built && is_sound(here));
-    edited(&path, |file| file.root().set_attr("theirs", AttrValue::F64(1.0)).unwrap());
+    // So many attributes are stored in another way than few.
+    edited(&path, |file| {
+        let group = file.root().group(WALL).unwrap();
+        (0..8).for_each(|k| group.set_attr(&format!("theirs {k}"), AttrValue::F64(1.0)).unwrap());
+    });
     crumple_ok(
         here,
         &["build", fixture("fe/lead-car-wall/study.toml").to_str().unwrap(), "-o", "curves.h5"],
     );
     assert!(stopped_mass(&path).unwrap() == built && is_sound(here));
+    for to in ["other", WALL] {
+        let from = if to == WALL { "other" } else { WALL };
+        crumple_ok(here, &["db", "rename", "curves.h5", "--group", from, "--to", to]);
+        assert!(is_sound(here), "{to}");
+    }
+    crumple_ok(here, &["db", "tag", "curves.h5", "--group", WALL, "--add", "seen"]);
+    let group = Hdf5::open(&path).unwrap().root().group(WALL).unwrap().attrs().unwrap();
+    assert_eq!((group.len(), stopped_mass(&path).unwrap() == built), (13, true), "{group:?}");
     for case in ["18kmh", "25kmh", "36kmh", "48kmh", "60kmh", "72kmh"] {
         crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", case]);
     }

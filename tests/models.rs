@@ -444,7 +444,7 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     let model =
         train("made", &family(&[7.0, 10.0, 13.0]), Choice::Kind(ModelKind::rate())).unwrap();
     let mut json: Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
-    assert_eq!(json["version"], 3);
+    assert_eq!(json["version"], 4);
     let path = std::path::Path::new("other.model");
     let read = |json: &Value| Model::parse(path, &serde_json::to_vec(json).unwrap());
     assert!(curve(&read(&json).unwrap(), 9.0).provenance.band.is_some());
@@ -455,9 +455,9 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     json["version"] = 2.into();
     assert_eq!(
         read(&json).unwrap_err().to_string(),
-        "other.model: the model file has version 2, this program reads version 3: train the model again with crumple train"
+        "other.model: the model file has version 2, this program reads version 4: train the model again with crumple train"
     );
-    json["version"] = 3.into();
+    json["version"] = 4.into();
     for damaged in [serde_json::json!(0.0), serde_json::json!(-1.0)] {
         json["leave_one_out"]["band"]["span_m_per_s"] = damaged;
         let error = read(&json).unwrap_err().to_string();

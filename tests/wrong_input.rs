@@ -286,13 +286,13 @@ fn files_that_are_not_ours() {
     );
     fs::write(
         here.join("m2.model"),
-        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":3", "\"version\":9"),
+        fs::read_to_string(here.join("m.model")).unwrap().replace("\"version\":4", "\"version\":9"),
     )
     .unwrap();
     t(
         here,
         &["predict", "m2.model", "--speed", "50km/h"],
-        "the model file has version 9, this program reads version 3",
+        "the model file has version 9, this program reads version 4",
     );
 }
 

@@ -14,8 +14,8 @@ pub struct BodyMotion {
     pub force: Envelope,
     /// Closing speed in m/s over deflection: an envelope by its shape, not a force.
     pub closing_speed: Envelope,
-    /// Speed of separation in m/s, the mean over the 5 ms after the body force has first fallen to zero
-    /// behind the largest deflection; `None` if the record ends before.
+    /// Speed of separation in m/s, the mean over up to 5 ms after the body force has first fallen to
+    /// zero behind the largest deflection; `None` if the record ends before it does.
     pub rebound_speed_m_per_s: Option<f64>,
 }
 

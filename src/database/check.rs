@@ -76,9 +76,11 @@ pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
             }
         }
         super::sort(&mut readable);
-        // Of cases that are not what was written the stopped mass is another.
+        // Of cases that are not what was written the stopped mass is another, and another version of the
+        // program may have found another.
         let is_altered = |f: &Finding| f.code == "altered" || DAMAGE.contains(&f.code);
-        let is_as_written = readable.len() == group.cases.len()
+        let is_as_written = raw.is_of_this_program()?
+            && readable.len() == group.cases.len()
             && !checked.findings[before..].iter().any(is_altered);
         of_group(&group, &readable, &mut checked.findings);
         if is_as_written {

@@ -296,7 +296,8 @@ fn replace_group_attributes(
             group.remove_attr(name)?;
         }
     }
-    attributes.retain(|(name, value)| !there.get(*name).is_some_and(|t| group::is_same(t, value)));
+    attributes
+        .retain(|(name, value)| !there.get(*name).is_some_and(|t| group::has_numbers_of(t, value)));
     with_attributes(group, attributes)
 }
 

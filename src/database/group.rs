@@ -68,7 +68,7 @@ pub(super) fn differs(
 }
 
 /// Share of the largest number by which stored numbers may differ from what the cases tell.
-const LIKE: f64 = 1e-9;
+const LIKE: f64 = 1e-6;
 
 fn is_like(a: &AttrValue, b: &AttrValue) -> bool {
     let (a, b) = (numbers(a), numbers(b));
@@ -84,7 +84,7 @@ fn numbers(value: &AttrValue) -> Vec<f64> {
     }
 }
 
-/// Whether both hold the same bits; lists of names always count as others.
-pub(super) fn is_same(a: &AttrValue, b: &AttrValue) -> bool {
+/// Whether both hold equal numbers; texts always count as others.
+pub(super) fn has_numbers_of(a: &AttrValue, b: &AttrValue) -> bool {
     !numbers(b).is_empty() && numbers(a) == numbers(b)
 }

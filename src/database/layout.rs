@@ -20,6 +20,8 @@ use crate::unit::{Speed, SpeedKind};
 pub(crate) const FORMAT: &str = "crumple curve database";
 /// Layout version this program writes.
 pub(crate) const VERSION: i64 = 3;
+/// Value of the root attribute `written_by`.
+const WRITTEN_BY: &str = concat!("crumple ", env!("CARGO_PKG_VERSION"));
 /// The oldest it reads: that one has no body force, dates, origins, tags and dimension scales.
 pub(crate) const OLDEST: i64 = 2;
 
@@ -217,11 +219,10 @@ pub(crate) fn with_hashes<'a>(
 
 /// The root's attributes.
 pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
-    let written_by = concat!("crumple ", env!("CARGO_PKG_VERSION"));
     [
         ("format", AttrValue::VarLenString(FORMAT.into())),
         ("layout_version", AttrValue::I64(VERSION)),
-        ("written_by", AttrValue::VarLenString(written_by.into())),
+        ("written_by", AttrValue::VarLenString(WRITTEN_BY.into())),
     ]
 }
 
@@ -398,6 +399,13 @@ impl<'a> Opened<'a> {
             }
         }
         Ok(groups)
+    }
+
+    /// Whether this version of the program has written the file.
+    pub(crate) fn is_of_this_program(&self) -> Result<bool, DatabaseError> {
+        let attributes = self.check("/", self.file.root().attrs())?;
+        let written_by = attributes.get("written_by").and_then(AttrValue::as_str);
+        Ok(written_by == Some(WRITTEN_BY))
     }
 
     /// The attributes of a group.

@@ -8,13 +8,16 @@ use crate::curve::{Envelope, EnvelopeError};
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
 /// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
 /// Whyatt, Cartographic Journal 30, 1993). The forces at the others are then those of the least squares
-/// over the whole curve, which keep the energy of every stretch. `kept` is the index of a point that stays,
-/// such as the maximal crush; the forces up to it are scaled so that the energy to it is the same.
+/// over the whole curve. `kept` is the index of a point that stays, such as the maximal crush; the forces up
+/// to it are scaled so that the energy to it is the same. A curve of so few points stays as it is.
 ///
 /// # Errors
 /// [`EnvelopeError`] if the result is no envelope.
 pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
+    if d.len() <= most.max(3) {
+        return Ok(curve.clone());
+    }
     let left = kept_points(d, f, most.max(3), kept);
     let mut force_n = least_squares(d, f, &left, kept);
     let deflection_m: Vec<f64> = left.iter().map(|&i| d[i]).collect();
@@ -28,7 +31,7 @@ pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, E
 }
 
 /// The forces at the points that are `left`, so that the lines between them have the least squares over the
-/// whole curve; those of the ends and of `kept` stay, and none gets below 0 that was not.
+/// whole curve, with those of the ends and of `kept` as they are; none gets below 0 that was not.
 fn least_squares(d: &[f64], f: &[f64], left: &[usize], kept: usize) -> Vec<f64> {
     let n = left.len();
     // ∫φᵢφₖ of the hat functions φ, and ∫Fφᵢ, as rows of a matrix with three diagonals.
@@ -275,7 +278,27 @@ mod tests {
     #[test]
     fn a_kept_point_stays() {
         let few = thinned(&curve(), 20, 333).unwrap();
-        assert!(few.deflection_m().contains(&curve().deflection_m()[333]));
+        let end_m = curve().deflection_m()[333];
+        assert!(few.deflection_m().contains(&end_m));
+        assert!((few.work_to(end_m) / curve().work_to(end_m) - 1.0).abs() < 1e-12);
+        assert!(few.force_n().iter().all(|f| *f >= 0.0));
+        assert_eq!(thinned(&curve(), 401, 400).unwrap(), curve(), "few enough");
+    }
+
+    /// Points on a parabola: chords lie on one side of it, lines of least squares on both.
+    #[test]
+    fn forces_of_least_squares_are_nearer_than_chords() {
+        let d: Vec<f64> = (0..=400).map(|i| f64::from(i) / 400.0).collect();
+        let parabola = Envelope::new(d.clone(), d.iter().map(|d| 1e6 * d * (2.0 - d)).collect());
+        let parabola = parabola.unwrap();
+        let left: Vec<usize> = (0..=400).step_by(50).collect();
+        let off = |force_n: Vec<f64>| -> f64 {
+            let of = Envelope::new(left.iter().map(|&i| d[i]).collect(), force_n).unwrap();
+            d.iter().map(|&d| (of.force_at(d) - parabola.force_at(d)).powi(2)).sum()
+        };
+        let chords = left.iter().map(|&i| parabola.force_n()[i]).collect();
+        let fitted = least_squares(&d, parabola.force_n(), &left, 400);
+        assert!(off(fitted) < 0.4 * off(chords));
     }
 
     #[test]

@@ -21,10 +21,10 @@ impl Cholesky {
         Self { rows: l }
     }
 
-    /// The solution of the equations with these right sides, one per row.
+    /// The solution of the first equations, as many as right sides are given, for as many unknowns.
     pub(crate) fn solve(&self, right: &[f64]) -> Vec<f64> {
         let l = &self.rows;
-        let n = l.len();
+        let n = right.len();
         let mut y = vec![0.0; n];
         for r in 0..n {
             y[r] = (right[r] - dot(&l[r][..r], &y[..r])) / l[r][r];
@@ -52,5 +52,8 @@ mod tests {
         let right = a.map(|row| dot(&row, &x));
         let found = Cholesky::of(3, |r, c| a[r][c]).solve(&right);
         assert!(found.iter().zip(x).all(|(found, x)| (found - x).abs() < 1e-12), "{found:?}");
+        // The first two alone: 4 x + 2 y = 8, 2 x + 10 y = 22.
+        let found = Cholesky::of(3, |r, c| a[r][c]).solve(&[8.0, 22.0]);
+        assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] - 2.0).abs() < 1e-12, "{found:?}");
     }
 }

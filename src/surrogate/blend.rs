@@ -18,27 +18,31 @@ const OWN: f64 = 0.02;
 pub(super) struct Blend<'a> {
     speeds_m_per_s: &'a [f64],
     length_m_per_s: f64,
+    /// Of the runs from the fastest on, so that the faster ones alone have its first equations.
+    equations: Cholesky,
 }
 
 impl<'a> Blend<'a> {
     /// Of one speed at least.
     pub(super) fn of(speeds_m_per_s: &'a [f64]) -> Self {
-        let range = speeds_m_per_s[speeds_m_per_s.len() - 1] - speeds_m_per_s[0];
-        Self { speeds_m_per_s, length_m_per_s: LENGTH * range }
+        let last = speeds_m_per_s.len() - 1;
+        let length_m_per_s = LENGTH * (speeds_m_per_s[last] - speeds_m_per_s[0]);
+        let entry = |r: usize, c: usize| {
+            let distance = speeds_m_per_s[last - r] - speeds_m_per_s[last - c];
+            matern(distance, length_m_per_s) + if r == c { OWN } else { 0.0 }
+        };
+        let equations = Cholesky::of(last + 1, entry);
+        Self { speeds_m_per_s, length_m_per_s, equations }
     }
 
-    /// The weights of the runs from the `first` on, 0 for those before, at an impact speed within or
-    /// beyond theirs: there those of the outermost. Their sum is 1.
+    /// The weights of the runs from the `first` on, 0 for those before, at an impact speed; beyond the speeds
+    /// of all runs those of the outermost. The runs from the `first` on tell of no speed below that of the one
+    /// before. Their sum is 1.
     pub(super) fn weights(&self, first: usize, speed_m_per_s: f64) -> Vec<f64> {
         let all = self.speeds_m_per_s;
-        let runs = &all[first..];
-        let v = speed_m_per_s.clamp(all[0], all[all.len() - 1]);
+        let v = speed_m_per_s.clamp(all[first.saturating_sub(1)], all[all.len() - 1]);
         let mut weights = vec![0.0; all.len()];
-        if let [_] = runs {
-            weights[first] = 1.0;
-            return weights;
-        }
-        let smooth = self.smooth(runs);
+        let smooth = |v: f64| self.smooth(all.len() - first, v);
         weights[first..].copy_from_slice(&smooth(v));
         let (low, high, share) = neighbours(all, v);
         for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
@@ -51,26 +55,23 @@ impl<'a> Blend<'a> {
         weights
     }
 
-    /// The weights of the smooth function at a speed.
-    fn smooth<'b>(&'b self, runs: &'b [f64]) -> impl Fn(f64) -> Vec<f64> + 'b {
-        let n = runs.len();
-        let alike = |a: f64, b: f64| matern((a - b).abs() / self.length_m_per_s);
-        let equations =
-            Cholesky::of(n, move |r, c| alike(runs[r], runs[c]) + if r == c { OWN } else { 0.0 });
-        let of_mean = equations.solve(&vec![1.0; n]);
-        let mean_sum: f64 = of_mean.iter().sum();
-        move |v: f64| {
-            let right: Vec<f64> = runs.iter().map(|&run| alike(run, v)).collect();
-            let known = equations.solve(&right);
-            let lacking = (1.0 - known.iter().sum::<f64>()) / mean_sum;
-            known.iter().zip(&of_mean).map(|(known, mean)| known + lacking * mean).collect()
-        }
+    /// The weights of so many of the fastest runs, by rising speed, of the smooth function at a speed.
+    fn smooth(&self, runs: usize, v: f64) -> Vec<f64> {
+        let alike = |run: &f64| matern(run - v, self.length_m_per_s);
+        let right: Vec<f64> = self.speeds_m_per_s.iter().rev().take(runs).map(alike).collect();
+        let known = self.equations.solve(&right);
+        let of_mean = self.equations.solve(&vec![1.0; runs]);
+        let lacking = (1.0 - known.iter().sum::<f64>()) / of_mean.iter().sum::<f64>();
+        known.iter().zip(&of_mean).rev().map(|(known, mean)| known + lacking * mean).collect()
     }
 }
 
-/// The correlation of Matérn with ν = 5/2 over a distance in lengths.
-fn matern(distance: f64) -> f64 {
-    let x = 5.0_f64.sqrt() * distance;
+/// The correlation of Matérn with ν = 5/2 over a distance; 1 where all speeds are the same.
+fn matern(distance: f64, length: f64) -> f64 {
+    if distance == 0.0 {
+        return 1.0;
+    }
+    let x = 5.0_f64.sqrt() * distance.abs() / length;
     (1.0 + x + x * x / 3.0) * (-x).exp()
 }
 
@@ -115,6 +116,22 @@ mod tests {
             let (below, above) = (blend.weights(0, v - 1e-9), blend.weights(0, v + 1e-9));
             assert!(below.iter().zip(&above).all(|(b, a)| (b - a).abs() < 1e-6), "at {v}");
         }
+    }
+
+    /// Few fast runs that are asked far below their speeds give no weights that would amplify their folds.
+    #[test]
+    fn weights_are_bounded_wherever_slower_runs_have_ended() {
+        let speeds = [18.0, 25.0, 36.0, 48.0, 60.0, 72.0];
+        let blend = Blend::of(&speeds);
+        for first in 0..speeds.len() {
+            for v in (10..80).map(f64::from) {
+                let weights = blend.weights(first, v);
+                assert!(weights.iter().all(|w| w.abs() < 1.6), "from {first} at {v}: {weights:?}");
+            }
+        }
+        // Three cases of one speed tell alike.
+        let equal = Blend::of(&[5.0; 3]).weights(0, 5.0);
+        assert!(close(equal.iter().sum(), 1.0) && equal.iter().all(|w| w.is_finite()), "{equal:?}");
     }
 
     /// One run that stands out moves the middle between two runs by less than half.

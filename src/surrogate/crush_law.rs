@@ -239,6 +239,31 @@ mod tests {
         }
     }
 
+    /// The run between the others ended early, as one that was cut: the slower one still comes out to its own end.
+    #[test]
+    fn a_run_comes_out_as_it_is_though_a_faster_one_ended_before() {
+        let cut = |speed: f64, end_m: f64| {
+            let made::Motion { deflection_m, contact_n, closing_m_per_s, .. } = made::motion(speed);
+            let n = deflection_m.partition_point(|d| *d <= end_m);
+            let first = |values: Vec<f64>| values[..n].to_vec();
+            let (d, f, u) = (first(deflection_m), first(contact_n), first(closing_m_per_s));
+            CaseCurve::new(speed, vec![], d, f, u).unwrap()
+        };
+        let cases = [cut(5.0, 1.0), cut(8.0, 0.08), cut(12.0, 1.0)];
+        assert!(cases[1].end_m() < 0.8 * cases[0].end_m(), "{} m", cases[0].end_m());
+        let law = law(&cases, 20e3);
+        for case in [&cases[0], &cases[2]] {
+            for share in [0.3, 0.6, 0.7, 0.8, 0.9, 0.99] {
+                let d = share * case.end_m();
+                let u = case.closing_at(d);
+                let found = law.standing_n(&cases, case.speed_m_per_s, &[d])[0] * law.factor(u);
+                let expected = case.force_at(d) - law.stopped.rate_kg_per_m(d) * u * u;
+                // Between the points of a curve λu² is not on a line.
+                assert!((found / expected - 1.0).abs() < 1e-7, "{found} N, {expected} N at {d} m");
+            }
+        }
+    }
+
     #[test]
     fn runs_without_stopped_mass_have_none() {
         let plain = |speed: f64| {

@@ -41,7 +41,6 @@ struct OfCrushLaw {
     force: ForceKind,
     /// Mean interval of the runs' states in s. What a slow run has within it, over a short way, is nothing
     /// that a faster one could show.
-    #[serde(default)]
     interval_s: f64,
     law: CrushLaw,
 }
@@ -55,17 +54,21 @@ fn interval_s(set: &TrainingSet) -> f64 {
 }
 
 /// Means of a force, given at increasing deflections, over the way that a body goes within `interval_s` at
-/// its closing speed there. Before the contact the force is taken for the opposite of that behind it, so
-/// that it still begins at 0.
+/// its closing speed there: as fine as these deflections are. Before the contact the force is taken for the
+/// opposite of that behind it, so that it still begins at 0; before the first deflection it is held.
 fn over_interval(
     interval_s: f64,
     along_m: &[f64],
     force_n: &[f64],
     closing_m_per_s: &[f64],
 ) -> Vec<f64> {
-    let (Some(&end_m), Ok(force)) =
-        (along_m.last(), Envelope::new(along_m.to_vec(), force_n.to_vec()))
-    else {
+    let (mut d, mut f) = (along_m.to_vec(), force_n.to_vec());
+    if d.first().is_some_and(|d| *d > 0.0) {
+        d.insert(0, 0.0);
+        f.insert(0, force_n[0]);
+    }
+    // One point, or a force that is no number, has no mean.
+    let (Some(&end_m), Ok(force)) = (along_m.last(), Envelope::new(d, f)) else {
         return force_n.to_vec();
     };
     let mean_n = |((&d, &f), u): ((&f64, &f64), &f64)| {
@@ -133,7 +136,8 @@ impl Surrogate for OfCrushLaw {
         };
         let crush_n: Vec<f64> =
             standing_n.iter().zip(closing).map(|(q, &u)| q * self.law.factor(u)).collect();
-        // A contact's spikes are as short as that; a body does not feel them.
+        // A contact's spikes are as short as that. What the runs' states do not resolve of the force on the
+        // body would only make it jagged. A crush law that drives a train has it, as the contact has.
         let crush_n = match self.force {
             ForceKind::Contact => crush_n,
             ForceKind::Body => over_interval(self.interval_s, deflection_m, &crush_n, closing),
@@ -150,6 +154,9 @@ impl Surrogate for OfCrushLaw {
     }
 
     fn check(&self, _: usize) -> Result<(), String> {
+        if !(self.interval_s.is_finite() && self.interval_s >= 0.0) {
+            return Err(format!("the interval of its runs' states is {} s", self.interval_s));
+        }
         self.law.check()
     }
 
@@ -213,5 +220,32 @@ mod tests {
             assert!((contact_n[i] - crush_n - of_stopping).abs() < 1e-6 * contact_n[i]);
         }
         assert!(contact_n[0] > 1.05 * body_n[0], "at 50 mm mass is being stopped");
+    }
+
+    /// At 2 m/s and 10 ms the mean is over 10 mm to both sides.
+    #[test]
+    fn a_force_is_averaged_over_the_way_of_an_interval() {
+        let along: Vec<f64> = (0..=100).map(|i| 0.001 * f64::from(i)).collect();
+        let closing = vec![2.0; along.len()];
+        let of = |force: &dyn Fn(f64) -> f64| {
+            let force_n: Vec<f64> = along.iter().map(|&d| force(d)).collect();
+            over_interval(0.01, &along, &force_n, &closing)
+        };
+        // A constant force rises over the first half and stays; a line stays one, up to the end.
+        for (i, (found, d)) in of(&|_| 1e6).iter().zip(&along).enumerate() {
+            let expected = if i < 10 { 1e6 * d / 0.01 } else { 1e6 };
+            assert!((found - expected).abs() < 1.0, "{found} N at {d} m");
+        }
+        for (found, d) in of(&|d| 1e7 * d).iter().zip(&along) {
+            assert!((found - 1e7 * d).abs() < 1.0, "{found} N at {d} m");
+        }
+        // A wave as long as the whole way is gone, away from both ends.
+        let wave = of(&|d| 1e6 + 1e5 * (std::f64::consts::TAU * d / 0.02).sin());
+        assert!(wave[20..=80].iter().all(|f| (f - 1e6).abs() < 100.0), "{wave:?}");
+        // Not from 0 on: the same away from the start.
+        let later = over_interval(0.01, &along[30..], &vec![1e6; 71], &closing[30..]);
+        assert!(later.iter().all(|f| (f - 1e6).abs() < 1.0), "{later:?}");
+        assert_eq!(over_interval(0.01, &[0.0], &[5.0], &[2.0]), [5.0]);
+        assert_eq!(over_interval(0.0, &along, &vec![1e6; 101], &closing), vec![1e6; 101]);
     }
 }

@@ -22,7 +22,7 @@ use crate::unit::{SpeedKind, UnitSystem};
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 /// Most bytes of a model file: a forest of 500 trees has some ten million.
 const MAX_BYTES: u64 = 1 << 30;
 
@@ -175,6 +175,9 @@ impl Model {
             || body.is_some_and(|b| lacks(b, self.curves.body.len()))
         {
             return Err("it lacks the curves of its cases".into());
+        }
+        if self.crush_law.is_some() && self.curves.declared.len() != self.cases.len() {
+            return Err("it has a crush law and lacks the curves of its cases".into());
         }
         self.crush_law.as_ref().map_or(Ok(()), CrushLaw::check)?;
         self.fitted.check(self.features.len())?;

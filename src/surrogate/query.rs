@@ -151,9 +151,11 @@ impl<'a> Asked<'a> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
         let top_n = body.force_at(body.end_m());
-        let speed = rebound_speed(self.model, self.v, last_force_n(body))?;
+        let per_mass = (trained_kg / self.mass_kg).sqrt();
+        // No body leaves faster than it came.
+        let speed = rebound_speed(self.model, self.v, last_force_n(body))?.min(self.v / per_mass);
         Some(Rebound {
-            speed_m_per_s: speed * (trained_kg / self.mass_kg).sqrt(),
+            speed_m_per_s: speed * per_mass,
             stiffness_n_per_m: rebound_stiffness_n_per_m(top_n, trained_kg, speed)?,
         })
     }
@@ -195,13 +197,13 @@ fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     };
     let known: Vec<(f64, f64)> = model.cases.iter().zip(curves).filter_map(known).collect();
     let line = relative_line(&known)?;
-    let beside: Vec<(f64, f64)> = known.iter().map(|&(v, y)| (v, (y / line(v)).ln())).collect();
+    let beside = means(known.iter().map(|&(v, y)| (v, (y / line(v)).ln())));
     let speeds: Vec<f64> = beside.iter().map(|p| p.0).collect();
     let (low, high, share) = neighbours(&speeds, v);
     let beside = (1.0 - share).powi(2) * beside[low].1 + share.powi(2) * beside[high].1;
     let v_held = v.clamp(speeds[0], speeds[speeds.len() - 1]);
     let held = line(v_held) * beside.exp() * v / v_held;
-    Some((of_force(last_n) * held).min(v))
+    Some(of_force(last_n) * held)
 }
 
 /// `a + b v` with the least squares of its ratios to the points, which are above 0; their mean if it were
@@ -243,6 +245,11 @@ pub(super) fn over_speed(
 
 /// The same of points in order of x.
 fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
+    interpolate_held(&means(points), x)
+}
+
+/// Points in order of x with one mean of those of equal x.
+fn means(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut known: Vec<(f64, f64, f64)> = Vec::new();
     for (x, y) in points {
         match known.last_mut() {
@@ -253,6 +260,5 @@ fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
             _ => known.push((x, y, 1.0)),
         }
     }
-    let points: Vec<(f64, f64)> = known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect();
-    interpolate_held(&points, x)
+    known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect()
 }

@@ -187,13 +187,20 @@ impl Rate {
                 of.iter().zip(&speeds).map(|(w, &s)| w * of_impact(v) / of_impact(s)).collect()
             })
             .collect();
+        // A run that ends before a slower one does not end the blend of that one.
+        let furthest = |furthest_m: &mut f64, case: &CaseCurve| {
+            *furthest_m = furthest_m.max(case.end_m());
+            Some(*furthest_m)
+        };
+        let ends_m: Vec<f64> = cases.iter().scan(0.0, furthest).collect();
         let mut now = vec![0.0; cases.len()];
         let mut standing_n = |d: f64| {
-            let is_gone = |i: &usize| self.fading(&cases[*i], d) == 0.0;
+            let is_gone = |i: &usize| self.fading(ends_m[*i], d) == 0.0;
             let first = (0..cases.len() - 1).rev().find(is_gone).map_or(0, |i| i + 1);
             now.copy_from_slice(&weights[first]);
-            for (case, faster) in cases[first..].iter().zip(&weights[first + 1..]) {
-                let fading = self.fading(case, d);
+            let ended = ends_m[first..].iter().take_while(|end_m| **end_m < d);
+            for (&end_m, faster) in ended.zip(&weights[first + 1..]) {
+                let fading = self.fading(end_m, d);
                 let fade = |(w, after): (&mut f64, &f64)| *w = fading * *w + (1.0 - fading) * after;
                 now.iter_mut().zip(faster).for_each(fade);
             }
@@ -202,15 +209,14 @@ impl Rate {
                 next_n = self.carried_n(cases, levels, i, d, next_n);
                 sum_n += now[i] * next_n;
             }
-            sum_n.max(0.0)
+            if sum_n < 0.0 { 0.0 } else { sum_n }
         };
         deflection_m.iter().map(|&d| standing_n(d)).collect()
     }
 
     /// What is left of a run at a deflection, as a share that fades beyond its end.
-    fn fading(&self, case: &CaseCurve, d: f64) -> f64 {
-        let end = case.end_m();
-        let lengths = (d - end) / (self.carried().fades * end);
+    fn fading(&self, end_m: f64, d: f64) -> f64 {
+        let lengths = (d - end_m) / (self.carried().fades * end_m);
         match lengths {
             ..=0.0 => 1.0,
             ..LENGTHS => (-lengths).exp(),
@@ -225,7 +231,7 @@ impl Rate {
             // Beyond the fastest curve its end is held, where it stood.
             return case.force_at(d) / self.factor(case.closing_at(d));
         }
-        let level = 1.0 + (levels[i] - 1.0) * self.fading(case, d);
+        let level = 1.0 + (levels[i] - 1.0) * self.fading(case.end_m(), d);
         next_n * self.level_of_next(cases, i) * level
     }
 
