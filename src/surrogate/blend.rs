@@ -2,9 +2,9 @@
 //!
 //! The values of the runs are taken for a smooth function of the impact speed with noise, a Gaussian
 //! process of unknown mean (ordinary kriging: Rasmussen and Williams, Gaussian Processes for Machine
-//! Learning, 2006, sections 2.2, 2.7 and 4.2): where a run stands out from what the others tell, its fold
-//! happened to, and the neighbours need not. What a run has beside the smooth function fades with the
-//! square of the nearness in speed, so that at its own speed a run comes out as it is.
+//! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that stands out from the others does so by a fold of its
+//! own, which its neighbours in speed need not have. What a run has beside the smooth function fades with
+//! the square of the nearness in speed, so that at its own speed a run comes out as it is.
 
 use super::curves::neighbours;
 use crate::signal::Cholesky;
