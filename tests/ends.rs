@@ -243,8 +243,8 @@ fn fes_contact_force_gives_fes_velocity() {
             }
             // Below, the whole crush is a few millimetres, and most of the time is rebound.
             if case.speed.m_per_s * per_wall >= 1.25 {
-                // Of the two slowest FE's own body force in this model leaves 1.1 and 1.0 %: most of
-                // their time is rebound, and it is no straight line.
+                // Of the two slowest nearly half of the time is rebound; and the contact force swings in a way
+                // that does not reach the body.
                 let most = if v >= 2.0 { 0.008 } else { 0.012 };
                 assert!(error < most, "{group}/{}: {:.2} %", case.name, 100.0 * error);
                 held += 1;

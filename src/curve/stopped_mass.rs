@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(StoppedMass::fit(&[run()], 20e3), None);
         let found = StoppedMass::fit(&[run(), run()], 20e3).unwrap();
         assert!(found.is_sound() && found.stopped_kg.len() == SEGMENTS + 1);
-        // Half of the speed is left there; towards the stop a lever of the masses grows.
+        // Half of the speed is left there; nearer to the stop small errors of the speed weigh more.
         assert!(found.at(0.19) < 1.0, "{found:?}");
     }
 
