@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use crumple::assess::choose::{Purpose, Selection};
-use crumple::assess::validate::validate;
+use crumple::assess::validate;
+use crumple::assess::{Purpose, Selection};
 use crumple::curve::Case;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::{Model, ModelKind, Query, predict};

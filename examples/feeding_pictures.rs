@@ -10,14 +10,14 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-use crumple::assess::choose::Purpose;
-use crumple::assess::validate::{Choice, train};
+use crumple::assess::Purpose;
+use crumple::assess::{Choice, train};
 use crumple::build::build;
 use crumple::curve::{Case, Envelope, ForceKind};
 use crumple::formats::{ExportCurve, ExportInput, Options, Tail, by_name};
 use crumple::multibody::{EnvelopeEnd, ForceLaw, Unloading};
 use crumple::plot::{Axis, Chart, Mark, Panel, Series, Shown};
-use crumple::surrogate::predict::predict_beyond;
+use crumple::surrogate::predict_beyond;
 use crumple::surrogate::{Model, PredictedCurve, Query};
 
 type Points = Vec<(f64, f64)>;

@@ -6,8 +6,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use crumple::assess::choose::Purpose;
-use crumple::assess::validate::{Choice, train};
+use crumple::assess::Purpose;
+use crumple::assess::{Choice, train};
 use crumple::build::build;
 use crumple::charts;
 use crumple::curve::ForceKind;

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use crumple::assess::ComparisonSettings;
-use crumple::assess::train::compare_train;
+use crumple::assess::compare_train;
 use crumple::build::build;
 use crumple::charts;
 use crumple::scenario;

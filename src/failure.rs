@@ -157,12 +157,12 @@ fn chain<'e>(error: &'e (dyn Error + 'static)) -> impl Iterator<Item = &'e (dyn 
 }
 
 /// Code of an error: that of the innermost cause whose kind is known.
-pub fn code(error: &(dyn Error + 'static)) -> ErrorCode {
+pub(crate) fn code(error: &(dyn Error + 'static)) -> ErrorCode {
     chain(error).filter_map(own_code).last().unwrap_or(ErrorCode::Other)
 }
 
 /// The place in a TOML file that an error is about.
-pub fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
+pub(crate) fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
     chain(error).find_map(|error| {
         (of::<ManifestError>(error).and_then(ManifestError::place))
             .or_else(|| of::<StudyError>(error).and_then(StudyError::place))
@@ -175,7 +175,7 @@ pub fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
 }
 
 /// The causes of an error that the messages above them do not contain, the nearest first.
-pub fn causes(error: &(dyn Error + 'static)) -> Vec<String> {
+pub(crate) fn causes(error: &(dyn Error + 'static)) -> Vec<String> {
     let mut shown = error.to_string();
     let mut causes = Vec::new();
     for cause in chain(error).skip(1) {

@@ -5,7 +5,7 @@
 //! ```
 //! use crumple::build::build;
 //! use crumple::dataset::TrainingSet;
-//! use crumple::surrogate::{Model, ModelKind, Query, forest::ForestOptions, predict};
+//! use crumple::surrogate::{ForestOptions, Model, ModelKind, Query, predict};
 //! use std::path::Path;
 //!
 //! # let folder = tempfile::tempdir()?;
@@ -27,7 +27,8 @@
 //! The modules below stand in the order worth reading. Inside is SI; units enter at the
 //! edges ([`unit`](mod@unit)). A speed always says what it is measured against.
 
-#![deny(missing_docs, unnameable_types)]
+#![deny(missing_docs)]
+#![warn(unreachable_pub)]
 
 pub mod unit;
 
@@ -100,3 +101,6 @@ pub mod report;
 pub mod failure;
 
 pub mod file;
+
+#[doc(hidden)]
+pub mod cli;

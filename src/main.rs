@@ -1,7 +1,5 @@
 //! The command line tool: arguments in, exit code out. See `cli`.
 
-mod cli;
-
 fn main() -> std::process::ExitCode {
-    cli::main()
+    crumple::cli::main()
 }

@@ -21,7 +21,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// Metres per second in one kilometre per hour.
-pub const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
+pub(crate) const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
 
 /// What a speed is measured against. A speed is never bare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -157,7 +157,8 @@ pub const SPEED: Dimension = Dimension {
 /// Masses, in kg inside.
 pub const MASS: Dimension =
     Dimension { what: "mass", example_unit: "t", units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)] };
-pub(crate) const LENGTH: Dimension = Dimension {
+/// Lengths, in metres.
+pub const LENGTH: Dimension = Dimension {
     what: "length",
     example_unit: "mm",
     units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
@@ -181,7 +182,8 @@ pub const STIFFNESS: Dimension = Dimension {
         ("kN/mm", 1e6),
     ],
 };
-pub(crate) const FORCE: Dimension =
+/// Forces, in newtons.
+pub const FORCE: Dimension =
     Dimension { what: "force", example_unit: "kN", units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)] };
 
 impl Dimension {
@@ -244,7 +246,7 @@ impl Dimension {
     }
 
     /// Like [`Dimension::parse`], but refuses values that are not above zero.
-    pub fn parse_positive(&self, text: &str) -> Result<f64, UnitError> {
+    pub(crate) fn parse_positive(&self, text: &str) -> Result<f64, UnitError> {
         let value = self.parse(text)?;
         if value > 0.0 {
             Ok(value)

@@ -448,7 +448,7 @@ fn training_is_bitwise_repeatable_on_any_number_of_threads() {
 fn a_saved_model_predicts_the_same_bits() {
     use crumple::database::Database;
     use crumple::dataset::TrainingSet;
-    use crumple::surrogate::forest::ForestOptions;
+    use crumple::surrogate::ForestOptions;
     use crumple::surrogate::{Model, ModelKind, QueryPoint};
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), WALL);

@@ -5,10 +5,8 @@ use std::path::Path;
 
 use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
 use crumple::curve::Masses;
-use crumple::curve::extract::{
-    ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract,
-};
-use crumple::curve::recipe::{Recipe, RecordedMotion};
+use crumple::curve::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
+use crumple::curve::{Recipe, RecordedMotion};
 use crumple::history::{EntityId, History};
 use crumple::solver::{self, Selection};
 use crumple::unit::{SpeedKind, UnitSystem};

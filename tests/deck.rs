@@ -5,18 +5,18 @@ use std::io::{self, BufRead};
 use std::path::Path;
 
 use crate::common::shared;
-use crumple::solver::lsdyna::deck::{Deck, Interface, Named, read};
+use crumple::solver::{Deck, DeckInterface, TitledEntity, parse_deck};
 use crumple::unit::UnitSystem;
 
 fn messages(deck: &Deck) -> Vec<String> {
     deck.problems.iter().map(ToString::to_string).collect()
 }
 
-fn named(list: &[Named]) -> Vec<(i64, Option<&str>)> {
+fn named(list: &[TitledEntity]) -> Vec<(i64, Option<&str>)> {
     list.iter().map(|n| (n.id, n.title.as_deref())).collect()
 }
 
-fn interfaces(list: &[Interface]) -> Vec<(Option<i64>, Option<&str>)> {
+fn interfaces(list: &[DeckInterface]) -> Vec<(Option<i64>, Option<&str>)> {
     list.iter().map(|n| (n.id, n.title.as_deref())).collect()
 }
 
@@ -27,7 +27,7 @@ fn deck_in(folder: &Path, name: &str) -> Deck {
         Some(Box::new(io::Cursor::new(bytes)) as Box<dyn BufRead>)
     };
     let bytes = fs::read(folder.join(name)).unwrap();
-    read(&mut &bytes[..], &mut open).unwrap()
+    parse_deck(&mut &bytes[..], &mut open).unwrap()
 }
 
 /// Expected counts were taken with grep.
@@ -57,7 +57,7 @@ fn reads_our_decks() {
 #[ignore = "needs ../shared (the real files)"]
 fn reads_decks_of_others() {
     let folder = shared("samples/lsdyna/keyword");
-    let ids = |list: &[Interface]| list.iter().map(|i| i.id).collect::<Vec<_>>();
+    let ids = |list: &[DeckInterface]| list.iter().map(|i| i.id).collect::<Vec<_>>();
     let kg_mm_ms = UnitSystem::parse("kg-mm-ms").ok();
 
     let d = deck_in(&folder, "pillars_control_explicit.k");
@@ -99,7 +99,8 @@ fn a_deck_and_its_includes_are_read_up_to_a_bound() {
     let mut open = |_: &str| -> Option<Box<dyn BufRead>> {
         Some(Box::new(io::BufReader::with_capacity(1 << 20, io::repeat(b' '))))
     };
-    let error = read(&mut &b"*KEYWORD\n*INCLUDE\nendless.k\n*END\n"[..], &mut open).unwrap_err();
+    let error =
+        parse_deck(&mut &b"*KEYWORD\n*INCLUDE\nendless.k\n*END\n"[..], &mut open).unwrap_err();
     assert_eq!(error.to_string(), "a deck is read up to 4 GB with its includes; it has more");
 }
 
@@ -110,7 +111,7 @@ fn a_deck_that_is_no_plain_text_says_so() {
     let wide: Vec<u8> = "*KEYWORD\n*TITLE\nrun\n".bytes().flat_map(|b| [b, 0]).collect();
     for bytes in [[&[0xff, 0xfe], &wide[..]].concat(), wide.clone()] {
         fs::write(&path, bytes).unwrap();
-        let error = crumple::solver::decks::read(&path).unwrap_err().to_string();
+        let error = crumple::solver::read_deck(&path).unwrap_err().to_string();
         assert!(error.contains("main.k: this is UTF-16 text, which iconv"), "{error}");
     }
 }

@@ -11,7 +11,7 @@ use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, run_python,
 };
 use crumple::formats::FORMATS;
-use crumple::formats::read::{self, ReadOptions};
+use crumple::formats::{ReadOptions, read};
 use crumple::unit::UnitSystem;
 use serde_json::{Value, json};
 
@@ -240,7 +240,7 @@ fn bands_stand_beside_their_curves() {
                 curve: Some(name.into()),
                 ..ReadOptions::default()
             };
-            let (edge, _) = read::read(&here.join("band.mat"), &options).unwrap();
+            let (edge, _) = read(&here.join("band.mat"), &options).unwrap();
             assert_eq!((&edge.deflection_m, &edge.force_n), (&d, edge_n), "{name} {prefix}");
         }
         // Columns, to nine digits.
@@ -485,7 +485,7 @@ fn our_readers_give_back_what_was_exported() {
             // Decks say their own.
             let units = (!["a.k", "a.rad"].contains(&file)).then_some(units);
             let options = ReadOptions { units, ..ReadOptions::default() };
-            let (read, _) = read::read(&here.join(file), &options).unwrap();
+            let (read, _) = read(&here.join(file), &options).unwrap();
             let close = |a: f64, b: f64| (a - b).abs() <= bound * b.abs();
             assert_eq!(read.deflection_m.len(), d.len(), "{file} {tail}: {:?}", read.notes);
             for i in 0..d.len() {
@@ -604,7 +604,7 @@ fn a_force_at_contact_keeps_its_energy() {
     let points: Vec<(f64, f64)> = (0..6).map(|i| (0.18 * f64::from(i), 2.47e6)).collect();
     with_points(here, "constant.json", &points);
     export(here, "constant.json", "a.k", &["--tail", "none"]);
-    let (read, _) = read::read(&here.join("a.k"), &ReadOptions::default()).unwrap();
+    let (read, _) = read(&here.join("a.k"), &ReadOptions::default()).unwrap();
     assert_eq!((read.deflection_m[0], read.force_n[0]), (0.0, 0.0));
     let energy = crumple::curve::Envelope::new(read.deflection_m, read.force_n).unwrap().work();
     assert!((energy / (0.9 * 2.47e6) - 1.0).abs() < 1e-3, "{energy}");
@@ -643,8 +643,7 @@ fn an_imported_curve_is_exported_as_it_was() {
     export(here, "legacy.h5", "back.csv", &["--tail", "none"]);
     let units = UnitSystem::parse("SI").ok();
     let (back, _) =
-        read::read(&here.join("back.csv"), &ReadOptions { units, ..ReadOptions::default() })
-            .unwrap();
+        read(&here.join("back.csv"), &ReadOptions { units, ..ReadOptions::default() }).unwrap();
     let back = crumple::curve::Envelope::new(back.deflection_m, back.force_n).unwrap();
     for (d, f) in spike(61) {
         assert!(
@@ -806,7 +805,7 @@ fn the_targets_rebound_is_said() {
     let work = |file: &str| {
         let units = UnitSystem::parse("SI").unwrap();
         let options = ReadOptions { units: Some(units), ..ReadOptions::default() };
-        let (curve, _) = read::read(&here.join(file), &options).unwrap();
+        let (curve, _) = read(&here.join(file), &options).unwrap();
         crumple::curve::Envelope::new(curve.deflection_m, curve.force_n).unwrap().work()
     };
     for (file, more) in [("hard.csv", &[][..]), ("soft.csv", &["--soften"])] {

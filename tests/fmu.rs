@@ -12,12 +12,12 @@ use crate::common::{build_fixture, python_of, root};
 use crumple::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
-use crumple::formats::fmu::{FmiVersion, Spring, archive, binaries};
+use crumple::formats::{FmiVersion, Spring, archive, binaries};
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Run, RunSettings, Unloading,
     UnloadingChoice, simulate,
 };
-use crumple::surrogate::forest::ForestOptions;
+use crumple::surrogate::ForestOptions;
 use crumple::surrogate::{Model, ModelKind, Query, predict};
 use serde_json::{Value, json};
 

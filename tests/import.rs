@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crumple::formats::read::{READERS, ReadCurve, ReadOptions, read};
+use crumple::formats::{READERS, ReadCurve, ReadOptions, read};
 use crumple::unit::UnitSystem;
 use proptest::prelude::*;
 use serde_json::Value;
@@ -1115,7 +1115,7 @@ proptest! {
         v in 0.01f64..300.0,
         unloading in proptest::option::of(1e3f64..1e12),
     ) {
-        use crumple::curve::from_table::{Impact, Table, from_table};
+        use crumple::curve::{Impact, Table, from_table};
         let mut d = 0.0;
         let (mut deflection_m, mut force_n) = (vec![0.0], vec![0.0]);
         for (step, force) in points {

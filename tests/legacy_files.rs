@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crumple::formats::read::{ColumnNames, ReadOptions, read};
+use crumple::formats::{ColumnNames, ReadOptions, read};
 use serde_json::Value;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder};

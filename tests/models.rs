@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root};
-use crumple::assess::choose::{Purpose, Selection, gaps};
-use crumple::assess::validate::{Choice, train, validate};
-use crumple::curve::energy::audit;
-use crumple::curve::loading::unloading_stiffness;
+use crumple::assess::{Choice, train, validate};
+use crumple::assess::{Purpose, Selection, gaps};
+use crumple::curve::audit;
+use crumple::curve::unloading_stiffness;
 use crumple::curve::{Case, Curve, DrivingCurve, ForceKind, Masses, Parameter};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
-use crumple::surrogate::forest::ForestOptions;
-use crumple::surrogate::leave_one_out::{Means, Validation};
-use crumple::surrogate::max_crush::MaxCrushRule;
+use crumple::surrogate::ForestOptions;
+use crumple::surrogate::MaxCrushRule;
+use crumple::surrogate::{Means, Validation};
 use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, QueryPoint, predict};
 use crumple::unit::{Speed, SpeedKind};
 use serde_json::Value;
@@ -1027,9 +1027,8 @@ fn a_speed_without_an_answer_is_named() {
     let mut missing = 0;
     for options in &options {
         for case in &cases {
-            let is_there = |r: &crumple::surrogate::leave_one_out::LeftOut| {
-                r.model == options.name() && r.case == case.name
-            };
+            let is_there =
+                |r: &crumple::surrogate::LeftOut| r.model == options.name() && r.case == case.name;
             let speed = format!("{} km/h", (case.speed.m_per_s * 360.0).round() / 100.0);
             let said = format!("{} at {speed}: no row: ", options.name());
             let noted = found.notes.iter().any(|n| n.starts_with(&said));
@@ -1167,7 +1166,7 @@ fn contact_and_body_force_rebound_alike() {
     let model = train("lead-car-wall", cases, Choice::Kind(ModelKind::linear())).unwrap();
     for case in &cases[1..4] {
         let curve = curve(&model, case.speed.m_per_s);
-        let reference = crumple::assess::reference::Reference::of(case).unwrap();
+        let reference = crumple::assess::Reference::of(case).unwrap();
         let rebound = |force| {
             let run = reference.run(&curve.driving(force).unwrap()).unwrap();
             -run.bodies[0].v_m_per_s.last().unwrap()
@@ -1192,7 +1191,7 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
         let cases = report.database.cases(group);
         assert_eq!(cases.len(), speeds);
         for case in cases {
-            let reference = crumple::assess::reference::Reference::of(case).unwrap();
+            let reference = crumple::assess::Reference::of(case).unwrap();
             let run =
                 reference.run(&crumple::curve::DrivingCurve::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
@@ -1205,7 +1204,7 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
 /// What a scenario takes from a model is what `predict` gives, for other masses too.
 #[test]
 fn what_drives_a_train_is_the_prediction() {
-    use crumple::surrogate::predict::predict_driving;
+    use crumple::surrogate::predict_driving;
     for group in ["lead-car-wall", "vehicle-pair"] {
         let set = TrainingSet::new(group, databases().cases(group)).unwrap();
         let model = Model::fit(&set, ModelKind::rate()).unwrap();
@@ -1256,7 +1255,13 @@ fn the_next_run_is_nearly_the_best_of_two() {
                 // Advice between the two gaps that the two left.
                 let gaps = gaps(&set, &validated(&rest));
                 let of = |k: usize| {
-                    let gap = gaps.iter().find(|gap| gap.holds(speed(k))).unwrap();
+                    let gap = gaps
+                        .iter()
+                        .find(|gap| {
+                            let (low, high) = gap.between_m_per_s;
+                            low < speed(k) && speed(k) < high
+                        })
+                        .unwrap();
                     gap.expected_force_l1.unwrap_or(0.0)
                 };
                 let (run, other) = if of(i) >= of(j) { (i, j) } else { (j, i) };

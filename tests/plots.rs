@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crumple::assess::Choice;
 use crumple::assess::ComparisonSettings;
-use crumple::assess::train::compare_train;
-use crumple::assess::validate::Choice;
+use crumple::assess::compare_train;
 use crumple::charts::{self, HistoryOptions, Motion, Quantity};
 use crumple::curve::ForceKind;
 use crumple::database::Database;

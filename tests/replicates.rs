@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::common::{crumple_fails, crumple_ok, shared};
 use crate::models::{all_kinds, case, database_of, family, law};
-use crumple::assess::choose::{Purpose, Selection};
-use crumple::assess::validate::{Choice, train, validate};
+use crumple::assess::{Choice, train, validate};
+use crumple::assess::{Purpose, Selection};
 use crumple::curve::{Case, Parameter};
 use crumple::dataset::TrainingSet;
-use crumple::surrogate::leave_one_out::Scatter;
+use crumple::surrogate::Scatter;
 use crumple::surrogate::{ModelKind, Query, predict};
 use serde_json::Value;
 

@@ -7,7 +7,7 @@ use std::io;
 use std::sync::Mutex;
 
 use crate::common::{crumple_fails, crumple_ok, python};
-use crumple::solver::source::Source;
+use crumple::solver::Source;
 use crumple::solver::{Access, Selection, SolverFile, blocks, read_from};
 
 const PAGE: u64 = 4096;

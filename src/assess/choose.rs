@@ -108,12 +108,6 @@ pub struct Gap {
 }
 
 impl Gap {
-    /// Whether a speed in m/s lies in it.
-    pub fn holds(&self, speed_m_per_s: f64) -> bool {
-        let (low, high) = self.between_m_per_s;
-        low < speed_m_per_s && speed_m_per_s < high
-    }
-
     /// The gaps with a known error first, the largest first; without errors the widest in ratio to
     /// its speeds.
     fn rank(&self) -> (bool, f64) {
@@ -159,7 +153,7 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
 }
 
 /// Proposes the middle of the first of [`gaps`]. `None` for fewer than two speeds.
-pub fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
+pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
     let mut gaps = gaps(set, validation).into_iter();
     let Gap { between_m_per_s: (low, high), expected_force_l1 } = gaps.next()?;
     let reason = match expected_force_l1 {

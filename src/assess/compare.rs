@@ -17,7 +17,7 @@ use crate::unit::{SpeedKind, km_per_h};
 
 /// Errors of every method at one left-out speed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Name of the group.
     pub group: String,
     /// Name of the case that is left out.
@@ -49,7 +49,7 @@ pub struct Comparison {
 
 /// What the fits of the spring and damper are worth.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct NsdmReport {
+pub(crate) struct NsdmReport {
     /// Name of the case that they are fitted to.
     pub fitted_to: String,
     /// Its speed, in m/s.
@@ -65,7 +65,7 @@ pub struct NsdmReport {
 
 /// One fit of the spring and damper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct NsdmFit {
+pub(crate) struct NsdmFit {
     /// Seed of its random draws.
     pub seed: u64,
     /// Ratio of the errors of the velocity at the speed it was fitted at.
@@ -84,7 +84,7 @@ pub struct NsdmFit {
 ///
 /// # Errors
 /// [`CompareError`] if the cases are no training set.
-pub fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, CompareError> {
+pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, CompareError> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -102,7 +102,7 @@ pub fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, CompareErro
 ///
 /// # Errors
 /// [`CompareError`] lists the speeds there are if none fits.
-pub fn compare(
+pub(crate) fn compare(
     group: &str,
     cases: &[Case],
     speed_m_per_s: f64,

@@ -228,7 +228,7 @@ pub enum TrainError {
 
 impl TrainError {
     /// Where in the scenario it is wrong.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         match self {
             Self::InScenario { place, .. } => Some(place),
             Self::Scenario(error) => error.place(),

@@ -1,17 +1,34 @@
 //! Assessment: predictions and methods against FE, with speeds left out, in one multi-body model
 //! and in whole trains.
 
-pub mod choose;
-pub mod compare;
-pub mod error;
+pub(crate) mod choose;
+pub(crate) mod compare;
+pub(crate) mod error;
 pub(crate) mod left_out;
 mod methods;
-pub mod reference;
+pub(crate) mod reference;
 mod row;
 mod scatter;
 pub(crate) mod settings;
-pub mod train;
-pub mod validate;
+pub(crate) mod train;
+pub(crate) mod validate;
 
-pub use row::Row;
+pub use choose::Gap;
+pub use choose::NextRun;
+pub use choose::{Purpose, Selection, gaps};
+pub use error::CompareError;
+pub use error::NotLeftOut;
+pub use error::TrainError;
+pub use error::ValidateError;
+pub use reference::MotionError;
+pub use reference::MotionErrors;
+pub use reference::Reference;
+pub(crate) use row::Row;
 pub use settings::ComparisonSettings;
+pub use train::InterfaceCrush;
+pub use train::TrainComparison;
+pub use train::TrainRow;
+pub use train::VehicleErrors;
+pub use train::compare_train;
+pub use validate::GroupReport;
+pub use validate::{Choice, Report, train, validate};

@@ -14,7 +14,7 @@ use crate::signal::l1_ratio;
 
 /// One method.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Row {
+pub(crate) struct Row {
     /// `fe` (FE's own curve of the recipe's force: the floor of a one-mass model), `fe_body` (of the
     /// body's motion, made from FE's speeds: a check of consistency), `fdrm`, `nsdm`, `ddtcm`,
     /// `best` (the model that validation chooses).

@@ -131,7 +131,7 @@ pub(super) fn choose_and_fit(
 ///
 /// # Errors
 /// As [`train`].
-pub fn train_chosen(
+pub(crate) fn train_chosen(
     group: &str,
     cases: &[Case],
     kept: &[ModelKind],
@@ -378,7 +378,7 @@ impl ModelTable {
 ///
 /// # Errors
 /// As [`validate`].
-pub fn add_nested(
+pub(crate) fn add_nested(
     validation: &mut Validation,
     cases: &[Case],
     seed: u64,

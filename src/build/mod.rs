@@ -41,7 +41,7 @@ pub enum BuildError {
 
 impl BuildError {
     /// Where in the manifest it is wrong.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         match self {
             Self::Study(error) => error.place(),
             Self::NoRun { place, .. } => place.as_ref(),
@@ -129,7 +129,7 @@ pub struct BuildReport {
 
 impl BuildReport {
     /// The case of a run.
-    pub fn case(&self, run: &BuiltRun) -> Option<&Case> {
+    pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
         self.database.cases(&run.case.group).iter().find(|case| case.name == run.case.name)
     }
 }

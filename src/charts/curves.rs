@@ -160,7 +160,7 @@ fn band_name(curve: &PredictedCurve) -> String {
 
 /// A curve that was predicted without the run beside it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LeftOutPrediction<'a> {
+pub(crate) struct LeftOutPrediction<'a> {
     /// The run that was left out.
     pub case: &'a Case,
     /// What the others predict for its speed.
@@ -170,7 +170,7 @@ pub struct LeftOutPrediction<'a> {
 }
 
 /// A run that was left out beside its prediction: force over deflection, and the speed over time.
-pub fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
+pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
     forces.title = format!("{} force", kind.name());

@@ -24,13 +24,22 @@ mod left_out;
 mod motion;
 mod train;
 
-pub use curves::{LeftOutPrediction, group_curves, left_out, prediction};
-pub use histories::{HistoryError, HistoryOptions, histories};
-pub use left_out::{LeftOutError, left_out_at};
-pub use motion::{BodyMotion, Energies, InterfaceMotion, Motion, MotionError, Quantity};
+pub use curves::group_curves;
+pub use curves::prediction;
+pub use histories::HistoryError;
+pub use histories::HistoryOptions;
+pub use histories::histories;
+pub use left_out::LeftOutError;
+pub use left_out::left_out_at;
+pub use motion::Motion;
+pub use motion::MotionError;
+pub use motion::Quantity;
 pub use train::train_speeds;
 
 use crate::unit::km_per_h;
+pub use motion::BodyMotion;
+pub use motion::Energies;
+pub use motion::InterfaceMotion;
 
 /// A speed in km/h with at most one digit behind the point.
 fn speed(m_per_s: f64) -> String {

@@ -1,22 +1,22 @@
 //! Arguments that several commands share.
 
+use crate::curve::Parameter;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::unit::{MASS, SPEED};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use crumple::curve::Parameter;
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::unit::{MASS, SPEED};
 
 /// A speed with its unit, in m/s.
-pub fn speed(text: &str) -> Result<f64, String> {
+pub(super) fn speed(text: &str) -> Result<f64, String> {
     SPEED.parse_positive(text).map_err(|e| e.to_string())
 }
 
 /// A mass with its unit, in kg.
-pub fn mass(text: &str) -> Result<f64, String> {
+pub(super) fn mass(text: &str) -> Result<f64, String> {
     MASS.parse_positive(text).map_err(|e| e.to_string())
 }
 
 /// A case parameter: `angle_deg=10` or `obstacle=pole`.
-pub fn parameter(text: &str) -> Result<(String, Parameter), String> {
+pub(super) fn parameter(text: &str) -> Result<(String, Parameter), String> {
     let (name, value) = text
         .split_once('=')
         .filter(|(name, value)| !name.is_empty() && !value.is_empty())
@@ -30,7 +30,7 @@ pub fn parameter(text: &str) -> Result<(String, Parameter), String> {
 }
 
 /// One of a few values of the library, by name and with a line of help each.
-pub fn one_of<T: Copy + Send + Sync + 'static>(
+pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     values: &'static [(&'static str, T, &'static str)],
 ) -> impl TypedValueParser<Value = T> {
     let names = values.iter().map(|(name, _, help)| PossibleValue::new(*name).help(*help));
@@ -41,7 +41,7 @@ pub fn one_of<T: Copy + Send + Sync + 'static>(
 }
 
 /// Rules for the maximal crush.
-pub const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
+pub(super) const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
     ("spline", MaxCrushRule::Spline, "Cubic spline through the training speeds (reference method)"),
     ("monotone", MaxCrushRule::Monotone, "Monotone cubic through (0, 0) and the training speeds"),
     ("energy", MaxCrushRule::Energy, "Where the curve has taken up the kinetic energy"),

@@ -12,7 +12,7 @@ const LEAST: usize = 20;
 const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 
 /// Draws force (N, shown in MN) over deflection (m, increasing); the force axis includes 0.
-pub fn curve(out: &mut dyn Write, deflection_m: &[f64], force_n: &[f64]) -> io::Result<()> {
+pub(super) fn curve(out: &mut dyn Write, deflection_m: &[f64], force_n: &[f64]) -> io::Result<()> {
     let end_m = deflection_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let low = force_n.iter().copied().fold(0.0, f64::min);
     let high = force_n.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

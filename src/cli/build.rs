@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crumple::build::{self, BuildReport, BuiltRun, RunOutcome};
-use crumple::database::CasePath;
-use crumple::plural::counted;
+use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
+use crate::database::CasePath;
+use crate::plural::counted;
 use serde::Serialize;
 
 use super::db::CaseRow;
@@ -23,7 +23,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 Only runs that changed since the last build are read again. A run that cannot be used is
 reported and left out (exit code 1); the others are built. W/E is the work of a curve over the
 energy of its impact: up to 5 % off 1 is usual, more is a wrong mass, speed or unit.")]
-pub struct Args {
+pub(super) struct Args {
     /// Study manifest (TOML); study.toml if absent
     study: Option<PathBuf>,
     /// Database to write or to update; curves.h5 beside the study if absent
@@ -86,7 +86,7 @@ struct RunReport {
     renamed: Option<String>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (study, output) = args.files()?;
     let bar = progress::Bar::new(options, "reading runs");
     let done = AtomicUsize::new(0);

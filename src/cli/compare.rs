@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::assess::compare::{self, Comparison, NsdmReport};
-use crumple::assess::train::{TrainComparison, TrainRow, compare_train};
-use crumple::assess::{ComparisonSettings, Row};
-use crumple::curve::ForceKind;
-use crumple::database::Database;
-use crumple::nsdm::Start;
-use crumple::rating::Rating;
-use crumple::scenario;
-use crumple::unit::km_per_h;
+use crate::assess::compare::{self, Comparison, NsdmReport};
+use crate::assess::train::{TrainComparison, TrainRow, compare_train};
+use crate::assess::{ComparisonSettings, Row};
+use crate::curve::ForceKind;
+use crate::database::Database;
+use crate::nsdm::Start;
+use crate::rating::Rating;
+use crate::scenario;
+use crate::unit::km_per_h;
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
@@ -38,7 +38,7 @@ With --train, a scenario whose curves are cases of a database runs with the curv
 and the vehicles' speeds are compared with FE's, which its [reference] names. rate_live lets the
 crush force follow the speeds of the run; split_ends gives each vehicle two ends with the mass that
 they stop. Several trains are compared one by one and in their means.")]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     #[arg(required_unless_present = "train", conflicts_with = "train")]
     database: Option<PathBuf>,
@@ -96,7 +96,7 @@ struct Mean {
     acceleration_iso18571: f64,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let settings = ComparisonSettings {
         seed: args.seed,
         fixed_speed_m_per_s: args.fixed_speed,
@@ -246,7 +246,7 @@ fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
 
 fn means(comparisons: &[Comparison]) -> Vec<Mean> {
     let Some(first) = comparisons.first() else { return Vec::new() };
-    let score = |rating: &crumple::rating::Rating| {
+    let score = |rating: &crate::rating::Rating| {
         rating.iso18571.as_ref().map_or(f64::NAN, |iso| iso.rating)
     };
     first

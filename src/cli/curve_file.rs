@@ -1,15 +1,15 @@
 //! What a measured or legacy curve's file does not say of itself, as several commands take it.
 
-use crumple::formats::read::{ColumnNames, ReadOptions};
-use crumple::import::{ImportError, Settings};
-use crumple::unit::{STIFFNESS, SpeedKind};
+use crate::formats::read::{ColumnNames, ReadOptions};
+use crate::import::{ImportError, Settings};
+use crate::unit::{STIFFNESS, SpeedKind};
 
 use super::Failure;
 use super::arguments::{mass, one_of};
 
 /// How a file is read, and the impact that its curve belongs to.
 #[derive(clap::Args)]
-pub struct CurveFile {
+pub(super) struct CurveFile {
     /// What the speed is measured against [default: what the file says, else the group's]
     #[arg(long, value_parser = one_of(KINDS))]
     kind: Option<SpeedKind>,
@@ -50,7 +50,7 @@ fn stiffness(text: &str) -> Result<f64, String> {
 
 impl CurveFile {
     /// Whether anything is said.
-    pub fn is_asked(&self) -> bool {
+    pub(super) fn is_asked(&self) -> bool {
         let read = [
             &self.from,
             &self.curve,
@@ -63,7 +63,7 @@ impl CurveFile {
     }
 
     /// What is said here; the rest is as by default.
-    pub fn settings(&self) -> Settings {
+    pub(super) fn settings(&self) -> Settings {
         let columns = ColumnNames {
             deflection: self.deflection_column.clone(),
             force: self.force_column.clone(),
@@ -86,7 +86,7 @@ impl CurveFile {
 }
 
 /// Wrong usage where the command line lacks something, or says what cannot be.
-pub fn failure(error: ImportError) -> Failure {
+pub(super) fn failure(error: ImportError) -> Failure {
     match error {
         ImportError::Missing { .. }
         | ImportError::MassOfWall { .. }

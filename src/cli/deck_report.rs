@@ -3,12 +3,12 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crumple::solver::lsdyna::deck::{Deck, Interface, Named, Value};
+use crate::solver::lsdyna::deck::{Deck, DeckInterface, TitledEntity, Value};
 use serde::Serialize;
 
 /// A deck's metadata, or only where titles were taken from.
 #[derive(Default, Serialize)]
-pub struct DeckReport<'a> {
+pub(super) struct DeckReport<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     titles_from: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,11 +92,11 @@ struct Include<'a> {
 }
 
 impl<'a> DeckReport<'a> {
-    pub fn of(deck: &'a Deck) -> Self {
-        let named = |list: &'a [Named]| -> Vec<Entry<'a>> {
+    pub(super) fn of(deck: &'a Deck) -> Self {
+        let named = |list: &'a [TitledEntity]| -> Vec<Entry<'a>> {
             list.iter().map(|n| Entry { id: Some(n.id), title: n.title.as_deref() }).collect()
         };
-        let interfaces = |list: &'a [Interface]| -> Vec<Entry<'a>> {
+        let interfaces = |list: &'a [DeckInterface]| -> Vec<Entry<'a>> {
             list.iter().map(|n| Entry { id: n.id, title: n.title.as_deref() }).collect()
         };
         Self {
@@ -123,7 +123,7 @@ impl<'a> DeckReport<'a> {
     }
 
     /// A note that titles of a solver file come from the deck at `path`.
-    pub fn titles(path: &Path, count: usize) -> Self {
+    pub(super) fn titles(path: &Path, count: usize) -> Self {
         Self {
             titles_from: Some(path.display().to_string()),
             titles: Some(count),
@@ -131,7 +131,7 @@ impl<'a> DeckReport<'a> {
         }
     }
 
-    pub fn print(&self, out: &mut dyn Write) -> io::Result<()> {
+    pub(super) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         if let (Some(path), Some(count)) = (&self.titles_from, self.titles) {
             writeln!(out, "  titles      {count} taken from the deck {path}")?;
         }

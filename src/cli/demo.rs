@@ -4,20 +4,20 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crumple::assess::choose::{Purpose, Selection};
-use crumple::assess::validate::{train_chosen, validate};
-use crumple::build::{self, BuiltRun, RunOutcome};
-use crumple::curve::Case;
-use crumple::database::Database;
-use crumple::file::{WriteError, write_at, write_whole};
-use crumple::formats::{self, ExportInput};
-use crumple::multibody::Run;
-use crumple::report::{MethodSpeeds, ReportSettings, report};
-use crumple::scenario;
-use crumple::surrogate::leave_one_out::Validation;
-use crumple::surrogate::predict::predict_beyond;
-use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query};
-use crumple::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
+use crate::assess::choose::{Purpose, Selection};
+use crate::assess::validate::{train_chosen, validate};
+use crate::build::{self, BuiltRun, RunOutcome};
+use crate::curve::Case;
+use crate::database::Database;
+use crate::file::{WriteError, write_at, write_whole};
+use crate::formats::{self, ExportInput};
+use crate::multibody::Run;
+use crate::report::{MethodSpeeds, ReportSettings, report};
+use crate::scenario;
+use crate::surrogate::leave_one_out::Validation;
+use crate::surrogate::predict::predict_beyond;
+use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
+use crate::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 #[command(after_help = "Examples:
   crumple demo
   crumple demo -o somewhere")]
-pub struct Args {
+pub(super) struct Args {
     /// Folder to write to
     #[arg(short, long, default_value = "crumple-demo")]
     output: PathBuf,
@@ -97,7 +97,7 @@ struct Flow<'a> {
     files: Vec<PathBuf>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
     let mut flow = Flow {
         folder: &args.output,

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crumple::curve::{ForceKind, Parameter};
-use crumple::formats::{self, ExportError, Exported, FORMATS, Format, Material, Options, Tail};
-use crumple::surrogate::Query;
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::predict::PredictError;
-use crumple::unit::UnitSystem;
+use crate::curve::{ForceKind, Parameter};
+use crate::formats::{self, ExportError, Exported, FORMATS, Format, Material, Options, Tail};
+use crate::surrogate::Query;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::PredictError;
+use crate::unit::UnitSystem;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
 use super::curve_file::CurveFile;
@@ -34,7 +34,7 @@ unloading stiffness. --tail changes that.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
 parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
-pub struct Args {
+pub(super) struct Args {
     /// Predicted curve (JSON of crumple predict), model (of crumple train), curve database, or a measured
     /// or legacy curve's file (crumple db add --list)
     #[arg(required_unless_present = "list")]
@@ -84,7 +84,7 @@ struct Which {
 
 /// The target's format and what it leaves open.
 #[derive(clap::Args)]
-pub struct Target {
+pub(super) struct Target {
     /// Format, if not told by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
@@ -145,7 +145,7 @@ pub(super) fn units(text: &str) -> Result<UnitSystem, String> {
 
 impl Target {
     /// The format by `--to`, else by the extension of the file.
-    pub fn format(&self, path: Option<&Path>) -> Result<&'static Format, Failure> {
+    pub(super) fn format(&self, path: Option<&Path>) -> Result<&'static Format, Failure> {
         let found = match (&self.to, path) {
             (Some(name), _) => formats::by_name(name),
             (None, Some(path)) => formats::by_extension(path),
@@ -185,7 +185,7 @@ impl Target {
 
     /// The files of curves for `path`, of the force that was asked for or of the body's; of both where
     /// the format holds both and none was asked for.
-    pub fn export(
+    pub(super) fn export(
         &self,
         format: &Format,
         curves: &[formats::ExportInput],
@@ -211,7 +211,7 @@ impl Target {
     }
 
     /// Refuses what none of the formats has a use for.
-    pub fn check(&self, formats: &[&Format]) -> Result<(), Failure> {
+    pub(super) fn check(&self, formats: &[&Format]) -> Result<(), Failure> {
         let is_of_none = |takes: fn(&Format) -> bool| !formats.iter().any(|f| takes(f));
         for (option, is_asked, takes) in [
             ("--deck", self.deck, Format::has_deck as fn(&Format) -> bool),
@@ -244,7 +244,7 @@ impl Target {
     }
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let Some(path) = args.input.as_ref().filter(|_| !args.list) else {
         return list(options);
     };

@@ -3,23 +3,23 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use crumple::curve::Case;
-use crumple::database::Database;
-use crumple::dataset::is_same_speed;
-use crumple::file;
-use crumple::formats::ExportInput;
-use crumple::formats::read::is_folder_of_tests;
-use crumple::formats::read::json::{self, CurveFileError};
-use crumple::import::{self, Item, Settings};
-use crumple::surrogate::predict::predict_beyond;
-use crumple::surrogate::{Model, PredictedCurve, Query};
-use crumple::unit::{UnitSystem, km_per_h};
+use crate::curve::Case;
+use crate::database::Database;
+use crate::dataset::is_same_speed;
+use crate::file;
+use crate::formats::ExportInput;
+use crate::formats::read::is_folder_of_tests;
+use crate::formats::read::json::{self, CurveFileError};
+use crate::import::{self, Item, Settings};
+use crate::surrogate::predict::predict_beyond;
+use crate::surrogate::{Model, PredictedCurve, Query};
+use crate::unit::{UnitSystem, km_per_h};
 
 use super::Failure;
 use super::curve_file::{self, CurveFile};
 
 /// The input of an export.
-pub enum Input {
+pub(super) enum Input {
     Curve(Box<PredictedCurve>),
     Model(Box<Model>),
     Database(PathBuf, Database),
@@ -28,7 +28,7 @@ pub enum Input {
 }
 
 /// Which curves of it.
-pub struct Chosen<'a> {
+pub(super) struct Chosen<'a> {
     pub speeds_m_per_s: &'a [f64],
     /// What is asked of a model; its speed is not used.
     pub query: Query,
@@ -41,7 +41,7 @@ pub struct Chosen<'a> {
 
 /// Curves, and what the user should know of how they were read.
 #[derive(Default)]
-pub struct Curves {
+pub(super) struct Curves {
     pub inputs: Vec<ExportInput>,
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
@@ -53,7 +53,7 @@ const HEAD: u64 = 4096;
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 impl Input {
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub(super) fn read(path: &Path) -> Result<Self, Failure> {
         if is_folder_of_tests(path) {
             return Ok(Self::File(path.into()));
         }
@@ -73,7 +73,7 @@ impl Input {
     }
 
     /// Refuses what is said of a curve's file where there is none.
-    pub fn check_said(&self, chosen: &Chosen<'_>) -> Result<(), Failure> {
+    pub(super) fn check_said(&self, chosen: &Chosen<'_>) -> Result<(), Failure> {
         let is_said = chosen.file.is_asked() || chosen.input_units.is_some();
         match (self, is_said) {
             (Self::File(_), _) | (_, false) => Ok(()),
@@ -84,7 +84,7 @@ impl Input {
     }
 
     /// The model, for a format that is made of one.
-    pub fn model(&self, format: &str) -> Result<&Model, Failure> {
+    pub(super) fn model(&self, format: &str) -> Result<&Model, Failure> {
         match self {
             Self::Model(model) => Ok(model),
             Self::Curve(_) | Self::Database(..) | Self::File(_) => Err(Failure::Usage(format!(
@@ -94,7 +94,7 @@ impl Input {
     }
 
     /// The recorded cases, for a format that is made of histories.
-    pub fn cases(&self, chosen: &Chosen<'_>, format: &str) -> Result<Vec<Case>, Failure> {
+    pub(super) fn cases(&self, chosen: &Chosen<'_>, format: &str) -> Result<Vec<Case>, Failure> {
         match self {
             Self::Database(path, database) => chosen.of_database(path, database),
             Self::File(path) => Ok(vec![chosen.of_file(path)?]),
@@ -105,7 +105,7 @@ impl Input {
     }
 
     /// The curves.
-    pub fn curves(&self, chosen: &Chosen<'_>) -> Result<Curves, Failure> {
+    pub(super) fn curves(&self, chosen: &Chosen<'_>) -> Result<Curves, Failure> {
         let of_case = |case: &Case| -> Result<ExportInput, Failure> {
             Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })
         };
@@ -151,7 +151,7 @@ impl Chosen<'_> {
 
     /// Refuses what an export of a whole model has no use for; a table takes all that is asked of
     /// a model.
-    pub fn check_for_model(&self, is_table: bool) -> Result<(), Failure> {
+    pub(super) fn check_for_model(&self, is_table: bool) -> Result<(), Failure> {
         let of_database = self.group.is_some() || !self.cases.is_empty();
         let of_curve = self.asks_a_model() || !self.speeds_m_per_s.is_empty();
         match (of_database, of_curve && !is_table) {

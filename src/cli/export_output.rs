@@ -3,15 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crumple::file::{WriteError, write_all_whole};
-use crumple::formats::{Exported, Format};
+use crate::file::{WriteError, write_all_whole};
+use crate::formats::{Exported, Format};
 use serde::Serialize;
 
 use super::output;
 use super::{Failure, GlobalOptions};
 
 /// The target of an export.
-pub struct Destination<'a> {
+pub(super) struct Destination<'a> {
     /// Standard output if absent.
     pub output: Option<&'a Path>,
     pub format: &'a Format,
@@ -40,7 +40,7 @@ struct Document<'a> {
 
 impl Destination<'_> {
     /// Writes the files and says what there is to say of them.
-    pub fn write(&self, exported: Exported, options: GlobalOptions) -> Result<(), Failure> {
+    pub(super) fn write(&self, exported: Exported, options: GlobalOptions) -> Result<(), Failure> {
         let notes = &exported.notes;
         if !options.json && !options.quiet {
             notes.iter().for_each(|note| output::say(&format!("note: {note}")));

@@ -3,13 +3,13 @@
 use std::io::Read;
 use std::path::Path;
 
-use crumple::file;
+use crate::file;
 
 use super::Failure;
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FileKind {
+pub(super) enum FileKind {
     /// Curve database.
     Database,
     /// Model.
@@ -31,7 +31,7 @@ const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 impl FileKind {
     /// The kind of a file.
-    pub fn of(path: &Path) -> Result<Self, Failure> {
+    pub(super) fn of(path: &Path) -> Result<Self, Failure> {
         let mut head = Vec::new();
         file::open(path)
             .and_then(|f| f.take(HEAD).read_to_end(&mut head))
@@ -54,7 +54,7 @@ impl FileKind {
     }
 
     /// As a message calls it.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Database => "a database",
             Self::Model => "a model",

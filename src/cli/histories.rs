@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::file::write_whole;
-use crumple::history::{History, Side};
-use crumple::history_hdf5::{Beside, convert, encode};
-use crumple::solver::{self, Access, Problem, Selection, SolverFile, WantedId, decks};
-use crumple::unit::UnitSystem;
+use crate::file::write_whole;
+use crate::history::{History, Side};
+use crate::history_hdf5::{Beside, convert, encode};
+use crate::solver::{self, Access, Problem, Selection, SolverFile, WantedId, decks};
+use crate::unit::UnitSystem;
 use serde::Serialize;
 
 use super::export::units;
@@ -23,7 +23,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple histories run/nodout -o nodout.h5
   crumple histories run/nodout -o nodout.h5 --units mm-t-s
 HDF5 has named dimensions, titles of nodes and walls (from the file or the deck beside it) and units.")]
-pub struct Args {
+pub(super) struct Args {
     /// File written by a solver
     file: PathBuf,
     /// Node, wall or interface to keep; 3:surfa keeps one side (default: all)
@@ -52,7 +52,7 @@ pub struct Args {
     force: bool,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let some = |empty: bool| !empty;
     let selection = Selection {
         ids: some(args.ids.is_empty()).then(|| args.ids.clone()),
@@ -110,7 +110,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 fn checked_target(args: &Args, output: Option<&Path>) -> Result<Option<Target>, Failure> {
     if let Some(output) = output {
         solver::family(&args.file).iter().try_for_each(|part| keep_input(part, output))?;
-        if !args.force && crumple::history_hdf5::is_other_hdf5(output) {
+        if !args.force && crate::history_hdf5::is_other_hdf5(output) {
             return Err(Failure::Usage(format!(
                 "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
                 output.display()

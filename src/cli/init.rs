@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crumple::file::write_whole;
-use crumple::init::{
+use crate::file::write_whole;
+use crate::init::{
     self, Given, GivenForce, InitError, Proposal, Proposed, ProposedRun, Request, ScenarioProposal,
 };
-use crumple::study::StudyKind;
-use crumple::unit::{UnitSystem, km_per_h};
+use crate::study::StudyKind;
+use crate::unit::{UnitSystem, km_per_h};
 use serde::Serialize;
 
 use super::arguments;
@@ -25,7 +25,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress}
   crumple init --scenario lead.model -o scenario.toml
 Each value in the study says whether it was read, computed or guessed, and from what. Then
 crumple build makes the curves of it.")]
-pub struct Args {
+pub(super) struct Args {
     /// Run folders, or folders above them; with --scenario model files
     #[arg(value_name = "RUN|MODEL")]
     inputs: Vec<PathBuf>,
@@ -90,7 +90,7 @@ struct Document<'a> {
     proposal: &'a Proposal,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let default = if args.scenario { "scenario.toml" } else { "study.toml" };
     let output = args.output.clone().unwrap_or_else(|| default.into());
     let to_stdout = is_stdout(&output);

@@ -3,11 +3,9 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::solver::decks;
-use crumple::solver::lsdyna::deck::Deck;
-use crumple::solver::{
-    self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData,
-};
+use crate::solver::decks;
+use crate::solver::lsdyna::deck::Deck;
+use crate::solver::{self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData};
 use serde::Serialize;
 
 use super::deck_report::DeckReport;
@@ -26,7 +24,7 @@ Examples:
   crumple inspect run/nodout run/rcforc --json
   crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged"
 )]
-pub struct Args {
+pub(super) struct Args {
     /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]
     files: Vec<PathBuf>,
@@ -90,7 +88,7 @@ struct Inspected {
     unread: Vec<ReadError>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let mut outcome = Outcome::Clean;
     let mut inspected = Vec::new();
     for asked in asked(&args.files)? {
@@ -157,7 +155,9 @@ fn inspect(asked: Asked, args: &Args) -> Inspected {
 fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Read>, ReadError> {
     let sections = match solver::read_sections(path, format, selection) {
         Ok(sections) => sections,
-        Err(ReadError::Deck { .. }) => return Ok(vec![Read::Deck(Box::new(decks::read(path)?))]),
+        Err(ReadError::Deck { .. }) => {
+            return Ok(vec![Read::Deck(Box::new(decks::read_deck(path)?))]);
+        }
         Err(error) => return Err(error),
     };
     let deck = deck_for(path, &sections);

@@ -3,20 +3,20 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::solver::decks::{self, Search};
-use crumple::solver::runs::{output_files, run_folders};
+use crate::solver::decks::{self, Search};
+use crate::solver::runs::{output_files, run_folders};
 
 use super::Failure;
 use super::output;
 
 /// What is to be inspected: a file that was named, or the files of a run that was found.
-pub enum Asked {
+pub(super) enum Asked {
     File(PathBuf),
     Run { folder: PathBuf, files: Vec<PathBuf> },
 }
 
 /// The files that were named, and those of every run at or below the folders that were.
-pub fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
+pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
     let mut asked = Vec::new();
     for path in paths {
         if !path.is_dir() {
@@ -43,11 +43,11 @@ pub fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
 }
 
 /// Columns of a run's table.
-pub const HEADING: [&str; 7] =
+pub(super) const HEADING: [&str; 7] =
     ["file", "holds", "states", "first time", "last", "entities", "problems"];
 
 /// A run's files, a line for each section.
-pub fn print(out: &mut dyn Write, folder: &Path, rows: &[Vec<String>]) -> io::Result<()> {
+pub(super) fn print(out: &mut dyn Write, folder: &Path, rows: &[Vec<String>]) -> io::Result<()> {
     writeln!(out, "{}", folder.display())?;
     output::table(out, &HEADING, rows)
 }

@@ -38,9 +38,9 @@ use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
+use crate::failure::{self, ErrorDocument};
+use crate::file::is_same;
 use clap::{FromArgMatches, Parser, Subcommand};
-use crumple::failure::{self, ErrorDocument};
-use crumple::file::is_same;
 
 /// Everything went well.
 const DONE: u8 = 0;
@@ -140,7 +140,7 @@ fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
 fn keep_inputs(scenario: &Path, output: &Path) -> Result<(), Failure> {
     keep_input(scenario, output)?;
     // A scenario that cannot be read is reported by whoever runs it.
-    let Ok(read) = crumple::scenario::read(scenario) else { return Ok(()) };
+    let Ok(read) = crate::scenario::read(scenario) else { return Ok(()) };
     for file in read.files(scenario) {
         keep_input(&file, output)?;
     }

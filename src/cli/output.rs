@@ -8,17 +8,17 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 
 use serde::Serialize;
 
-use crumple::manifest::Place;
+use crate::manifest::Place;
 
 use super::{Failure, GlobalOptions, terminal};
 
 /// Writes text to standard output.
-pub fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+pub(super) fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     print_with(|_| REPLACED.into(), write)
 }
 
 /// Writes data to standard output, byte for byte; to a terminal as text.
-pub fn print_data<T, E: Error + 'static>(
+pub(super) fn print_data<T, E: Error + 'static>(
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
     if io::stdout().is_terminal() {
@@ -31,7 +31,7 @@ pub fn print_data<T, E: Error + 'static>(
 }
 
 /// Prints one JSON document.
-pub fn print_json(document: &impl Serialize) -> Result<(), Failure> {
+pub(super) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     // JSON escapes the others itself; they stand within strings only.
     let escaped = |code: u8| format!("\\u{code:04x}");
     print_with(escaped, |out| {
@@ -73,7 +73,7 @@ impl Write for Named<'_> {
 }
 
 /// Prints a line on standard error.
-pub fn say(line: &str) {
+pub(super) fn say(line: &str) {
     // With standard error closed or full there is nobody to tell.
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
@@ -83,7 +83,7 @@ pub fn say(line: &str) {
 const WIDEST: usize = 200;
 
 /// Prints the line of a file that an error is about on standard error, with carets below.
-pub fn say_excerpt(place: Option<&Place>) {
+pub(super) fn say_excerpt(place: Option<&Place>) {
     let width = terminal::error_width().unwrap_or(WIDEST);
     if let Some(excerpt) = place.and_then(|place| place.excerpt(width)) {
         say(&excerpt);
@@ -91,7 +91,7 @@ pub fn say_excerpt(place: Option<&Place>) {
 }
 
 /// A text without control characters but line ends and tabs.
-pub fn plain(text: &str) -> Cow<'_, str> {
+pub(super) fn plain(text: &str) -> Cow<'_, str> {
     let is_control = |c: char| c.is_control() && c != '\n' && c != '\t';
     match text.contains(is_control) {
         true => Cow::Owned(text.replace(is_control, REPLACED)),
@@ -153,7 +153,7 @@ impl<W: Write, F: Fn(u8) -> String> Write for Plain<W, F> {
 }
 
 /// Whether an error only says that the reader of a pipe went away.
-pub fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
+pub(super) fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
     let mut cause = Some(error);
     while let Some(e) = cause {
         if let Some(io) = e.downcast_ref::<io::Error>()
@@ -169,7 +169,7 @@ pub fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
 /// Prints rows under a heading with columns as wide as their content; the first
 /// column is set left, the others right. What is wider than the terminal is shown in blocks of
 /// columns, each with the first one, or with a line for each cell.
-pub fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
+pub(super) fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
     table_within(out, terminal::width().unwrap_or(usize::MAX), heading, rows)
 }
 
@@ -259,14 +259,14 @@ fn list(
 
 /// A format as a list of them says it.
 #[derive(Serialize)]
-pub struct ListedFormat {
+pub(super) struct ListedFormat {
     pub name: &'static str,
     pub extensions: &'static [&'static str],
     pub description: &'static str,
 }
 
 /// Prints the formats that a command knows.
-pub fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Result<(), Failure> {
+pub(super) fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Result<(), Failure> {
     #[derive(Serialize)]
     struct Document {
         formats: Vec<ListedFormat>,
@@ -287,7 +287,7 @@ pub fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Result<(),
 }
 
 /// A number of things: `1 case`, `2 cases`.
-pub fn counted(number: usize, what: &str) -> String {
+pub(super) fn counted(number: usize, what: &str) -> String {
     let plural = if number == 1 { "" } else { "s" };
     format!("{number} {what}{plural}")
 }

@@ -3,20 +3,20 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::assess::ComparisonSettings;
-use crumple::assess::choose::Purpose;
-use crumple::assess::train::compare_train;
-use crumple::assess::validate::Choice;
-use crumple::charts::{self, HistoryOptions, Motion, Quantity};
-use crumple::curve::ForceKind;
-use crumple::database::Database;
-use crumple::file::{self, write_all_whole};
-use crumple::formats::read::json;
-use crumple::plot::Chart;
-use crumple::scenario;
-use crumple::solver::{self, Access, Selection, WantedId};
-use crumple::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
-use crumple::unit::{UnitSystem, km_per_h};
+use crate::assess::ComparisonSettings;
+use crate::assess::choose::Purpose;
+use crate::assess::train::compare_train;
+use crate::assess::validate::Choice;
+use crate::charts::{self, HistoryOptions, Motion, Quantity};
+use crate::curve::ForceKind;
+use crate::database::Database;
+use crate::file::{self, write_all_whole};
+use crate::formats::read::json;
+use crate::plot::Chart;
+use crate::scenario;
+use crate::solver::{self, Access, Selection, WantedId};
+use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
+use crate::unit::{UnitSystem, km_per_h};
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
@@ -36,7 +36,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple plot train-set.toml --train -o train.svg                      # FE's train and the methods
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
 What the file is, its content tells. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
-pub struct Args {
+pub(super) struct Args {
     /// Database, model, predicted curve, scenario, result (CSV) or solver file
     file: PathBuf,
     /// Picture to write: .svg or .png; may be repeated
@@ -133,7 +133,7 @@ struct Document {
     files: Vec<PathBuf>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let pictures =
         args.output.iter().map(|path| Picture::of(path)).collect::<Result<Vec<_>, _>>()?;
     args.output.iter().try_for_each(|output| keep_input(&args.file, output))?;

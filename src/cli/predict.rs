@@ -1,17 +1,17 @@
 //! `crumple predict`: the curve at a new speed.
 
-use crumple::plural::counted;
+use crate::plural::counted;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::curve::{ForceKind, Parameter};
-use crumple::file::write_all_whole;
-use crumple::formats::{ExportInput, Exported, Format};
-use crumple::surrogate::band::{Band, LeftOutSpeeds};
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::predict::predict_beyond;
-use crumple::surrogate::{Model, PredictedCurve, Query};
-use crumple::unit::km_per_h;
+use crate::curve::{ForceKind, Parameter};
+use crate::file::write_all_whole;
+use crate::formats::{ExportInput, Exported, Format};
+use crate::surrogate::band::{Band, LeftOutSpeeds};
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::predict::predict_beyond;
+use crate::surrogate::{Model, PredictedCurve, Query};
+use crate::unit::km_per_h;
 use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
@@ -24,7 +24,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple predict lead.model --speed 50km/h
   crumple predict lead.model --speed 50km/h -o lead50.json -o lead50.csv -o lead50.k
   crumple predict lead.model --speed 14m/s --max-crush energy --json")]
-pub struct Args {
+pub(super) struct Args {
     /// Model file made by crumple train
     model: PathBuf,
     /// Impact speed with its unit, of the kind the model was trained on
@@ -55,7 +55,7 @@ pub struct Args {
     target: super::export::Target,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let rule = match args.paper {
         true => Some(MaxCrushRule::Spline),
         false => args.max_crush,

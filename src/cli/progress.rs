@@ -9,10 +9,10 @@ use super::GlobalOptions;
 use super::output::plain;
 
 /// A spinner that names the step just done.
-pub struct Bar(Option<ProgressBar>);
+pub(super) struct Bar(Option<ProgressBar>);
 
 impl Bar {
-    pub fn new(options: GlobalOptions, what: &'static str) -> Self {
+    pub(super) fn new(options: GlobalOptions, what: &'static str) -> Self {
         let visible = !options.quiet && std::io::stderr().is_terminal();
         Self(visible.then(|| {
             let bar = ProgressBar::new_spinner().with_message(what);
@@ -21,13 +21,13 @@ impl Bar {
         }))
     }
 
-    pub fn step(&self, done: &str) {
+    pub(super) fn step(&self, done: &str) {
         if let Some(bar) = &self.0 {
             bar.set_message(plain(done).into_owned());
         }
     }
 
-    pub fn end(self) {
+    pub(super) fn end(self) {
         if let Some(bar) = self.0 {
             bar.finish_and_clear();
         }
@@ -35,10 +35,10 @@ impl Bar {
 }
 
 /// A bar over a known number of items, with the time that is left.
-pub struct Count(Option<ProgressBar>);
+pub(super) struct Count(Option<ProgressBar>);
 
 impl Count {
-    pub fn new(options: GlobalOptions, items: u64) -> Self {
+    pub(super) fn new(options: GlobalOptions, items: u64) -> Self {
         let visible = !options.quiet && std::io::stderr().is_terminal();
         Self(visible.then(|| {
             let bar = ProgressBar::new(items);
@@ -51,20 +51,20 @@ impl Count {
     }
 
     /// Sets where it begins; what was done before says nothing of the time left.
-    pub fn begin(&self, done: u64) {
+    pub(super) fn begin(&self, done: u64) {
         if let Some(bar) = &self.0 {
             bar.set_position(done);
             bar.reset_eta();
         }
     }
 
-    pub fn set(&self, done: u64) {
+    pub(super) fn set(&self, done: u64) {
         if let Some(bar) = &self.0 {
             bar.set_position(done);
         }
     }
 
-    pub fn end(self) {
+    pub(super) fn end(self) {
         if let Some(bar) = self.0 {
             bar.finish_and_clear();
         }

@@ -3,13 +3,13 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::file;
-use crumple::rating::deceleration::Deceleration;
-use crumple::rating::iso18571::Iso18571;
-use crumple::rating::magnitude_phase::MagnitudePhase;
-use crumple::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
-use crumple::solver::{self, ReadError, Selection, WantedId};
-use crumple::unit::TIME;
+use crate::file;
+use crate::rating::deceleration::Deceleration;
+use crate::rating::iso18571::Iso18571;
+use crate::rating::magnitude_phase::MagnitudePhase;
+use crate::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
+use crate::solver::{self, ReadError, Selection, WantedId};
+use crate::unit::TIME;
 
 use super::arguments::one_of;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
@@ -31,7 +31,7 @@ several sections FILE:SECTION:ID:COMPONENT; behind it ,scale=FACTOR on the value
 the times (s, ms, us). What both share may stand once, as --id and --component or --column. Both are filtered if asked, then interpolated
 linearly at common times 0.1 ms apart (10 kHz, as ISO/TS 18571 wants it). Accelerations are negative
 while the body is slowed down. ISO/TS 18571 and CORA take up to 2 s: choose with --from and --to.")]
-pub struct Args {
+pub(super) struct Args {
     /// Reference: CSV or a solver's file, with what to take from it
     #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
     reference: Address,
@@ -218,7 +218,7 @@ struct Read {
     problems: usize,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let both = &args.both;
     let wanted = |address| Wanted {
         address,

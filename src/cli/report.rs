@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::database::Database;
-use crumple::file::write_whole;
-use crumple::report::{MethodSpeeds, ReportSettings, report};
+use crate::database::Database;
+use crate::file::write_whole;
+use crate::report::{MethodSpeeds, ReportSettings, report};
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
@@ -20,7 +20,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple report curves.h5 scenario.toml train-set.toml -o report.html
   crumple report curves.h5 --group lead-car-wall --speed 50km/h --nsdm-seeds 3 -o report.html
 The page needs no network and no other file. Scenarios are run; one with a [reference] is held against FE.")]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     /// Scenarios (TOML) whose runs are shown
@@ -61,7 +61,7 @@ struct Document {
     warnings: usize,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     keep_input(&args.database, &args.output)?;
     args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
     if is_stdout(&args.output) && options.json {

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use crumple::file::{WriteError, write_all_whole};
-use crumple::formats::iso_mme::{Channel, Test, folder, interval_s, object};
-use crumple::multibody::Run;
-use crumple::scenario::Prepared;
+use crate::file::{WriteError, write_all_whole};
+use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
+use crate::multibody::Run;
+use crate::scenario::Prepared;
 
 use super::Failure;
 
 /// Writes the run into the folder at `path`, whose name without its extension names the files.
-pub fn write(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), Failure> {
     let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("run");
     let bodies = prepared.chain.bodies();
     if bodies.len() > OBJECTS {

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::file::write_whole;
 use clap::{Command, CommandFactory};
-use crumple::file::write_whole;
 use serde::Serialize;
 
 use super::output;
@@ -15,7 +15,7 @@ use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome};
 #[command(after_help = "Examples:
   crumple completions bash > /etc/bash_completion.d/crumple
   crumple completions zsh > ~/.zfunc/_crumple")]
-pub struct Completions {
+pub(super) struct Completions {
     /// Shell to complete in
     shell: clap_complete::Shell,
 }
@@ -25,7 +25,7 @@ pub struct Completions {
 #[command(after_help = "Examples:
   crumple man | man -l -
   crumple man -o ~/.local/share/man/man1      # then: man crumple-build")]
-pub struct Man {
+pub(super) struct Man {
     /// Folder for crumple.1 and a page of every command, such as crumple-build.1; made if it is
     /// not there
     #[arg(short, long, value_name = "DIR")]
@@ -33,7 +33,7 @@ pub struct Man {
 }
 
 /// The command line's definition, with the options that every command takes under one heading.
-pub fn command() -> Command {
+pub(super) fn command() -> Command {
     let mut command = Cli::command();
     // Makes the commands' own help and version options, which otherwise come too late.
     command.build();
@@ -63,7 +63,7 @@ const ORDER: [(&str, &str); 9] = [
 ];
 
 /// What `crumple` says without arguments, for a terminal of at least 60 columns.
-pub fn short_help() -> String {
+pub(super) fn short_help() -> String {
     let about = Cli::command().get_about().map(ToString::to_string).unwrap_or_default();
     let is_narrow = terminal::error_width().is_some_and(|width| width < 80);
     let about = if is_narrow { about.replacen(" from ", "\nfrom ", 1) } else { about };
@@ -81,18 +81,18 @@ pub fn short_help() -> String {
 }
 
 /// A text of several lines as one.
-pub fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join("; ")
 }
 
-pub fn completions(args: &Completions, options: GlobalOptions) -> CommandResult {
+pub(super) fn completions(args: &Completions, options: GlobalOptions) -> CommandResult {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "crumple", &mut script);
     print(&script, options)
 }
 
-pub fn man(args: &Man, options: GlobalOptions) -> CommandResult {
+pub(super) fn man(args: &Man, options: GlobalOptions) -> CommandResult {
     if let Some(folder) = &args.output {
         return write_pages(folder, options);
     }

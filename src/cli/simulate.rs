@@ -3,10 +3,10 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::file::write_whole;
-use crumple::multibody::{BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2};
-use crumple::scenario::{self, Prepared};
-use crumple::unit::km_per_h;
+use crate::file::write_whole;
+use crate::multibody::{BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2};
+use crate::scenario::{self, Prepared};
+use crate::unit::km_per_h;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -21,7 +21,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple simulate scenario.toml --json > result.json
   crumple simulate scenario.toml -o result.mme      # an ISO-MME folder
   crumple simulate scenario.toml -o - | head        # CSV on standard output")]
-pub struct Args {
+pub(super) struct Args {
     /// Scenario (TOML)
     scenario: PathBuf,
     /// Result as CSV, or as a folder of ISO-MME (.mme); "-" is standard output
@@ -88,7 +88,7 @@ struct InterfaceSummary {
     curve_speed_m_per_s: Option<f64>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = &args.output {
         keep_inputs(&args.scenario, output)?;
         let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));

@@ -1,10 +1,10 @@
 //! What is said of the mass that a crush zone stops.
 
-use crumple::curve::StoppedMass;
-use crumple::unit::SpeedKind;
+use crate::curve::StoppedMass;
+use crate::unit::SpeedKind;
 
 /// How much, over which deflection, and how well the runs agree.
-pub fn said(stopped: &StoppedMass, kind: SpeedKind) -> String {
+pub(super) fn said(stopped: &StoppedMass, kind: SpeedKind) -> String {
     let (end_m, all_kg) = stopped.in_all();
     let of = match kind {
         SpeedKind::Wall => "",

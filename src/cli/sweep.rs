@@ -1,6 +1,6 @@
 //! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
 
-use crumple::plural::counted;
+use crate::plural::counted;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crumple::sweep::{
+use crate::sweep::{
     self, ColumnStatistics, Report, Shard, Sweep, SweepError, VariableSummary, WriteOptions,
 };
 use serde::Serialize;
@@ -34,7 +34,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple sweep scenario.toml --shard 2/3 -o part2.csv
   crumple sweep merge -o results.csv part1.csv part2.csv part3.csv"
 )]
-pub struct Args {
+pub(super) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
     /// Scenario (TOML) with a [sweep] table
@@ -86,7 +86,7 @@ fn shard(text: &str) -> Result<Shard, String> {
 /// Rows that a dry run shows.
 const SHOWN: u64 = 5;
 
-pub fn run(args: &Args, global: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     if let Some(Command::Merge { shards, output }) = &args.command {
         return merge(shards, output, global);
     }
@@ -175,7 +175,7 @@ fn write(
             true => output::print_data(write),
             false => {
                 let device = OpenOptions::new().write(true).open(output);
-                let failed = |source| crumple::file::WriteError::new(output, source);
+                let failed = |source| crate::file::WriteError::new(output, source);
                 Ok(write(&mut device.map_err(failed)?)?)
             }
         }

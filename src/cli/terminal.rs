@@ -8,13 +8,13 @@ use terminal_size::{Width, terminal_size_of};
 const LEAST: usize = 40;
 
 /// Characters in a line of the terminal that standard output is; `None` if it is none.
-pub fn width() -> Option<usize> {
+pub(super) fn width() -> Option<usize> {
     let out = io::stdout();
     out.is_terminal().then(|| stated().or_else(|| size(&out)).unwrap_or(80).max(LEAST))
 }
 
 /// The same of standard error.
-pub fn error_width() -> Option<usize> {
+pub(super) fn error_width() -> Option<usize> {
     let err = io::stderr();
     err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))
 }

@@ -1,19 +1,19 @@
 //! `crumple train`: from a group of the database to a model file.
 
-use crumple::plural::counted;
+use crate::plural::counted;
 use std::iter;
 use std::path::{Path, PathBuf};
 
+use crate::assess::choose::Purpose;
+use crate::assess::validate::{self, Choice};
+use crate::database::Database;
+use crate::forest::{StopRule, Thresholds};
+use crate::surrogate::forest::ForestOptions;
+use crate::surrogate::leave_one_out::Validation;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind};
+use crate::unit::km_per_h;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use crumple::assess::choose::Purpose;
-use crumple::assess::validate::{self, Choice};
-use crumple::database::Database;
-use crumple::forest::{StopRule, Thresholds};
-use crumple::surrogate::forest::ForestOptions;
-use crumple::surrogate::leave_one_out::Validation;
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::surrogate::{CrushLaw, MODELS, Model, ModelKind};
-use crumple::unit::km_per_h;
 use serde::Serialize;
 
 use super::arguments::one_of;
@@ -31,7 +31,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input, stopped_
   crumple train curves.h5 --group lead-car-wall --model nearest -o fdrm.model
 auto fits every model with each speed left out (crumple validate shows the table) and takes the
 simplest of the best. The same seed gives the same bytes, on any number of threads.")]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     /// Group to train on (default: the only one)
@@ -113,7 +113,7 @@ struct Document<'a> {
     training_speeds_m_per_s: Vec<f64>,
     training_hash: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    out_of_bag: Option<crumple::forest::OutOfBag>,
+    out_of_bag: Option<crate::forest::OutOfBag>,
     crush_law: &'a Option<CrushLaw>,
     validation: &'a Option<Validation>,
 }
@@ -156,7 +156,7 @@ impl Args {
     }
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !(args.stop_threshold >= 0.0 && args.stop_threshold.is_finite()) {
         return Err(Failure::Usage(format!(
             "--stop-threshold {} must be 0 or more",

@@ -1,22 +1,22 @@
 //! `crumple validate`: every model at every speed that is left out.
 
-use crumple::plural::counted;
+use crate::plural::counted;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::assess::choose::{NextRun, Purpose, Selection, next_run};
-use crumple::assess::error::ValidateError;
-use crumple::assess::validate::{GroupReport, Report, add_nested, validate};
-use crumple::curve::Case;
-use crumple::database::Database;
-use crumple::dataset::{TrainingSet, is_same_speed};
-use crumple::surrogate::ModelKind;
-use crumple::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
-use crumple::surrogate::leave_one_out::{
+use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
+use crate::assess::error::ValidateError;
+use crate::assess::validate::{GroupReport, Report, add_nested, validate};
+use crate::curve::Case;
+use crate::database::Database;
+use crate::dataset::{TrainingSet, is_same_speed};
+use crate::surrogate::ModelKind;
+use crate::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
+use crate::surrogate::leave_one_out::{
     Floor, LeftOut, Means, PeakError, Scatter, SpeedScatter, Validation,
 };
-use crumple::surrogate::max_crush::MaxCrushRule;
-use crumple::unit::km_per_h;
+use crate::surrogate::max_crush::MaxCrushRule;
+use crate::unit::km_per_h;
 
 use super::output;
 use super::progress::Bar;
@@ -39,7 +39,7 @@ force law and run. FE scatter (floor) is how far a run lies from the mean of sev
 which stands for them: no model can remove this part of an error, though the mean over n runs has
 only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
 model and rule chosen without the speed that is left out.")]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     /// Group to validate (default: all)
@@ -56,7 +56,7 @@ pub struct Args {
     seed: u64,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let groups: Vec<&str> = match &args.group {
         Some(group) => vec![group],
@@ -258,7 +258,7 @@ fn floor(floor: &Floor) -> Vec<String> {
 }
 
 /// The means over the inner speeds, the floors beside them, and the choice.
-pub fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
+pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
         let speeds = first.speeds;

@@ -9,7 +9,7 @@ use crate::unit::SpeedKind;
 
 /// Cases beside each other.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// The case that the others are held against.
     pub reference: String,
     /// One entry per case, the reference first.
@@ -18,7 +18,7 @@ pub struct Comparison {
 
 /// One case, and its differences from the reference; those of values are shares of the reference's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Group of the case.
     pub group: String,
     /// Name of the case.
@@ -63,7 +63,7 @@ const STEPS: usize = 400;
 ///
 /// # Errors
 /// [`EnvelopeError`] if a case has no loading branch.
-pub fn compare(cases: &[&Case]) -> Result<Option<Comparison>, EnvelopeError> {
+pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, EnvelopeError> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;
     let differences: Result<Vec<Difference>, EnvelopeError> = cases

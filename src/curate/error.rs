@@ -7,7 +7,7 @@ use crate::file::{LockError, WriteError};
 
 /// Why nothing was chosen or changed; the databases are as they were.
 #[derive(Debug, thiserror::Error)]
-pub enum CurateError {
+pub(crate) enum CurateError {
     /// A database cannot be read or written.
     #[error(transparent)]
     Database(#[from] DatabaseError),

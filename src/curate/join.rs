@@ -11,7 +11,7 @@ use crate::file::{WriterLock, is_same};
 
 /// What happens to a case whose name another curve has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnConflict {
+pub(crate) enum OnConflict {
     /// Nothing is joined.
     Refuse,
     /// The new case gets another name: `36kmh_2`.
@@ -22,7 +22,7 @@ pub enum OnConflict {
 
 /// What joining did, or would do: cases by where they were, with their databases.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Joined {
+pub(crate) struct Joined {
     /// Cases that were added under their own names.
     pub added: Vec<(PathBuf, CasePath)>,
     /// Cases that are there already, under these names.
@@ -37,7 +37,7 @@ pub struct Joined {
 
 /// Where cases are copied to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Target {
+pub(crate) struct Target {
     /// Another database, which is made if it is not there; the cases' own if absent.
     pub database: Option<PathBuf>,
     /// Their group there; their own if absent.
@@ -50,7 +50,7 @@ pub struct Target {
 /// # Errors
 /// [`CurateError`] if different curves have one name and nothing says what to do, if a group would
 /// have two kinds of speed or force, or a file cannot be read or written.
-pub fn merge(
+pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,
     on_conflict: OnConflict,
@@ -83,7 +83,7 @@ pub fn merge(
 ///
 /// # Errors
 /// As of [`merge`], and if nothing is chosen or a case would be copied to its own place.
-pub fn copy(
+pub(crate) fn copy(
     path: &Path,
     selection: &Selection,
     target: &Target,

@@ -10,7 +10,7 @@ use crate::file::WriterLock;
 
 /// What is added to cases and taken from them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Labels {
+pub(crate) struct Labels {
     /// Tags that they get.
     pub add_tags: Vec<String>,
     /// Tags that they lose.
@@ -102,7 +102,7 @@ impl Labels {
 /// # Errors
 /// [`CurateError`] if nothing is chosen, a text is no tag or note, or one that is to be taken away
 /// is not there.
-pub fn label(
+pub(crate) fn label(
     path: &Path,
     selection: &Selection,
     labels: &Labels,

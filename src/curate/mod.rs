@@ -16,17 +16,27 @@ mod tables;
 use std::path::Path;
 
 use crate::database::Database;
-pub use compare::{Comparison, Difference, compare};
-pub use error::CurateError;
-pub use join::{Joined, OnConflict, Target, copy, merge};
-pub use labels::{Labels, label};
-pub use names::{remove, rename_case, rename_group};
-pub use selection::{Selection, SpeedRange, SpeedRangeError};
-pub use tables::{Tables, write_tables};
+pub(crate) use compare::Difference;
+pub(crate) use compare::compare;
+pub(crate) use error::CurateError;
+pub(crate) use join::Joined;
+pub(crate) use join::OnConflict;
+pub(crate) use join::Target;
+pub(crate) use join::copy;
+pub(crate) use join::merge;
+pub(crate) use labels::Labels;
+pub(crate) use labels::label;
+pub(crate) use names::remove;
+pub(crate) use names::rename_case;
+pub(crate) use names::rename_group;
+pub(crate) use selection::Selection;
+pub(crate) use selection::SpeedRange;
+pub(crate) use tables::Tables;
+pub(crate) use tables::write_tables;
 
 /// Whether a database is changed or only asked what would change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effect {
+pub(crate) enum Effect {
     /// The file is written.
     Written,
     /// It stays as it is.

@@ -12,7 +12,7 @@ use crate::file::WriterLock;
 ///
 /// # Errors
 /// [`CurateError`] if nothing is chosen, or the database cannot be written.
-pub fn remove(
+pub(crate) fn remove(
     path: &Path,
     selection: &Selection,
     effect: Effect,
@@ -29,7 +29,7 @@ pub fn remove(
 ///
 /// # Errors
 /// [`CurateError`] if not just one is chosen, or the name is none or another case's.
-pub fn rename_case(
+pub(crate) fn rename_case(
     path: &Path,
     group: Option<&str>,
     case: &str,
@@ -53,7 +53,11 @@ pub fn rename_case(
 ///
 /// # Errors
 /// [`CurateError`] if there is no such group, or the name is none or another group's.
-pub fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<CasePath>, CurateError> {
+pub(crate) fn rename_group(
+    path: &Path,
+    group: &str,
+    name: &str,
+) -> Result<Vec<CasePath>, CurateError> {
     check("group", name)?;
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read(path)?;

@@ -12,7 +12,7 @@ use crate::unit::{SPEED, UnitError, km_per_h};
 
 /// Which cases; every part that is given narrows the choice, and each value of a part widens it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Selection {
+pub(crate) struct Selection {
     /// Groups; all if empty.
     pub groups: Vec<String>,
     /// Names of cases, or `GROUP/NAME`; all if empty.
@@ -25,7 +25,7 @@ pub struct Selection {
 
 /// Speeds from one to another, both among them, in m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpeedRange {
+pub(crate) struct SpeedRange {
     /// The lowest; 0 if any is.
     pub low_m_per_s: f64,
     /// The highest; infinite if any is.
@@ -34,7 +34,7 @@ pub struct SpeedRange {
 
 /// Why a text is no range of speeds.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SpeedRangeError {
+pub(crate) enum SpeedRangeError {
     /// One of its ends is no speed.
     #[error(transparent)]
     Unit(#[from] UnitError),
@@ -102,7 +102,7 @@ const LISTED: usize = 20;
 
 impl Selection {
     /// Whether it chooses nothing by itself: all cases.
-    pub fn is_all(&self) -> bool {
+    pub(crate) fn is_all(&self) -> bool {
         *self == Self::default()
     }
 
@@ -111,7 +111,7 @@ impl Selection {
     /// # Errors
     /// [`CurateError`] for a group or name that is not there or is in several groups, and if
     /// nothing is chosen; it lists what there is.
-    pub fn find<'a>(
+    pub(crate) fn find<'a>(
         &self,
         path: &Path,
         database: &'a Database,

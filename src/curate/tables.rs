@@ -12,7 +12,7 @@ use crate::file::{WriteError, write_at};
 
 /// Which tables are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tables {
+pub(crate) enum Tables {
     /// `cases.csv` and `curves.csv`, the curves at their common interval.
     Sampled,
     /// Also `originals.csv`, the curves at the solver's rate.
@@ -25,7 +25,7 @@ pub enum Tables {
 ///
 /// # Errors
 /// [`WriteError`] if the folder cannot be made or a table not be written.
-pub fn write_tables(
+pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,
     tables: Tables,

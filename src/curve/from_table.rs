@@ -25,7 +25,7 @@ use crate::signal::resample::interpolate;
 use crate::unit::{Speed, UnitSystem};
 
 /// Study of the cases that were added from files and not built of FE runs.
-pub const IMPORTED: &str = "imported";
+pub(crate) const IMPORTED: &str = "imported";
 
 /// A table of force over deflection.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,15 +5,15 @@
 pub(crate) mod body;
 pub(crate) mod contact;
 pub(crate) mod driving;
-pub mod energy;
+pub(crate) mod energy;
 pub(crate) mod envelope;
-pub mod extract;
-pub mod from_table;
-pub mod loading;
+pub(crate) mod extract;
+pub(crate) mod from_table;
+pub(crate) mod loading;
 pub(crate) mod made_of;
-pub mod recipe;
+pub(crate) mod recipe;
 pub(crate) mod replicates;
-pub mod retrace;
+pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
 
 use std::collections::BTreeMap;
@@ -23,8 +23,27 @@ use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
-pub use driving::{CurveUnloading, DrivingCurve};
-pub use envelope::{Envelope, EnvelopeError};
+pub use driving::CurveUnloading;
+pub use driving::DrivingCurve;
+pub use energy::Impossible;
+pub use energy::audit;
+pub use envelope::Envelope;
+pub use envelope::EnvelopeError;
+pub use extract::input::DeckSpeed;
+pub use extract::input::StatedContact;
+pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
+pub use from_table::FromTable;
+pub use from_table::FromTableError;
+pub use from_table::{Impact, Table, from_table};
+pub use loading::Loading;
+pub use loading::unloading_stiffness;
+pub use recipe::DeflectionSource;
+pub use recipe::DisplacementComponent;
+pub use recipe::Filter;
+pub use recipe::ForceSource;
+pub use recipe::Sampling;
+pub use recipe::{Recipe, RecordedMotion};
+pub use retrace::MotionError;
 pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.

@@ -94,19 +94,19 @@ impl StoppedMass {
     }
 
     /// Whether the runs agree on one.
-    pub fn is_told(&self) -> bool {
+    pub(crate) fn is_told(&self) -> bool {
         self.stopped_kg.iter().any(|&m| m > 0.0)
     }
 
     /// The deflection in m over which mass is stopped, and how much in kg.
-    pub fn in_all(&self) -> (f64, f64) {
+    pub(crate) fn in_all(&self) -> (f64, f64) {
         let all_kg = self.stopped_kg[self.stopped_kg.len() - 1];
         let i = self.stopped_kg.iter().position(|&m| m >= all_kg).unwrap_or(0);
         (self.deflection_m[i], all_kg)
     }
 
     /// Stopped mass in kg at a deflection in m.
-    pub fn at(&self, deflection_m: f64) -> f64 {
+    pub(crate) fn at(&self, deflection_m: f64) -> f64 {
         let (d, m) = (&self.deflection_m, &self.stopped_kg);
         match deflection_m < d[d.len() - 1] {
             true => piecewise::by_share(d, m, piecewise::segment(d, deflection_m), deflection_m),
@@ -115,7 +115,7 @@ impl StoppedMass {
     }
 
     /// `λ`, stopped mass per deflection, in kg/m; beyond the last node 0.
-    pub fn rate_kg_per_m(&self, deflection_m: f64) -> f64 {
+    pub(crate) fn rate_kg_per_m(&self, deflection_m: f64) -> f64 {
         let nodes = &self.deflection_m;
         if deflection_m >= nodes[nodes.len() - 1] {
             return 0.0;

@@ -16,7 +16,7 @@ use crate::signal::resample::interpolate;
 
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// Group of the case.
     pub group: String,
     /// Name of the case.
@@ -35,7 +35,7 @@ pub struct Finding {
 
 /// What a check has found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Checked {
+pub(crate) struct Checked {
     /// Number of cases.
     pub cases: usize,
     /// What was found, in the order of the file.
@@ -46,7 +46,7 @@ pub struct Checked {
 ///
 /// # Errors
 /// [`DatabaseError`] if it cannot be opened, or its groups not be listed.
-pub fn check(path: &Path) -> Result<Checked, DatabaseError> {
+pub(crate) fn check(path: &Path) -> Result<Checked, DatabaseError> {
     // Each has its own bound of bytes, and every dataset is read twice.
     let (raw, decoded) = (layout::open(path)?, layout::open(path)?);
     let mut checked = Checked::default();

@@ -19,12 +19,12 @@ pub(super) struct Item {
 
 impl Item {
     /// The group that it is in; empty if in none.
-    pub fn group(&self) -> &str {
+    pub(super) fn group(&self) -> &str {
         self.place.split_once('/').map_or("", |(group, _)| group)
     }
 
     /// The case that it is in, or might be: nothing is in what is no case.
-    pub fn case(&self) -> Option<CasePath> {
+    pub(super) fn case(&self) -> Option<CasePath> {
         let (group, rest) = self.place.split_once('/')?;
         let (name, _) = rest.split_once('/')?;
         Some(CasePath { group: group.into(), name: name.into() })

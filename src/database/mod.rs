@@ -22,7 +22,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod check;
+pub(crate) mod check;
 mod edit;
 mod foreign;
 mod group;
@@ -62,7 +62,7 @@ pub struct CasePath {
 
 impl CasePath {
     /// The names of a case.
-    pub fn of(case: &Case) -> Self {
+    pub(crate) fn of(case: &Case) -> Self {
         Self { group: case.group.clone(), name: case.name.clone() }
     }
 }

@@ -9,9 +9,13 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-pub use lock::{LockError, WriterLock};
+pub use lock::LockError;
+pub use lock::WriterLock;
+pub use write::WriteError;
+pub(crate) use write::write_all_whole;
+pub use write::write_at;
 pub(crate) use write::write_by_path;
-pub use write::{WriteError, write_all_whole, write_at, write_whole};
+pub(crate) use write::write_whole;
 
 /// What can be read at a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +58,7 @@ fn is_pipe(_: fs::FileType) -> bool {
 ///
 /// # Errors
 /// Where there is no such file, and for folders, devices and pipes, with what to do instead.
-pub fn open(path: &Path) -> io::Result<File> {
+pub(crate) fn open(path: &Path) -> io::Result<File> {
     match kind(path)? {
         Kind::File => File::open(path),
         Kind::Pipe => Err(io::Error::new(
@@ -68,7 +72,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// If it cannot be opened, or is no regular file or pipe; for a longer file its size and the bound.
-pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let size = file.metadata()?.len();
     let mut bytes = Vec::new();
@@ -108,7 +112,7 @@ pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
 }
 
 /// Whether two paths name the same existing file.
-pub fn is_same(a: &Path, b: &Path) -> bool {
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 

@@ -23,7 +23,7 @@ pub struct WriteError {
 
 impl WriteError {
     /// Says of some causes what to do.
-    pub fn new(path: &Path, source: io::Error) -> Self {
+    pub(crate) fn new(path: &Path, source: io::Error) -> Self {
         Self { path: path.into(), is_old_kept: path.is_file(), source: explained(path, source) }
     }
 }
@@ -34,16 +34,16 @@ impl WriteError {
 ///
 /// # Errors
 /// [`WriteError`] names the path; nothing half-written stays behind.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     write_all_whole(&[(path, bytes)])
 }
 
-/// Writes several files as [`write_whole`] does: none is renamed into place before all of
+/// Writes several files as `write_whole` does: none is renamed into place before all of
 /// them are written.
 ///
 /// # Errors
 /// [`WriteError`] names the first path that cannot be written.
-pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
+pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     let mut prepared: Vec<(&Path, Draft)> = Vec::new();
     for (path, bytes) in files {
         let failed = |source| WriteError::new(path, source);
@@ -64,7 +64,7 @@ pub fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// Writes a file as [`write_whole`] does, by a function that fills it at any positions.
+/// Writes a file as `write_whole` does, by a function that fills it at any positions.
 /// Gives back what the function gives; nothing is replaced if that is `None`.
 ///
 /// The content is not forced to the disk: it is derived from a file that is still there.
@@ -86,7 +86,7 @@ pub fn write_at<T>(
     write().map_err(|source| WriteError::new(path, source))
 }
 
-/// Writes a file as [`write_whole`] does, by a function that is given the path of the temporary
+/// Writes a file as `write_whole` does, by a function that is given the path of the temporary
 /// file and may do with it what it likes but remove it.
 ///
 /// # Errors

@@ -13,7 +13,7 @@ const PER_LINE: usize = 4;
 /// Columns of a comment.
 const COMMENT_WIDTH: usize = 200;
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     // mm and N, as of Adams' own default units (MMKS).
     let usual = UnitSystem { length_m: 1e-3, mass_kg: 1e3, time_s: 1.0 };
     let units = options.units.unwrap_or(usual);

@@ -15,7 +15,7 @@ const MOST_ROWS: usize = 200;
 /// Time steps of the deck per state.
 const STEPS: f64 = 10.0;
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
         return Err(ExportError::Unfit { format: "calculix --deck", needs });

@@ -4,7 +4,7 @@ use super::text::{Lines, nine_digits};
 use super::{ExportCurve, ExportError, Exported, Options};
 use crate::unit::{FORCE, LENGTH, UnitSystem};
 
-pub fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
     let units = options.units.unwrap_or(UnitSystem::SI);
     let (length, force) =
         LENGTH.name_of(units.length_m).zip(FORCE.name_of(units.force())).ok_or_else(|| {

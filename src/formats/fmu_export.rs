@@ -7,11 +7,11 @@ use super::{ExportCurve, ExportError, Exported, Options};
 /// Points that an FMU's binary has room for.
 const MOST_POINTS: usize = 4096;
 
-pub fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
     write(curve, options, FmiVersion::Fmi2, "fmi2")
 }
 
-pub fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
     write(curve, options, FmiVersion::Fmi3, "fmi3")
 }
 

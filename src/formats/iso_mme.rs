@@ -10,7 +10,7 @@ use crate::unit::km_per_h;
 
 /// One quantity over time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Channel {
+pub(crate) struct Channel {
     /// Sixteen characters: test object, position, location, dimension, direction, filter class.
     pub code: String,
     /// What it is, in words.
@@ -23,7 +23,7 @@ pub struct Channel {
 
 /// What a folder of channels is of.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Test<'a> {
+pub(crate) struct Test<'a> {
     /// Name of its files.
     pub name: &'a str,
     /// What happened, in one line.
@@ -44,7 +44,7 @@ const EVEN: f64 = 1e-6;
 const OBJECTS: &str = "123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ";
 
 /// The character of the `k`-th body, counted from 0; `None` beyond 35.
-pub fn object(k: usize) -> Option<char> {
+pub(crate) fn object(k: usize) -> Option<char> {
     OBJECTS.chars().nth(k)
 }
 
@@ -93,7 +93,7 @@ pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Exp
 ///
 /// # Errors
 /// [`ExportError::Unfit`] if the times are not even.
-pub fn interval_s(times: &[f64]) -> Result<f64, ExportError> {
+pub(crate) fn interval_s(times: &[f64]) -> Result<f64, ExportError> {
     let steps = times.len().saturating_sub(1).max(1) as f64;
     let interval = (times[times.len() - 1] - times[0]) / steps;
     let uneven = |(i, t): (usize, &f64)| {
@@ -112,7 +112,7 @@ pub fn interval_s(times: &[f64]) -> Result<f64, ExportError> {
 ///
 /// # Errors
 /// [`ExportError::Unfit`] if there are more than 999 channels.
-pub fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, ExportError> {
+pub(crate) fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, ExportError> {
     if channels.len() > 999 {
         let needs = format!("999 channels or fewer, found {}", channels.len());
         return Err(ExportError::Unfit { format: "iso-mme", needs });

@@ -3,7 +3,7 @@
 use super::export_curve::file_stem;
 use super::{ExportError, ExportInput, Exported, Options};
 
-pub fn write(input: &ExportInput, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(input: &ExportInput, options: &Options) -> Result<Exported, ExportError> {
     if options.units.is_some() {
         return Err(ExportError::SiOnly { format: "json" });
     }

@@ -6,7 +6,7 @@
 
 use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     if options.units.is_some() {
         return Err(ExportError::SiOnly { format: "mat" });
     }

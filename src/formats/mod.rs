@@ -8,16 +8,16 @@ mod adams;
 mod calculix;
 mod csv;
 mod export_curve;
-pub mod fmu;
+pub(crate) mod fmu;
 mod fmu_export;
-pub mod iso_mme;
+pub(crate) mod iso_mme;
 mod json;
 mod lsdyna;
 mod mat;
 mod modelica;
 mod onnx;
 mod radioss;
-pub mod read;
+pub(crate) mod read;
 mod table;
 mod tail;
 mod text;
@@ -32,8 +32,20 @@ use crate::surrogate::predict::PredictError;
 use crate::surrogate::{Model, Query};
 use crate::unit::UnitSystem;
 
-pub use export_curve::{ExportCurve, ExportInput, TargetUnloading};
+pub use export_curve::ExportCurve;
+pub use export_curve::ExportInput;
+pub use export_curve::TargetUnloading;
+pub use fmu::FmuError;
+pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
+pub use read::Reader;
+pub use read::curve::Facts;
+pub use read::curve::ReadFile;
+pub use read::error::ContentError;
+pub use read::error::Place;
+pub use read::error::ReadCurveError;
+pub use read::json::CurveFileError;
+pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};
 pub use tail::Tail;
 
 /// One target: its name, its file extensions, how it is written.
@@ -302,7 +314,7 @@ pub enum ExportError {
 pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 
 /// Fewest points that every target takes.
-pub const MIN_POINTS: usize = 4;
+pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
     /// Whether it is made of a whole model, not of its curves.
@@ -316,22 +328,22 @@ impl Format {
     }
 
     /// Whether one file holds both forces of a curve, each with its unloading.
-    pub fn holds_both_forces(&self) -> bool {
+    pub(crate) fn holds_both_forces(&self) -> bool {
         matches!(self.writer, Writer::Whole(_))
     }
 
     /// Whether it can be a complete input of one mass on the spring.
-    pub fn has_deck(&self) -> bool {
+    pub(crate) fn has_deck(&self) -> bool {
         ["lsdyna", "radioss", "calculix"].contains(&self.name)
     }
 
     /// Whether it has several spring materials.
-    pub fn has_materials(&self) -> bool {
+    pub(crate) fn has_materials(&self) -> bool {
         self.name == "lsdyna"
     }
 
     /// Whether its curves can go on beyond the maximal crush.
-    pub fn takes_tail(&self) -> bool {
+    pub(crate) fn takes_tail(&self) -> bool {
         match self.writer {
             Writer::Each(_) | Writer::Together(_) => true,
             Writer::Model(_) => self.name == "table",
@@ -340,12 +352,12 @@ impl Format {
     }
 
     /// Whether a band stands beside its curves.
-    pub fn holds_band(&self) -> bool {
+    pub(crate) fn holds_band(&self) -> bool {
         ["csv", "mat"].contains(&self.name)
     }
 
     /// Whether curves have numbers in it.
-    pub fn has_ids(&self) -> bool {
+    pub(crate) fn has_ids(&self) -> bool {
         self.has_deck() || self.name == "adams"
     }
 
@@ -364,7 +376,11 @@ impl Format {
     ///
     /// # Errors
     /// [`ExportError::Unfit`] if the target does not take cases.
-    pub fn export_cases(&self, cases: &[Case], options: &Options) -> Result<Exported, ExportError> {
+    pub(crate) fn export_cases(
+        &self,
+        cases: &[Case],
+        options: &Options,
+    ) -> Result<Exported, ExportError> {
         let Writer::Case(write) = self.writer else {
             return Err(self.unfit("curves: it has no histories"));
         };
@@ -487,7 +503,7 @@ pub fn by_name(name: &str) -> Result<&'static Format, ExportError> {
 }
 
 /// The names of all formats, for messages.
-pub fn names() -> String {
+pub(crate) fn names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
@@ -495,7 +511,7 @@ pub fn names() -> String {
 ///
 /// # Errors
 /// [`ExportError::NoSuchExtension`] lists the extensions there are.
-pub fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
+pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let known = || {
         let all: Vec<String> =

@@ -22,7 +22,7 @@ const KEYWORDS: &str = "algorithm and block class connect connector constant dis
 /// Numbers per line of an array.
 const PER_LINE: usize = 6;
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     if options.units.is_some() {
         return Err(ExportError::SiOnly { format: "modelica" });
     }

@@ -5,7 +5,7 @@ use crate::forest::OnnxDescription;
 use crate::surrogate::Model;
 
 /// The model's forest: speed and deflection to force, in SI.
-pub fn write(model: &Model, _options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(model: &Model, _options: &Options) -> Result<Exported, ExportError> {
     let Some(forest) = model.forest() else {
         let needs =
             format!("models of --model forest or extra, this is of --model {}", model.name());

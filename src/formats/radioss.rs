@@ -15,7 +15,7 @@ const TITLE_WIDTH: usize = 100;
 /// Uncoupled hardening.
 const HARDENING: u32 = 2;
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
         return Err(ExportError::Unfit { format: "radioss --deck", needs });

@@ -37,7 +37,7 @@ struct Table {
     notes: Vec<String>,
 }
 
-pub fn write(model: &Model, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, ExportError> {
     if options.units.is_some() {
         return Err(ExportError::SiOnly { format: "table" });
     }

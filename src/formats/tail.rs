@@ -40,7 +40,7 @@ const LAST: f64 = 0.1;
 ///
 /// # Errors
 /// [`EnvelopeError`] if forces or deflections are beyond a double.
-pub fn with_tail(
+pub(crate) fn with_tail(
     curve: &Envelope,
     beyond: Option<&Envelope>,
     stiffness_n_per_m: f64,

@@ -3,7 +3,7 @@
 use std::fmt::{Arguments, Write};
 
 /// Nine significant digits in Fortran's form: `3.80000000E+06`.
-pub fn nine_digits(value: f64) -> String {
+pub(crate) fn nine_digits(value: f64) -> String {
     // A negative zero would only puzzle readers.
     let text = format!("{:.8E}", value + 0.0);
     match text.split_once('E') {
@@ -20,7 +20,7 @@ pub fn nine_digits(value: f64) -> String {
 
 /// A title of at most `width` characters that no keyword reader misreads: ASCII, no comma
 /// (some readers then take the line for free format), no `*`, `$`, `/` or `#` in front.
-pub fn title(text: &str, width: usize) -> String {
+pub(crate) fn title(text: &str, width: usize) -> String {
     text.trim_start_matches(['*', '$', '/', '#', ' '])
         .chars()
         .map(|c| if c.is_ascii_graphic() && c != ',' { c } else { ' ' })
@@ -30,17 +30,17 @@ pub fn title(text: &str, width: usize) -> String {
 
 /// A text that grows line by line.
 #[derive(Default)]
-pub struct Lines(String);
+pub(crate) struct Lines(String);
 
 impl Lines {
     /// Adds one line: `lines.add(format_args!("…"))`.
-    pub fn add(&mut self, line: Arguments<'_>) {
+    pub(super) fn add(&mut self, line: Arguments<'_>) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.0, "{line}");
     }
 
     /// The bytes of all lines.
-    pub fn into_bytes(self) -> Vec<u8> {
+    pub(super) fn into_bytes(self) -> Vec<u8> {
         self.0.into_bytes()
     }
 }

@@ -13,7 +13,11 @@ use crate::curve::{Envelope, EnvelopeError};
 ///
 /// # Errors
 /// [`EnvelopeError`] if the result is no envelope.
-pub fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, EnvelopeError> {
+pub(crate) fn thinned(
+    curve: &Envelope,
+    most: usize,
+    kept: usize,
+) -> Result<Envelope, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     if d.len() <= most.max(3) {
         return Ok(curve.clone());
@@ -117,7 +121,7 @@ const KINK: f64 = 0.02;
 ///
 /// # Errors
 /// [`EnvelopeError`] if the result is no envelope.
-pub fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
+pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let widest_m = curve.end_m() / FEWEST as f64;
     let slope = |i: usize| (f[i + 1] - f[i]) / (d[i + 1] - d[i]);
@@ -147,7 +151,7 @@ pub fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
 
 /// What came of making steep flanks less steep.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Softened {
+pub(crate) enum Softened {
     /// There is none that steep.
     Nothing,
     /// The softer curve.
@@ -159,7 +163,7 @@ pub enum Softened {
 /// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
 /// `end`: a too steep flank begins earlier on its line, and the forces around it are raised for what
 /// the flank has lost, by a quarter at most and not in the last twentieth of the deflection.
-pub fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Softened {
+pub(crate) fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Softened {
     if curve.max_slope() <= stiffness_n_per_m * (1.0 + 1e-9) {
         return Softened::Nothing;
     }
@@ -223,7 +227,7 @@ const MOST_RAISED: f64 = 1.25;
 ///
 /// # Errors
 /// [`EnvelopeError`] if the result is no envelope.
-pub fn from_origin(
+pub(crate) fn from_origin(
     curve: &Envelope,
     end: usize,
 ) -> Result<Option<(Envelope, usize)>, EnvelopeError> {

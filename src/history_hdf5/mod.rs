@@ -56,7 +56,7 @@ pub struct Beside<'a> {
 /// # Errors
 /// [`ConvertError`] if the file cannot be read or the output not be written; the output is
 /// then unchanged.
-pub fn convert(
+pub(crate) fn convert(
     input: &Path,
     format: Option<&str>,
     selection: &Selection,
@@ -80,7 +80,7 @@ pub fn convert(
 
 /// Whether a file is HDF5 but no file of histories: a curve database, or of someone else.
 /// What cannot be read as HDF5 to its root counts as such, since a table may be damaged.
-pub fn is_other_hdf5(path: &Path) -> bool {
+pub(crate) fn is_other_hdf5(path: &Path) -> bool {
     let format = match hdf5::open(path) {
         Ok(file) => {
             let attributes = file.root().attrs().ok();

@@ -10,7 +10,7 @@ use crate::formats::read::ReadCurveError;
 
 /// Why nothing was added.
 #[derive(Debug, thiserror::Error)]
-pub enum ImportError {
+pub(crate) enum ImportError {
     /// A file is no curve.
     #[error(transparent)]
     Read(#[from] ReadCurveError),

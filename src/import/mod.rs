@@ -1,4 +1,4 @@
-//! Adding curves of files to a database: each becomes a case of the study [`IMPORTED`].
+//! Adding curves of files to a database: each becomes a case of the study `IMPORTED`.
 //!
 //! All files are read, and all cases made, before anything is written; the database is locked
 //! meanwhile, and written whole.
@@ -17,11 +17,11 @@ use crate::database::Database;
 use crate::file::WriterLock;
 use crate::formats::read::ReadOptions;
 use crate::unit::SpeedKind;
-pub use error::ImportError;
+pub(crate) use error::ImportError;
 
 /// One file that is to become a case, and what is said of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Item {
+pub(crate) struct Item {
     /// The file, or an ISO-MME test's folder.
     pub path: PathBuf,
     /// Name of the case; the file's, without its extension, if absent.
@@ -32,7 +32,7 @@ pub struct Item {
 
 /// What is said of all files that are added at once.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Group of the database.
     pub group: String,
     /// What speeds are measured against; the file's if absent, else the group's.
@@ -58,7 +58,11 @@ pub struct Settings {
 ///
 /// # Errors
 /// [`ImportError`] names the file and what to do; the database is then unchanged.
-pub fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, ImportError> {
+pub(crate) fn add(
+    path: &Path,
+    items: &[Item],
+    settings: &Settings,
+) -> Result<Vec<Case>, ImportError> {
     let _lock = WriterLock::take(path)?;
     let mut database = match path.try_exists().unwrap_or(true) {
         true => Database::read(path)?,
@@ -92,7 +96,7 @@ pub fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>
 ///
 /// # Errors
 /// [`ImportError`] names the file and what to do.
-pub fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, ImportError> {
+pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, ImportError> {
     case::of(item, settings, None)
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Said {
 impl Said {
     /// What is stated wins, and a warning says where the file differs. `group`: a case that is
     /// there, whose kind of speed holds where nothing else says it.
-    pub fn of(
+    pub(super) fn of(
         item: &Item,
         settings: &Settings,
         curve: &ReadCurve,

@@ -18,7 +18,7 @@ pub enum Evidence {
 
 impl Evidence {
     /// `read`, `computed`, …: the word that stands for it in a proposal.
-    pub fn word(&self) -> &'static str {
+    pub(crate) fn word(&self) -> &'static str {
         match self {
             Self::Given(_) => "given",
             Self::Read(_) => "read",
@@ -28,7 +28,7 @@ impl Evidence {
     }
 
     /// What the value was taken or made from.
-    pub fn from(&self) -> &str {
+    pub(crate) fn from(&self) -> &str {
         let (Self::Given(from) | Self::Read(from) | Self::Computed(from) | Self::Guessed(from)) =
             self;
         from
@@ -62,7 +62,7 @@ pub enum Proposed<T> {
 
 impl<T> Proposed<T> {
     /// The value, if there is one.
-    pub fn value(&self) -> Option<&T> {
+    pub(crate) fn value(&self) -> Option<&T> {
         match self {
             Self::Found { value, .. } => Some(value),
             Self::Missing { .. } => None,

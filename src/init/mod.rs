@@ -33,20 +33,25 @@ use std::path::Path;
 
 pub use agree::Alternative;
 pub use error::InitError;
-pub use evidence::{Evidence, Proposed};
-pub use given::{Given, GivenForce, NoForce};
-pub use left_out::{LeftOut, Reason};
-pub use proposal::{Proposal, ProposedRun};
-pub use propose::{Request, propose};
-pub use scenario::{
-    ProposedCurve, ProposedTrain, ProposedVehicle, ScenarioProposal, propose_scenario,
-};
+pub use evidence::Evidence;
+pub use evidence::Proposed;
+pub use given::Given;
+pub use given::GivenForce;
+pub use given::NoForce;
+pub use left_out::LeftOut;
+pub use left_out::Reason;
+pub use proposal::Proposal;
+pub use proposal::ProposedRun;
+pub use propose::Request;
+pub use propose::propose;
+pub(crate) use scenario::ScenarioProposal;
+pub(crate) use scenario::propose_scenario;
 
 /// Refuses a file that is there already.
 ///
 /// # Errors
 /// [`InitError::Exists`]; a device or a pipe may be written to.
-pub fn refuse_existing(path: &Path) -> Result<(), InitError> {
+pub(crate) fn refuse_existing(path: &Path) -> Result<(), InitError> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
     match is_there {

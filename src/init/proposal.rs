@@ -81,7 +81,7 @@ pub struct ProposedRun {
 
 impl Proposal {
     /// What is left to fill in before the study can be built.
-    pub fn missing(&self) -> Vec<String> {
+    pub(crate) fn missing(&self) -> Vec<String> {
         let mut missing = Vec::new();
         let mut add = |key: String, why: Option<&str>| {
             if let Some(why) = why {

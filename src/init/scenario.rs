@@ -23,7 +23,7 @@ const MASSES: [&str; 2] = ["mass_kg", "other_mass_kg"];
 
 /// A proposed scenario.
 #[derive(Clone, Debug, Serialize)]
-pub struct ScenarioProposal {
+pub(crate) struct ScenarioProposal {
     /// Between the noses or nose and wall, then that between the vehicles of a train.
     pub curves: Vec<ProposedCurve>,
     /// Two trains, or one if it meets a wall.
@@ -38,7 +38,7 @@ pub struct ScenarioProposal {
 
 /// A curve of a proposed scenario.
 #[derive(Clone, Debug, Serialize)]
-pub struct ProposedCurve {
+pub(crate) struct ProposedCurve {
     /// Its name in the scenario.
     pub name: &'static str,
     /// Model file as the scenario names it.
@@ -55,7 +55,7 @@ pub struct ProposedCurve {
 
 /// A train of a proposed scenario.
 #[derive(Clone, Debug, Serialize)]
-pub struct ProposedTrain {
+pub(crate) struct ProposedTrain {
     /// Its name.
     pub name: &'static str,
     /// Its speed in m/s.
@@ -66,7 +66,7 @@ pub struct ProposedTrain {
 
 /// A vehicle of a proposed train.
 #[derive(Clone, Debug, Serialize)]
-pub struct ProposedVehicle {
+pub(crate) struct ProposedVehicle {
     /// Its name.
     pub name: String,
     /// Its mass in kg.
@@ -77,7 +77,10 @@ pub struct ProposedVehicle {
 ///
 /// # Errors
 /// [`InitError`] if a model cannot be read, or they make no scenario.
-pub fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<ScenarioProposal, InitError> {
+pub(crate) fn propose_scenario(
+    models: &[PathBuf],
+    path: &Path,
+) -> Result<ScenarioProposal, InitError> {
     if !(1..=2).contains(&models.len()) {
         return Err(InitError::Models { found: models.len() });
     }
@@ -200,7 +203,7 @@ fn duration(nose: &Model, inner: Option<&Model>) -> Proposed<f64> {
 
 impl ScenarioProposal {
     /// The proposal as the text of a scenario.
-    pub fn to_toml(&self) -> String {
+    pub(crate) fn to_toml(&self) -> String {
         let mut text = Text::default();
         text.comment("Proposed by crumple init: masses and speeds are those of the models' runs. Put your own trains in their place; the speed must stay within the training speeds. Then: crumple simulate");
         self.missing.iter().for_each(|what| text.item(&format!("fill in {what}")));

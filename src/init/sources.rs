@@ -206,6 +206,6 @@ fn deck_of(folder: &Path) -> Option<(PathBuf, Box<Deck>)> {
         Search::One(path) => Some(path),
         Search::None | Search::Several(_) => None,
     })?;
-    let deck = decks::read(&found).ok()?;
+    let deck = decks::read_deck(&found).ok()?;
     Some((found, Box::new(deck)))
 }

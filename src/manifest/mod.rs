@@ -38,7 +38,7 @@ pub enum ManifestError {
 
 impl ManifestError {
     /// Where in the file it is wrong.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         match self {
             Self::Io { .. } => None,
             Self::Toml { place, .. } => Some(place),

@@ -62,23 +62,23 @@ impl Place {
     }
 
     /// The file.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Line in the file, counted from 1.
-    pub fn line(&self) -> Option<usize> {
+    pub(crate) fn line(&self) -> Option<usize> {
         self.spot.as_ref().map(|spot| spot.line)
     }
 
     /// Column in the line, in characters counted from 1.
-    pub fn column(&self) -> Option<usize> {
+    pub(crate) fn column(&self) -> Option<usize> {
         self.spot.as_ref().map(|spot| spot.before + 1)
     }
 
     /// The line with its number, and below it carets under the place: lines of at most `width`
     /// characters (40 or more), for which a longer line is cut on both sides.
-    pub fn excerpt(&self, width: usize) -> Option<String> {
+    pub(crate) fn excerpt(&self, width: usize) -> Option<String> {
         let spot = self.spot.as_ref()?;
         let number = spot.line.to_string();
         let room = width.max(40) - number.len() - 3;

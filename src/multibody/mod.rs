@@ -33,18 +33,36 @@ mod reference;
 mod rows;
 mod run;
 
-pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2};
-pub use chain::{ChainError, Tension};
-pub use crush::{RateFactor, Stopping};
-pub use damping::{Damping, DampingError};
+pub use chain::Body;
+pub use chain::Chain;
+pub use chain::ChainError;
+pub use chain::Interface;
+pub use chain::Resistance;
+pub use chain::STANDARD_GRAVITY_M_PER_S2;
+pub use chain::Tension;
+pub use crush::RateFactor;
+pub use crush::Stopping;
+pub use damping::Damping;
+pub use damping::DampingError;
 pub use driven::UnloadingChoice;
-pub use law::{EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingShape};
+pub use law::EnvelopeEnd;
+pub use law::ForceLaw;
+pub use law::LawTables;
+pub use law::Unloading;
+pub use law::UnloadingShape;
 pub use ledger::Ledger;
-pub use run::InterfaceHistory;
-pub use run::{BodyHistory, Method, Record, Run, RunSettings, RunWarning, SimulationError};
+pub use run::BodyHistory;
+pub use run::Method;
+pub use run::Record;
+pub use run::Run;
+pub use run::RunSettings;
+pub use run::RunWarning;
+pub use run::SimulationError;
 
 use engine::Scheme;
+pub use law::tables::MemoryTables;
 use run::Grid;
+pub use run::InterfaceHistory;
 
 /// A curve's own run ends where the curve does, but for rounding.
 const AT_END_M: f64 = 1e-4;

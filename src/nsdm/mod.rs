@@ -40,10 +40,13 @@ use crate::signal::l1_ratio;
 use crate::stream::Stream;
 pub use error::NsdmError;
 use genes::{Genes, Scales};
-pub use law::{Nsdm, PiecewiseLinear};
+pub use law::Nsdm;
+pub use law::PiecewiseLinear;
 pub use motion::Motion;
 use motion::Steps;
-pub use spread::{Identifiability, LawSpread, Range};
+pub use spread::Identifiability;
+pub use spread::LawSpread;
+pub use spread::Range;
 
 /// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];

@@ -14,7 +14,8 @@ use serde::Deserialize;
 use crate::unit::{LENGTH, MASS, SPEED};
 use draw::Distribution;
 pub use draw::DistributionError;
-pub use error::{PlanError, VaryError};
+pub use error::PlanError;
+pub use error::VaryError;
 
 /// More items than any cluster could run; keeps a mistyped number from passing.
 pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;

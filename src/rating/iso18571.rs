@@ -71,7 +71,7 @@ impl Grade {
     }
 
     /// The word in files and tables.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Excellent => "excellent",
             Self::Good => "good",

@@ -27,13 +27,13 @@
 
 pub(crate) mod cora;
 pub(crate) mod corridor;
-pub mod deceleration;
+pub(crate) mod deceleration;
 pub(crate) mod differences;
-pub mod iso18571;
-pub mod magnitude_phase;
+pub(crate) mod iso18571;
+pub(crate) mod magnitude_phase;
 pub(crate) mod shift;
 mod signal;
-pub mod table;
+pub(crate) mod table;
 pub(crate) mod warping;
 
 use schemars::JsonSchema;
@@ -43,13 +43,18 @@ use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
 pub use cora::Cora;
 use cora::cora;
-use deceleration::Deceleration;
-pub use differences::{MaxAbs, Pointwise};
+pub use deceleration::Deceleration;
+pub use differences::MaxAbs;
+pub use differences::Pointwise;
 use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
-use iso18571::{Iso18571, iso18571};
-use magnitude_phase::{MagnitudePhase, russell, sprague_geers};
+pub use iso18571::Grade;
+pub use iso18571::Iso18571;
+use iso18571::iso18571;
+pub use magnitude_phase::MagnitudePhase;
+use magnitude_phase::{russell, sprague_geers};
+pub use signal::Signal;
+pub use signal::SignalError;
 pub(crate) use signal::{INTERVAL_S, Pair};
-pub use signal::{Signal, SignalError};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -64,7 +69,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// Tells an acceleration by a column's name: `x_acceleration[900001]`, `a_m_per_s2[A1]`.
-    pub fn named(column: &str) -> Self {
+    pub(crate) fn named(column: &str) -> Self {
         let column = column.to_ascii_lowercase();
         let is_acceleration = column.contains("acceleration") || column.starts_with("a_m_per_s2");
         if is_acceleration { Self::Acceleration } else { Self::Other }

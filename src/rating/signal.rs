@@ -163,7 +163,7 @@ impl Signal {
     }
 
     /// First and last time, in s.
-    pub fn range_s(&self) -> (f64, f64) {
+    pub(crate) fn range_s(&self) -> (f64, f64) {
         (self.time_s[0], self.time_s[self.time_s.len() - 1])
     }
 

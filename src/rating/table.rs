@@ -7,7 +7,7 @@ use crate::table::{CsvTable, NoNumber};
 
 /// Columns of a table that hold a signal: its times as they stand, and its values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Columns {
+pub(crate) struct Columns {
     /// Name of the time's column.
     pub time_name: String,
     /// Name of the values' column.
@@ -20,7 +20,7 @@ pub struct Columns {
 
 /// Why a table holds no signal. Lines and columns count from 1.
 #[derive(Debug, thiserror::Error)]
-pub enum TableError {
+pub(crate) enum TableError {
     /// The text is no table.
     #[error("{0}")]
     Csv(#[from] csv::Error),
@@ -116,7 +116,7 @@ pub enum TableError {
 ///
 /// # Errors
 /// [`TableError`] with line and column.
-pub fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, TableError> {
+pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, TableError> {
     let mut text = Vec::new();
     source.read_to_end(&mut text).map_err(csv::Error::from)?;
     let mut table = CsvTable::open(&text, 0)?;

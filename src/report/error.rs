@@ -6,7 +6,7 @@ use crate::scenario::ScenarioError;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
-pub enum ReportError {
+pub(crate) enum ReportError {
     /// A group is not there.
     #[error("{0}")]
     Database(#[from] DatabaseError),

@@ -11,7 +11,7 @@ mod page;
 mod text;
 mod train;
 
-pub use error::ReportError;
+pub(crate) use error::ReportError;
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ use crate::surrogate::Model;
 
 /// What a report is about.
 #[derive(Clone, Debug)]
-pub struct ReportSettings {
+pub(crate) struct ReportSettings {
     /// Title of the page; the database's name if absent.
     pub title: Option<String>,
     /// Groups of the database; all if empty.
@@ -40,7 +40,7 @@ pub struct ReportSettings {
 
 /// At which left-out speeds the methods are compared: each takes about half a second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MethodSpeeds {
+pub(crate) enum MethodSpeeds {
     /// At none; trains are not held against FE either.
     None,
     /// Where the chosen model has its largest error.
@@ -133,7 +133,7 @@ impl Content {
 ///
 /// # Errors
 /// [`ReportError`] for a group that is not there, one that makes no table, or a scenario that does not run.
-pub fn report(
+pub(crate) fn report(
     path: &Path,
     database: &Database,
     scenarios: &[PathBuf],

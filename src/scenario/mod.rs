@@ -42,13 +42,14 @@ use std::path::Path;
 
 pub use assemble::AssemblyError;
 pub(crate) use assemble::{PLATES, adjust};
-pub use check::{CheckError, CheckedScenario};
-pub use end::PlatesError;
+pub use check::CheckError;
+pub use check::CheckedScenario;
 pub(crate) use local::assemble;
+pub use sources::SourceError;
+pub use sources::StageError;
 pub(crate) use sources::{CurveSource, Sources};
-pub use sources::{SourceError, StageError};
 pub use spring::SpringError;
-pub use tables::*;
+pub(crate) use tables::*;
 
 use crate::database::DatabaseError;
 use crate::formats::read::{ReadCurveError, json};
@@ -56,7 +57,25 @@ use crate::manifest::{self, Document, ManifestError, Place};
 use crate::multibody::{Chain, ChainError, Run, RunSettings, SimulationError, simulate};
 use crate::surrogate::ModelError;
 use crate::surrogate::predict::PredictError;
+pub use end::PlatesError;
 use place::Origin;
+pub use tables::ContactTable;
+pub use tables::CrushZoneTable;
+pub use tables::CurveTable;
+pub use tables::DampingTable;
+pub use tables::EndName;
+pub use tables::InterfaceSpeed;
+pub use tables::LawName;
+pub use tables::LimitsTable;
+pub use tables::MethodName;
+pub use tables::ReferenceTable;
+pub use tables::ResistanceTable;
+pub use tables::RunTable;
+pub use tables::Scenario;
+pub use tables::StageTable;
+pub use tables::TrainTable;
+pub use tables::VehicleTable;
+pub use tables::WallTable;
 
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
@@ -179,7 +198,7 @@ pub enum ScenarioError {
 
 impl ScenarioError {
     /// Where in the scenario it is wrong.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         match self {
             Self::Manifest(error) => error.place(),
             Self::Check { place, .. }
@@ -215,7 +234,7 @@ pub enum SourceFileError {
 ///
 /// # Errors
 /// [`ScenarioError`] names the key.
-pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
+pub(crate) fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
     let scenario: Scenario = manifest::parse(path, text)?;
     let document = Document::new(path, text);
     let checked = scenario.check().map_err(|source| {

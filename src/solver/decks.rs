@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::lsdyna::deck::{self, Deck, Interface, Named};
+use super::lsdyna::deck::{self, Deck, DeckInterface, TitledEntity};
 use super::lsdyna::line::Lines;
 use super::{Entity, ReadError, SolverFile, source};
 use crate::file;
@@ -20,7 +20,7 @@ const HEAD: usize = 16;
 const HEAD_LINES: usize = 1_000;
 
 /// What a folder has of decks.
-pub enum Search {
+pub(crate) enum Search {
     /// It has no deck.
     None,
     /// The only deck, or the one that includes the others.
@@ -33,7 +33,7 @@ pub enum Search {
 ///
 /// # Errors
 /// [`ReadError::Io`] if the deck itself cannot be read.
-pub fn read(path: &Path) -> Result<Deck, ReadError> {
+pub fn read_deck(path: &Path) -> Result<Deck, ReadError> {
     Ok(read_with_includes(path)?.0)
 }
 
@@ -57,19 +57,19 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Re
     if let Some(what) = source::encoded(&head[..head.len().min(HEAD)]) {
         return Err(io(std::io::Error::other(what)));
     }
-    let deck = deck::read(&mut file, &mut open).map_err(io)?;
+    let deck = deck::parse_deck(&mut file, &mut open).map_err(io)?;
     Ok((deck, included))
 }
 
 /// The files that a deck itself includes.
 fn includes(path: &Path) -> Vec<deck::Include> {
     let Ok(file) = file::open(path) else { return Vec::new() };
-    let read = deck::read(&mut BufReader::new(file), &mut |_| None);
+    let read = deck::parse_deck(&mut BufReader::new(file), &mut |_| None);
     read.map(|deck| deck.includes).unwrap_or_default()
 }
 
 /// Looks for the main deck in a folder: the one that no other of the folder includes.
-pub fn find(folder: &Path) -> Search {
+pub(crate) fn find(folder: &Path) -> Search {
     let Ok(entries) = folder.read_dir() else { return Search::None };
     let mut candidates: Vec<PathBuf> = entries
         .filter_map(Result::ok)
@@ -97,10 +97,10 @@ pub fn find(folder: &Path) -> Search {
 }
 
 /// The only deck beside the file at `path`, or the one that includes the others, if it can be read.
-pub fn beside(path: &Path) -> Option<(PathBuf, Deck)> {
+pub(crate) fn beside(path: &Path) -> Option<(PathBuf, Deck)> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match find(folder) {
-        Search::One(path) => read(&path).ok().map(|deck| (path, deck)),
+        Search::One(path) => read_deck(&path).ok().map(|deck| (path, deck)),
         Search::None | Search::Several(_) => None,
     }
 }
@@ -125,16 +125,16 @@ fn is_deck(path: &Path) -> bool {
 }
 
 /// Fills titles that a file does not give itself from the deck; how many.
-pub fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
+pub(crate) fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
     fill_entity_titles(&file.section, &mut file.entities, deck)
 }
 
 /// The same for the entities of a section.
 pub(crate) fn fill_entity_titles(section: &str, entities: &mut [Entity], deck: &Deck) -> usize {
-    let named = |list: &[Named]| -> Vec<(i64, Option<String>)> {
+    let named = |list: &[TitledEntity]| -> Vec<(i64, Option<String>)> {
         list.iter().map(|n| (n.id, n.title.clone())).collect()
     };
-    let interfaces = |list: &[Interface]| -> Vec<(i64, Option<String>)> {
+    let interfaces = |list: &[DeckInterface]| -> Vec<(i64, Option<String>)> {
         list.iter().filter_map(|n| Some((n.id?, n.title.clone()))).collect()
     };
     let titles = match section.split('/').next().unwrap_or_default() {

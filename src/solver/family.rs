@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// The files that are read together with `path`, itself first: of a binary file its
 /// continuations `name%001`, `name%002`, … as far as they follow each other, and with
 /// `binout0000` the files `binout0001`, … that other processes of the run wrote.
-pub fn family(path: &Path) -> Vec<PathBuf> {
+pub(crate) fn family(path: &Path) -> Vec<PathBuf> {
     let mut parts = with_continuations(path);
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let Some(number) = process_number(&name) else { return parts };

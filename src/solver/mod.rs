@@ -22,39 +22,56 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod decks;
+pub(crate) mod decks;
 mod detect;
 mod error;
 mod family;
 mod format;
-pub mod lsdyna;
+pub(crate) mod lsdyna;
 mod openradioss;
 mod problem;
 mod restart;
-pub mod runs;
+pub(crate) mod runs;
 mod selection;
 mod solver_file;
-pub mod source;
+pub(crate) mod source;
 mod states;
 mod zeros;
 
 use std::path::{Path, PathBuf};
 
+pub use decks::read_deck;
 use detect::{check_format, detect, files_in};
 pub use error::ReadError;
 use error::check_selection;
 pub(crate) use error::entity_word;
-pub use family::family;
+pub(crate) use family::family;
 use family::missing_continuation;
+pub use format::FORMATS;
+pub use format::Format;
 pub(crate) use format::format_names;
 use format::named;
-pub use format::{FORMATS, Format};
-pub use lsdyna::nodout::{Blocks, Column};
-pub use problem::{Problem, ProblemCode};
-pub use selection::{Selection, WantedId};
-pub use solver_file::{Entity, NoDataReason, SolverFile, WithoutData};
+pub use lsdyna::deck::contents::DeckPlace;
+pub use lsdyna::deck::contents::ImpactSpeed;
+pub use lsdyna::deck::contents::Include;
+pub use lsdyna::deck::contents::InitialVelocity;
+pub use lsdyna::deck::contents::Output;
+pub use lsdyna::deck::contents::Scope;
+pub use lsdyna::deck::contents::StatedUnits;
+pub use lsdyna::deck::parameters::Value;
+pub use lsdyna::deck::{Deck, DeckInterface, TitledEntity, parse_deck};
+pub use lsdyna::nodout::Blocks;
+pub use lsdyna::nodout::blocks::Column;
+pub use problem::Problem;
+pub use problem::ProblemCode;
+pub use selection::Selection;
+pub use selection::WantedId;
+pub use solver_file::Entity;
+pub use solver_file::NoDataReason;
+pub use solver_file::SolverFile;
+pub use solver_file::WithoutData;
 pub use source::Access;
-use source::Source;
+pub use source::{Source, Window};
 
 /// Reads the selected histories of the file at `path`, of one section.
 ///

@@ -18,7 +18,7 @@ const MOST_NAMES: usize = 100_000;
 
 /// What stands below a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RunFolders {
+pub(crate) struct RunFolders {
     /// Folders with solver files, in order of their names; nothing below them is looked at.
     pub runs: Vec<PathBuf>,
     /// Folders that hold neither solver files nor folders, likewise.
@@ -33,7 +33,7 @@ pub struct RunFolders {
 ///
 /// # Errors
 /// If there is no such folder, or it cannot be read.
-pub fn run_folders(root: &Path) -> io::Result<RunFolders> {
+pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
     if !fs::metadata(root)?.is_dir() {
         let message = "this is no folder: give a run's folder, or one above runs";
         return Err(io::Error::new(io::ErrorKind::NotADirectory, message));
@@ -48,7 +48,7 @@ pub fn run_folders(root: &Path) -> io::Result<RunFolders> {
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = folder
         .read_dir()?
         .take(MOST_NAMES)
@@ -70,7 +70,7 @@ const MOST_OPENED: usize = 50;
 
 /// The first file of a folder that holds what a solver writes under another name, and that name:
 /// a run whose files were renamed.
-pub fn renamed_file(folder: &Path) -> Option<(PathBuf, &'static str)> {
+pub(crate) fn renamed_file(folder: &Path) -> Option<(PathBuf, &'static str)> {
     let mut files: Vec<PathBuf> = folder
         .read_dir()
         .ok()?

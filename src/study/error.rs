@@ -27,7 +27,7 @@ pub enum StudyError {
 
 impl StudyError {
     /// Where in the manifest it is wrong.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         match self {
             Self::Manifest(error) => error.place(),
             Self::Invalid { place, .. } => Some(place),

@@ -59,7 +59,7 @@ pub enum StudyKind {
 
 impl StudyKind {
     /// As a manifest has it: `wall` or `pair`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Wall => "wall",
             Self::Pair => "pair",

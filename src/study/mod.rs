@@ -20,9 +20,15 @@ use crate::curve::extract::{Stated, StatedContact};
 use crate::manifest::{self as toml_file, Document};
 use crate::unit::SpeedKind;
 pub use check::InvalidStudy;
-pub use error::{RunError, StudyError};
+pub use error::RunError;
+pub use error::StudyError;
 pub(crate) use locate::LocatedRun;
-pub use manifest::{Head, Manifest, NoSign, RunEntry, Sign, StudyKind};
+pub use manifest::Head;
+pub use manifest::Manifest;
+pub use manifest::NoSign;
+pub use manifest::RunEntry;
+pub use manifest::Sign;
+pub use manifest::StudyKind;
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

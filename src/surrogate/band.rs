@@ -32,7 +32,7 @@ pub(crate) const LEVEL: f64 = 0.9;
 /// Half width, as a share of the curve's end, over which the force's level is averaged.
 const WINDOW: f64 = 0.05;
 /// Between training speeds errors grow with this power of the gap.
-pub const POWER_OF_GAP: f64 = 0.65;
+pub(crate) const POWER_OF_GAP: f64 = 0.65;
 /// Bands wider than this are damage, not measurement.
 const WIDEST: f64 = 1e6;
 

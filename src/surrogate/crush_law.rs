@@ -163,11 +163,11 @@ pub(super) mod made {
     use super::*;
     use crate::curve::stopped_mass::LoadingRun;
 
-    pub const MASS_KG: f64 = 20e3;
+    pub(crate) const MASS_KG: f64 = 20e3;
 
     /// A run's loading, by deflection.
     #[derive(Default)]
-    pub struct Motion {
+    pub(crate) struct Motion {
         pub deflection_m: Vec<f64>,
         pub contact_n: Vec<f64>,
         pub body_n: Vec<f64>,
@@ -175,7 +175,7 @@ pub(super) mod made {
     }
 
     /// `Q` a wave, β = 0.06, and 300 kg stopped evenly in the first 100 mm.
-    pub fn motion(speed_m_per_s: f64) -> Motion {
+    pub(crate) fn motion(speed_m_per_s: f64) -> Motion {
         let (beta, step) = (0.06, 5e-5);
         let (mut d, mut u, mut stopped) = (0.0_f64, speed_m_per_s, 0.0_f64);
         let mut motion = Motion::default();
@@ -195,13 +195,13 @@ pub(super) mod made {
         motion
     }
 
-    pub fn made(speed_m_per_s: f64) -> CaseCurve {
+    pub(crate) fn made(speed_m_per_s: f64) -> CaseCurve {
         let Motion { deflection_m, contact_n, closing_m_per_s, .. } = motion(speed_m_per_s);
         CaseCurve::new(speed_m_per_s, vec![], deflection_m, contact_n, closing_m_per_s).unwrap()
     }
 
     /// The law of made runs.
-    pub fn law(cases: &[CaseCurve], mass_kg: f64) -> CrushLaw {
+    pub(crate) fn law(cases: &[CaseCurve], mass_kg: f64) -> CrushLaw {
         let run = |case: &CaseCurve| {
             let contact_n = case.envelope().clone();
             let d = contact_n.deflection_m().to_vec();

@@ -4,31 +4,31 @@
 //! training curves alone (`nearest`, `linear`, `registered`) hold nothing else; the curves stand once in the model file, over even
 //! deflections.
 
-pub mod band;
+pub(crate) mod band;
 mod blend;
 mod cached;
 mod cases;
-pub mod crush_law;
+pub(crate) mod crush_law;
 mod crush_law_model;
 pub(crate) mod curves;
 mod entry;
 mod extra;
-pub mod forest;
+pub(crate) mod forest;
 mod forest_options;
 mod landmarks;
-pub mod leave_one_out;
+pub(crate) mod leave_one_out;
 mod linear;
-pub mod max_crush;
+pub(crate) mod max_crush;
 mod model;
 mod model_file;
 pub(crate) mod models;
 mod nearest;
-pub mod predict;
+pub(crate) mod predict;
 mod predict_error;
 pub(crate) mod predicted;
 mod query;
 mod rate;
-pub mod recorded;
+pub(crate) mod recorded;
 mod registered;
 mod spikes;
 pub(crate) mod warning;
@@ -37,15 +37,37 @@ use std::fmt::Debug;
 
 use serde_json::value::RawValue;
 
+pub use band::Band;
+pub use band::LeftOutSpeeds;
+pub use band::ScatterWidths;
 pub use cases::ModelCase;
 pub use crush_law::CrushLaw;
 pub(crate) use curves::CaseCurve;
 pub use entry::ModelEntry;
-pub use model::{Model, ModelError};
-pub use models::{MODELS, ModelKind};
-pub use predict::{PredictedCurve, Query, predict};
+pub use forest::ForestOptions;
+pub use forest::ForestSurrogate;
+pub use leave_one_out::BodyScatter;
+pub use leave_one_out::Floor;
+pub use leave_one_out::PeakError;
+pub use leave_one_out::SpeedScatter;
+pub use leave_one_out::{LeftOut, Means, Scatter, Validation};
+pub use max_crush::MaxCrush;
+pub use max_crush::MaxCrushRule;
+pub use model::Model;
+pub use model::ModelError;
+pub(crate) use models::MODELS;
+pub use models::ModelKind;
+pub use predict::Beyond;
+pub use predict::PredictedCurve;
+pub use predict::Query;
+pub use predict::predict;
+pub use predict::{predict_beyond, predict_driving};
 pub use predict_error::PredictError;
-pub use warning::{Warning, WarningCode};
+pub use predicted::ForestQuantiles;
+pub use predicted::Provenance;
+pub use predicted::Rebound;
+pub use warning::Warning;
+pub use warning::WarningCode;
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]

@@ -252,7 +252,7 @@ impl Model {
         }
     }
 
-    /// Its name, as of [`MODELS`].
+    /// Its name, as of `MODELS`.
     pub fn name(&self) -> &'static str {
         self.kind.name()
     }

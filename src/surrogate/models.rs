@@ -1,17 +1,17 @@
-//! The models that can be trained: one line each in [`MODELS`].
+//! The models that can be trained: one line each in `MODELS`.
 
 use crate::guess;
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub use super::entry::ModelEntry;
+pub(crate) use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
 use super::{crush_law_model, extra, forest, linear, nearest, rate, registered};
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
 /// line here.
-pub const MODELS: &[ModelEntry] = &[
+pub(crate) const MODELS: &[ModelEntry] = &[
     nearest::ENTRY,
     linear::ENTRY,
     rate::ENTRY,
@@ -42,7 +42,7 @@ impl ModelKind {
         Self { entry, forest: entry.forest.map(|options| ForestOptions { seed, ..options() }) }
     }
 
-    /// Every model, in the order of [`MODELS`].
+    /// Every model, in the order of `MODELS`.
     pub fn all(seed: u64) -> Vec<Self> {
         MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
     }

@@ -24,8 +24,10 @@ use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{grid, nearest};
 
-pub use super::predict_error::PredictError;
-pub use super::predicted::{ForestQuantiles, PredictedCurve, Provenance, Rebound};
+pub(crate) use super::predict_error::PredictError;
+pub(crate) use super::predicted::ForestQuantiles;
+pub use super::predicted::PredictedCurve;
+pub(crate) use super::predicted::Provenance;
 pub use super::query::Query;
 
 /// Points of a predicted curve besides (0, 0), as in the reference data.

@@ -10,7 +10,7 @@ use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError, ForceKind, Param
 use crate::dataset::OTHER_MASS;
 
 /// The name that stands where a predicted curve has its model's.
-pub const RECORDED: &str = "recorded";
+pub(crate) const RECORDED: &str = "recorded";
 
 impl PredictedCurve {
     /// The curve of one recorded run: its declared force, and beside a contact force the one that

@@ -41,12 +41,17 @@ use crate::manifest::{self, Document, KeyPath, ManifestError, Place};
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
-pub use journal::{WriteOptions, write, write_rows};
-pub use merge::{MergeError, merge};
+pub use journal::WriteOptions;
+pub use journal::write;
+pub use journal::write_rows;
+pub use merge::MergeError;
+pub use merge::merge;
 pub use run::Chunk;
 pub use statistics::ColumnStatistics;
+pub use variables::BindError;
 use variables::Variable;
-pub use variables::{BindError, VariableError, VariableSummary};
+pub use variables::VariableError;
+pub use variables::VariableSummary;
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Cursor};
 
-use crumple::solver::lsdyna::deck;
+use crumple::solver::parse_deck;
 
 pub fn target(bytes: &[u8]) {
     // Included files hold the deck itself, and are then no longer there: a deck of includes
@@ -13,6 +13,6 @@ pub fn target(bytes: &[u8]) {
         (left >= 0).then(|| Box::new(Cursor::new(bytes.to_vec())) as Box<dyn BufRead>)
     };
     let mut source = bytes;
-    let deck = deck::read(&mut source, &mut open).unwrap();
+    let deck = parse_deck(&mut source, &mut open).unwrap();
     deck.impact_speed();
 }

@@ -1,12 +1,12 @@
 //! `crumple db add`: measured and legacy curves from files into a curve database.
 
-use crumple::plural::counted;
+use crate::plural::counted;
 use std::path::PathBuf;
 
-use crumple::curve::{Case, ForceKind, Parameter};
-use crumple::formats::read::{READERS, ReadOptions};
-use crumple::import::{self, Item, Settings};
-use crumple::unit::UnitSystem;
+use crate::curve::{Case, ForceKind, Parameter};
+use crate::formats::read::{READERS, ReadOptions};
+use crate::import::{self, Item, Settings};
+use crate::unit::UnitSystem;
 use serde::Serialize;
 
 use super::super::curve_file::{self, CurveFile};
@@ -19,7 +19,7 @@ use output::ListedFormat;
 
 /// Files, the group they join, and what they do not say of themselves.
 #[derive(clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database; made if it is not there
     #[arg(required_unless_present = "list")]
     database: Option<PathBuf>,
@@ -65,7 +65,7 @@ struct Document {
     cases: Vec<CaseRow>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (Some(database), Some(group), false) = (&args.database, &args.group, args.list) else {
         return list(options);
     };

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crumple::database::check::{self, Checked};
-use crumple::plural::counted;
+use crate::database::check::{self, Checked};
+use crate::plural::counted;
 
 use super::{CommandResult, GlobalOptions, Outcome, output};
 
-pub fn run(path: &Path, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(path: &Path, options: GlobalOptions) -> CommandResult {
     let checked = check::check(path)?;
     let Checked { cases, findings } = &checked;
     if options.json {

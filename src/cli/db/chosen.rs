@@ -1,12 +1,12 @@
 //! Options that choose cases of a database.
 
-use crumple::curate::{Selection, SpeedRange};
+use crate::curate::{Selection, SpeedRange};
 
 use super::Failure;
 
 /// Which cases; every option narrows the choice.
 #[derive(clap::Args)]
-pub struct Chosen {
+pub(super) struct Chosen {
     /// Group; may be repeated [default: all]
     #[arg(long, help_heading = "Which cases")]
     group: Vec<String>,
@@ -22,7 +22,7 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    pub fn selection(&self) -> Selection {
+    pub(super) fn selection(&self) -> Selection {
         Selection {
             groups: self.group.clone(),
             cases: self.case.clone(),
@@ -32,7 +32,7 @@ impl Chosen {
     }
 
     /// The same, which may not be everything by mistake; `what` is what happens to the cases.
-    pub fn some(&self, what: &str) -> Result<Selection, Failure> {
+    pub(super) fn some(&self, what: &str) -> Result<Selection, Failure> {
         let selection = self.selection();
         match selection.is_all() {
             true => Err(Failure::Usage(format!(

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use crumple::curate::{self, Tables};
-use crumple::curve::Case;
-use crumple::database::Database;
+use crate::curate::{self, Tables};
+use crate::curve::Case;
+use crate::database::Database;
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -12,7 +12,7 @@ use super::{CommandResult, GlobalOptions, Outcome, output};
 
 /// Cases, and the folder for their tables.
 #[derive(clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -32,7 +32,7 @@ struct Document {
     files: Vec<String>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crumple::curate::{self, Effect, Joined, OnConflict, Target};
-use crumple::database::CasePath;
+use crate::curate::{self, Effect, Joined, OnConflict, Target};
+use crate::database::CasePath;
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -41,7 +41,7 @@ impl How {
 
 /// Databases, and where they are joined.
 #[derive(clap::Args)]
-pub struct MergeArgs {
+pub(super) struct MergeArgs {
     /// Curve databases; later ones are joined to earlier ones, and all to -o if that is one of them
     #[arg(required = true, num_args = 2..)]
     databases: Vec<PathBuf>,
@@ -52,7 +52,7 @@ pub struct MergeArgs {
     how: How,
 }
 
-pub fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
     let joined =
         curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.effect())?;
     report(&joined, &args.output, args.how.dry_run, options)
@@ -60,7 +60,7 @@ pub fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
 
 /// Cases, and where they are copied.
 #[derive(clap::Args)]
-pub struct CopyArgs {
+pub(super) struct CopyArgs {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -75,7 +75,7 @@ pub struct CopyArgs {
     how: How,
 }
 
-pub fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     if args.to.is_none() && args.to_group.is_none() {
         return Err(Failure::Usage(
             "say where the cases are copied: with --to-group, --to (another database) or both"

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crumple::curate::{self, Labels, Selection};
-use crumple::database::CasePath;
+use crate::curate::{self, Labels, Selection};
+use crate::database::CasePath;
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -11,7 +11,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 
 /// Cases, and the tags that they get and lose.
 #[derive(clap::Args)]
-pub struct TagArgs {
+pub(super) struct TagArgs {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -27,7 +27,7 @@ pub struct TagArgs {
     clear: bool,
 }
 
-pub fn tag(args: &TagArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn tag(args: &TagArgs, options: GlobalOptions) -> CommandResult {
     let labels = Labels {
         add_tags: args.add.clone(),
         remove_tags: args.remove.clone(),
@@ -39,7 +39,7 @@ pub fn tag(args: &TagArgs, options: GlobalOptions) -> CommandResult {
 
 /// Cases, and the notes that they get and lose.
 #[derive(clap::Args)]
-pub struct NoteArgs {
+pub(super) struct NoteArgs {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub struct NoteArgs {
     clear: bool,
 }
 
-pub fn note(args: &NoteArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn note(args: &NoteArgs, options: GlobalOptions) -> CommandResult {
     let labels = Labels {
         add_notes: args.add.clone(),
         remove_notes: args.remove.clone(),

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::curve::{Case, StoppedMass};
-use crumple::database::Database;
-use crumple::dataset::of_one_kind;
+use crate::curve::{Case, StoppedMass};
+use crate::database::Database;
+use crate::dataset::of_one_kind;
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -16,7 +16,7 @@ use super::{CommandResult, GlobalOptions, Outcome, output};
 
 /// A database, and which of its cases.
 #[derive(clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-pub struct Groups<T> {
+pub(super) struct Groups<T> {
     pub groups: BTreeMap<String, Vec<T>>,
     /// The mass that the crush zone of a group stops, where its cases tell it.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -34,7 +34,7 @@ pub struct Groups<T> {
     pub warnings: Vec<String>,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
     // A database without cases has nothing to list, which is no error.
@@ -73,7 +73,7 @@ pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 }
 
 /// A table of cases under the name of their group, with their tags if one has any.
-pub fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
+pub(super) fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
     let is_tagged = rows.iter().any(|row| !row.tags.is_empty());
     let mut heading: Vec<&str> = [group].into_iter().chain(CaseRow::HEADING).collect();
     heading.extend(is_tagged.then_some("tags"));

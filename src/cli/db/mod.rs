@@ -15,7 +15,7 @@ mod show;
 use std::path::PathBuf;
 
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, stopped_mass};
-pub use row::CaseRow;
+pub(super) use row::CaseRow;
 
 /// List, show, check, add, rename, join, tag and export cases of a curve database
 #[derive(clap::Args)]
@@ -29,7 +29,7 @@ pub use row::CaseRow;
   crumple db merge curves.h5 others.h5 -o all.h5
   crumple db export curves.h5 -o tables
 Commands that change a database lock it; whenever they are stopped, the old or the new file is there.")]
-pub struct Args {
+pub(super) struct Args {
     #[command(subcommand)]
     command: Command,
 }
@@ -134,7 +134,7 @@ docs/databases.md has recipes for pandas, polars, DuckDB, Parquet and xarray.")]
     Export(export::Args),
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match &args.command {
         Command::Ls(args) => list::run(args, options),
         Command::Show(args) => show::run(args, options),

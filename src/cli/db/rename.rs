@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crumple::curate::{self, Effect};
+use crate::curate::{self, Effect};
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -12,7 +12,7 @@ use super::{CommandResult, GlobalOptions, Outcome, output};
 
 /// A database, and which of its cases are removed.
 #[derive(clap::Args)]
-pub struct RemoveArgs {
+pub(super) struct RemoveArgs {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -36,7 +36,7 @@ struct Named {
     row: CaseRow,
 }
 
-pub fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.some("removed")?;
     let effect = if args.dry_run { Effect::OnlySaid } else { Effect::Written };
     let cases = curate::remove(&args.database, &selection, effect)?;
@@ -60,7 +60,7 @@ pub fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
 
 /// A database, and what of it is called how.
 #[derive(clap::Args)]
-pub struct RenameArgs {
+pub(super) struct RenameArgs {
     /// Curve database
     database: PathBuf,
     /// Group that is renamed, or the group of the case
@@ -83,7 +83,7 @@ struct Renamed {
     cases: Vec<String>,
 }
 
-pub fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult {
+pub(super) fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult {
     let database = args.database.display().to_string();
     let (from, to, cases) = match (&args.case, &args.group) {
         (Some(case), group) => {

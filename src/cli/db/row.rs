@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crumple::curve::{Case, ForceKind, Origin, Parameter, SourceFile};
-use crumple::unit::{SpeedKind, km_per_h};
+use crate::curve::{Case, ForceKind, Origin, Parameter, SourceFile};
+use crate::unit::{SpeedKind, km_per_h};
 use serde::Serialize;
 
 use super::Failure;
 
 /// What a list says of one case.
 #[derive(Serialize)]
-pub struct CaseRow {
+pub(crate) struct CaseRow {
     pub name: String,
     speed_m_per_s: f64,
     speed_kind: SpeedKind,
@@ -43,9 +43,10 @@ pub struct CaseRow {
 }
 
 impl CaseRow {
-    pub const HEADING: [&str; 6] = ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
+    pub(crate) const HEADING: [&str; 6] =
+        ["speed", "mass", "peak force", "max crush", "W/E", "unloading"];
 
-    pub fn of(case: &Case) -> Self {
+    pub(crate) fn of(case: &Case) -> Self {
         Self {
             name: case.name.clone(),
             speed_m_per_s: case.speed.m_per_s,
@@ -71,7 +72,7 @@ impl CaseRow {
         }
     }
 
-    pub fn cells(&self) -> Vec<String> {
+    pub(crate) fn cells(&self) -> Vec<String> {
         vec![
             format!("{} ({})", km_per_h(self.speed_m_per_s), self.speed_kind.name()),
             format!("{:.2} t", self.mass_kg / 1e3),
@@ -89,7 +90,7 @@ impl CaseRow {
 
 /// Everything of one case.
 #[derive(Serialize)]
-pub struct FullCase<'a> {
+pub(super) struct FullCase<'a> {
     #[serde(flatten)]
     row: CaseRow,
     study: &'a str,
@@ -117,7 +118,7 @@ struct Columns<'a> {
 }
 
 impl<'a> FullCase<'a> {
-    pub fn of(case: &'a Case) -> Result<Self, Failure> {
+    pub(super) fn of(case: &'a Case) -> Result<Self, Failure> {
         Ok(Self {
             row: CaseRow::of(case),
             study: &case.study,

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crumple::curate::{self, Difference, Selection};
-use crumple::curve::{Case, Parameter};
-use crumple::database::Database;
-use crumple::unit::km_per_h;
+use crate::curate::{self, Difference, Selection};
+use crate::curve::{Case, Parameter};
+use crate::database::Database;
+use crate::unit::km_per_h;
 
 use super::super::braille;
 use super::chosen::Chosen;
@@ -17,7 +17,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 
 /// A database, and which of its cases are shown how.
 #[derive(clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Curve database
     database: PathBuf,
     #[command(flatten)]
@@ -27,7 +27,7 @@ pub struct Args {
     compare: bool,
 }
 
-pub fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.selection();
     let alone = |selection: &Selection| {
         let Selection { groups, cases, speed, tags } = selection;

@@ -7,9 +7,9 @@
 //! The sign of the deflection is the direction of motion at contact, not of the largest value: at low speeds the rebound
 //! travels further than the crush.
 
-mod error;
+pub(crate) mod error;
 mod from_contact;
-mod input;
+pub(crate) mod input;
 mod record;
 mod remarks;
 mod sample;
@@ -21,10 +21,14 @@ use super::{Curve, EnergyAudit, energy, loading};
 use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::Speed;
-pub use error::{ExtractError, Origin};
+pub use error::ExtractError;
 use from_contact::FromContact;
-pub use input::{DeckSpeed, StatedContact};
-pub use input::{Measured, MeasuredForce, Setup, Stated};
+pub(crate) use input::DeckSpeed;
+pub use input::Measured;
+pub use input::MeasuredForce;
+pub use input::Setup;
+pub use input::Stated;
+pub(crate) use input::StatedContact;
 use record::Record;
 pub(crate) use remarks::Remarks;
 use sample::sample;

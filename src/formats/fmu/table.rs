@@ -37,7 +37,7 @@ pub(super) struct Table {
 impl Table {
     /// # Errors
     /// [`FmuError`] if a law has too many points, or numbers that are not finite.
-    pub fn new(law: &ForceLaw, token: &str) -> Result<Self, FmuError> {
+    pub(super) fn new(law: &ForceLaw, token: &str) -> Result<Self, FmuError> {
         let LawTables { deflection_m, force_n, slope_n_per_m, work_j, memory, .. } = law.tables();
         let LawTables { shape_length, shape_force, shape_rest, .. } = law.tables();
         let (points, shape_points) = (deflection_m.len(), shape_length.len());
@@ -109,7 +109,7 @@ impl Table {
     }
 
     /// The block of a ready binary.
-    pub fn bytes(&self) -> Vec<u8> {
+    pub(super) fn bytes(&self) -> Vec<u8> {
         let mut block = Vec::with_capacity(SIZE);
         block.extend(MARK);
         block.extend(self.sum().to_le_bytes());
@@ -130,7 +130,11 @@ impl Table {
     ///
     /// # Errors
     /// [`FmuError::NoPlace`] if it has not exactly one block of this layout.
-    pub fn written_into(&self, binary: &[u8], platform: &'static str) -> Result<Vec<u8>, FmuError> {
+    pub(super) fn written_into(
+        &self,
+        binary: &[u8],
+        platform: &'static str,
+    ) -> Result<Vec<u8>, FmuError> {
         let no_place = FmuError::NoPlace { platform };
         let mut found = memchr::memmem::find_iter(binary, MARK);
         let (Some(at), None) = (found.next(), found.next()) else { return Err(no_place) };
@@ -149,7 +153,7 @@ impl Table {
 
     /// The table as a C file. Shortest decimal numbers, which every compiler reads back as the
     /// same double.
-    pub fn source(&self) -> String {
+    pub(super) fn source(&self) -> String {
         let mut c = String::from(
             "/* The curve of this FMU, written by crumple; see table.h. */\n#include \"table.h\"\n\n\
              const crumple_table_t crumple_table = {\n",

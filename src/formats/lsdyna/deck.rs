@@ -5,7 +5,7 @@ use super::super::{ExportCurve, NUMBER_OF_STATES, run_time_s};
 use super::{InUnits, Material, TITLE_WIDTH};
 
 /// Everything beside curves and material. The moving body is node 2 at +x and moves towards −x.
-pub fn write(
+pub(crate) fn write(
     lines: &mut Lines,
     curve: &ExportCurve,
     units: InUnits,

@@ -32,22 +32,22 @@ pub(super) struct InUnits(pub UnitSystem);
 
 impl InUnits {
     /// A length in m.
-    pub fn length(self, m: f64) -> String {
+    pub(super) fn length(self, m: f64) -> String {
         nine_digits(m / self.0.length_m)
     }
 
     /// A force in N.
-    pub fn force(self, n: f64) -> String {
+    pub(super) fn force(self, n: f64) -> String {
         nine_digits(n / self.0.force())
     }
 
     /// A stiffness in N/m.
-    pub fn stiffness(self, n_per_m: f64) -> f64 {
+    pub(super) fn stiffness(self, n_per_m: f64) -> f64 {
         n_per_m * self.0.length_m / self.0.force()
     }
 
     /// The lines that say the units, for a header.
-    pub fn stated(self) -> String {
+    pub(super) fn stated(self) -> String {
         format!(
             "units of the points: {} (length {} m, force {} N)",
             self.0,
@@ -65,7 +65,7 @@ struct Ids {
     material: u32,
 }
 
-pub fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
         return Err(ExportError::Unfit { format: "lsdyna --deck", needs });

@@ -71,7 +71,7 @@ impl Places {
 
 impl Columns {
     /// No points yet.
-    pub fn at(places: Places) -> Self {
+    pub(super) fn at(places: Places) -> Self {
         Self {
             deflection_m: Vec::new(),
             force_n: Vec::new(),
@@ -89,7 +89,7 @@ impl Columns {
     ///
     /// # Errors
     /// [`ContentError`] names the first point that does not fit.
-    pub fn curve(mut self) -> Result<ReadCurve, ContentError> {
+    pub(super) fn curve(mut self) -> Result<ReadCurve, ContentError> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
             return Err(ContentError::TooFew { points, of: "", least: MIN_POINTS });

@@ -20,7 +20,7 @@ use crate::unit::UnitSystem;
 ///
 /// # Errors
 /// [`ReadCurveError`] with line and field.
-pub fn driving(path: &Path) -> Result<DrivingCurve, ReadCurveError> {
+pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, ReadCurveError> {
     let (bytes, _) = open(path)?;
     let read = || {
         let text = decoded(&bytes).bytes;

@@ -30,7 +30,7 @@ impl Separator {
     const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
 
     /// The character that stands between columns once blanks have become tabs.
-    pub fn byte(self) -> u8 {
+    pub(super) fn byte(self) -> u8 {
         match self {
             Self::Tab | Self::Blanks => b'\t',
             Self::Semicolon => b';',
@@ -109,7 +109,7 @@ const TITLES: usize = 3;
 impl Frame {
     /// The table of a text in UTF-8; `None` if no line can be its header. `asked` are columns that the user
     /// has named; `titles`: whether lines may stand above the header.
-    pub fn find(text: &[u8], asked: &[&str], titles: bool) -> Option<Self> {
+    pub(super) fn find(text: &[u8], asked: &[&str], titles: bool) -> Option<Self> {
         let lines = lines(text, MOST_TITLES + 2);
         let most = if titles { MOST_TITLES } else { 1 };
         let candidates = (0..lines.len().min(most))
@@ -142,7 +142,7 @@ impl Frame {
     }
 
     /// The table whose header is the first line with content, separated as it stands there.
-    pub fn at_first_line(text: &[u8], separator: u8) -> Self {
+    pub(super) fn at_first_line(text: &[u8], separator: u8) -> Self {
         let separator = Separator::ALL.into_iter().find(|s| s.byte() == separator);
         let first = lines(text, 1).into_iter().next();
         let (begin, before) = first.map_or((text.len(), 0), |line| (line.begin, line.number - 1));
@@ -158,7 +158,7 @@ impl Frame {
     }
 
     /// What was skipped, in one line; `None` if nothing was.
-    pub fn note(&self) -> Option<String> {
+    pub(super) fn note(&self) -> Option<String> {
         let ((first, _), (last, _)) = (self.titles.first()?, self.titles.last()?);
         let lines = match first == last {
             true => format!("line {first} is a title"),
@@ -171,7 +171,7 @@ impl Frame {
     }
 
     /// The table with one character between columns.
-    pub fn table<'a>(&self, text: &'a [u8]) -> Cow<'a, [u8]> {
+    pub(super) fn table<'a>(&self, text: &'a [u8]) -> Cow<'a, [u8]> {
         let text = &text[self.begin..];
         if self.separator != Separator::Blanks {
             return Cow::Borrowed(text);

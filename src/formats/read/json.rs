@@ -48,7 +48,7 @@ pub enum CurveFileError {
 ///
 /// # Errors
 /// [`CurveFileError`] with line and column, or with the promise that is broken.
-pub fn predicted(path: &Path) -> Result<PredictedCurve, CurveFileError> {
+pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, CurveFileError> {
     let bytes = file::read(path, MAX_CURVE_BYTES)
         .map_err(|source| CurveFileError::Io { path: path.into(), source })?;
     parse(path, &bytes)

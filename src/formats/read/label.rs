@@ -74,10 +74,10 @@ const OTHERS: [&str; 18] = [
 
 impl Quantity {
     /// In the order in which an axis is asked for them.
-    pub const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
+    pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
     /// Its name in messages.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Deflection => "deflection",
             Self::Force => "force",
@@ -86,7 +86,7 @@ impl Quantity {
     }
 
     /// What its column could be called.
-    pub fn example(self) -> &'static str {
+    pub(super) fn example(self) -> &'static str {
         match self {
             Self::Deflection => "d_m or d_mm",
             Self::Force => "force_N or force_kN",
@@ -95,7 +95,7 @@ impl Quantity {
     }
 
     /// The option that names its column.
-    pub fn option(self) -> &'static str {
+    pub(super) fn option(self) -> &'static str {
         match self {
             Self::Deflection => "--deflection-column",
             Self::Force => "--force-column",
@@ -103,7 +103,7 @@ impl Quantity {
         }
     }
 
-    pub fn dimension(self) -> &'static Dimension {
+    pub(super) fn dimension(self) -> &'static Dimension {
         match self {
             Self::Deflection => &LENGTH,
             Self::Force => &FORCE,
@@ -112,7 +112,7 @@ impl Quantity {
     }
 
     /// SI value of its unit in a system.
-    pub fn size_in(self, units: UnitSystem) -> f64 {
+    pub(super) fn size_in(self, units: UnitSystem) -> f64 {
         match self {
             Self::Deflection => units.length_m,
             Self::Force => units.force(),
@@ -145,7 +145,7 @@ impl Quantity {
     }
 
     /// SI value of a unit of this quantity.
-    pub fn size_of(self, unit: &str) -> Option<f64> {
+    pub(super) fn size_of(self, unit: &str) -> Option<f64> {
         // Micro is a letter of its own in texts that are no ASCII.
         self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
     }
@@ -161,7 +161,7 @@ pub(super) struct Label {
 
 impl Label {
     /// What an axis shows: by its name, or by its unit in brackets alone.
-    pub fn of_axis(text: &str) -> Option<Self> {
+    pub(super) fn of_axis(text: &str) -> Option<Self> {
         let by_unit = || {
             let (_, unit) = in_brackets(text.trim())?;
             let quantity = Quantity::ALL.into_iter().find(|q| q.size_of(unit).is_some())?;
@@ -171,7 +171,7 @@ impl Label {
     }
 
     /// What a column holds: by its name, or by a word within its name such as `Y Force [kN]`.
-    pub fn of_column(text: &str) -> Option<Self> {
+    pub(super) fn of_column(text: &str) -> Option<Self> {
         let within = || {
             let (name, unit) = name_and_unit(text);
             let quantity = Quantity::within(name)?;
@@ -182,13 +182,13 @@ impl Label {
     }
 
     /// The column of a quantity that the user has named: with the unit of its header.
-    pub fn of_named(quantity: Quantity, text: &str) -> Self {
+    pub(super) fn of_named(quantity: Quantity, text: &str) -> Self {
         let (_, unit) = name_and_unit(text);
         Self { quantity, unit: unit.map(Into::into) }
     }
 
     /// What a text names; `None` if that is nothing of a curve.
-    pub fn parse(text: &str) -> Option<Self> {
+    pub(super) fn parse(text: &str) -> Option<Self> {
         let text = text.trim().trim_matches('"').trim();
         if let Some((name, unit)) = in_brackets(text) {
             let quantity = Quantity::named(name)?;
@@ -212,7 +212,7 @@ impl Label {
     ///
     /// # Errors
     /// [`ContentError::UnknownUnit`], or [`ContentError::NoUnit`] without either.
-    pub fn size(
+    pub(super) fn size(
         &self,
         text: &str,
         given: Option<UnitSystem>,

@@ -78,7 +78,7 @@ impl Column {
 
 impl Layout {
     /// By the header's names and the row of units below it, if there is one.
-    pub fn of(
+    pub(super) fn of(
         names: &[String],
         line: u64,
         units: Option<&Row>,
@@ -152,7 +152,7 @@ impl Layout {
     }
 
     /// Deflection, then force, in the units that were given.
-    pub fn without_header(
+    pub(super) fn without_header(
         row: &Row,
         units: Option<UnitSystem>,
         asked: &ColumnNames,
@@ -187,7 +187,7 @@ impl Layout {
     }
 
     /// Which columns could have been taken instead, in one line.
-    pub fn note(&self) -> Option<String> {
+    pub(super) fn note(&self) -> Option<String> {
         let shown = |column: &Column| {
             format!("\"{}\" ({})", shown(&column.name), column.label.quantity.name())
         };
@@ -196,7 +196,7 @@ impl Layout {
     }
 
     /// What each field is and the SI value of its unit; says what was taken.
-    pub fn sizes(
+    pub(super) fn sizes(
         &self,
         units: Option<UnitSystem>,
         units_used: &mut bool,

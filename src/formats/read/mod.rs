@@ -9,13 +9,13 @@
 //! repeated as far behind the end) are removed. Each of these leaves a note.
 
 mod columns;
-pub mod csv;
-mod curve;
+pub(crate) mod csv;
+pub(crate) mod curve;
 mod encoding;
-mod error;
+pub(crate) mod error;
 mod frame;
 mod iso_mme;
-pub mod json;
+pub(crate) mod json;
 mod label;
 mod layout;
 mod lsdyna;
@@ -33,8 +33,11 @@ use crate::curve::ForceKind;
 use crate::file;
 use crate::unit::UnitSystem;
 use columns::Columns;
-pub use curve::{Facts, ReadCurve, ReadFile};
-pub use error::{ContentError, Place, ReadCurveError};
+pub(crate) use curve::Facts;
+pub use curve::ReadCurve;
+pub(crate) use curve::ReadFile;
+pub(crate) use error::ContentError;
+pub(crate) use error::ReadCurveError;
 use label::Quantity;
 
 /// One format of curves.
@@ -209,7 +212,7 @@ impl Input<'_> {
 }
 
 /// Whether `path` is a folder of ISO-MME tests; other folders are no curves.
-pub fn is_folder_of_tests(path: &Path) -> bool {
+pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
     path.is_dir() && !iso_mme::tests(path).is_empty()
 }
 

@@ -29,7 +29,7 @@ pub(super) struct Memory {
 impl Memory {
     /// `largest_share` is that of the branch's shape: ½ for a line. `points` are those of the
     /// envelope.
-    pub fn new(
+    pub(super) fn new(
         stiffness_n_per_m: f64,
         steepest_rise_n_per_m: f64,
         largest_share: f64,
@@ -51,13 +51,13 @@ impl Memory {
         memory
     }
 
-    pub fn steepest_n_per_m(&self) -> f64 {
+    pub(super) fn steepest_n_per_m(&self) -> f64 {
         self.steepest_n_per_m
     }
 
     /// Energy that comes back from a largest deflection.
     #[inline]
-    pub fn stored_j(&self, top: &OnEnvelope) -> f64 {
+    pub(super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         // Within a piece work − storable is monotone for either bound, so its ends and the top
         // decide.
         let dissipated = self.dissipated_j[top.piece].max(top.work_j - self.by_stiffness_j(top));

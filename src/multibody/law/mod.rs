@@ -9,13 +9,13 @@
 mod memory;
 mod pieces;
 mod shape;
-mod tables;
+pub(crate) mod tables;
 
 use crate::curve::Envelope;
 use memory::{Memory, StoredBy};
 pub(super) use pieces::{Branch, OnEnvelope, Piece};
 pub use shape::UnloadingShape;
-pub use tables::{LawTables, MemoryTables};
+pub use tables::LawTables;
 
 /// What happens when the deflection falls.
 #[derive(Clone, Copy, Debug, PartialEq)]

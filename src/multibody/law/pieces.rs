@@ -48,18 +48,18 @@ pub(in super::super) struct Known {
 
 impl Piece {
     /// No force up to a deflection, after this work with this integral.
-    pub fn open_to(to_m: f64, work_j: f64, sum_jm: f64) -> Self {
+    pub(crate) fn open_to(to_m: f64, work_j: f64, sum_jm: f64) -> Self {
         let known = Known { deflection_m: to_m, force_n: 0.0, work_j, sum_jm };
         Self { from_m: f64::NEG_INFINITY, to_m, at_zero_n: 0.0, slope_n_per_m: 0.0, known }
     }
 
     /// Whether the interface is open here.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.from_m == f64::NEG_INFINITY
     }
 
     /// Whether it has no force.
-    pub fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.slope_n_per_m == 0.0 && self.at_zero_n == 0.0
     }
 }

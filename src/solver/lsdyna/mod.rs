@@ -5,7 +5,7 @@ mod ascii;
 pub(super) mod binout;
 pub(super) mod bndout;
 pub(super) mod curvout;
-pub mod deck;
+pub(crate) mod deck;
 pub(super) mod deforc;
 mod dotted;
 mod e12;

@@ -18,15 +18,15 @@ pub struct Deck {
     /// `*DATABASE_…` of the ASCII files, in order.
     pub outputs: Vec<Output>,
     /// `*DATABASE_HISTORY_NODE`.
-    pub history_nodes: Vec<Named>,
+    pub history_nodes: Vec<TitledEntity>,
     /// `*DATABASE_HISTORY_NODE_SET`.
     pub history_node_sets: Vec<i64>,
     /// `*CONTACT_…`, in order.
-    pub contacts: Vec<Interface>,
+    pub contacts: Vec<DeckInterface>,
     /// `*PART`, in order.
-    pub parts: Vec<Named>,
+    pub parts: Vec<TitledEntity>,
     /// `*RIGIDWALL_…`, in order.
-    pub rigid_walls: Vec<Interface>,
+    pub rigid_walls: Vec<DeckInterface>,
     /// `*PARAMETER`, names in lower case.
     pub parameters: Vec<(String, Value)>,
     /// `*INCLUDE`, in order of reading. Folders of `*INCLUDE_PATH` are tried, not listed.
@@ -105,7 +105,7 @@ pub struct Output {
 
 /// An id and the title that goes with it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Named {
+pub struct TitledEntity {
     /// As the deck has it.
     pub id: i64,
     /// `None` where the deck gives none.
@@ -116,7 +116,7 @@ pub struct Named {
 
 /// A contact or a rigid wall.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interface {
+pub struct DeckInterface {
     /// From `_ID`, or the order number when no contact (no wall) of the deck has an id
     /// and all are of a kind that is numbered together; else `None`.
     pub id: Option<i64>,
@@ -154,7 +154,8 @@ impl Deck {
     /// seven digits). `None` when there is none, when they differ, when one turns or is
     /// not known, or when a wall moves. An include that is not there may hide more.
     pub fn impact_speed(&self) -> Option<ImpactSpeed> {
-        let moves = |w: &Interface| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
+        let moves =
+            |w: &DeckInterface| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
         if self.rigid_walls.iter().any(moves) {
             return None;
         }

@@ -5,24 +5,26 @@
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;
-mod contents;
+pub(crate) mod contents;
 mod context;
 mod definitions;
 mod includes;
 mod keyword;
 mod kind;
 mod named;
-mod parameters;
+pub(crate) mod parameters;
 mod reader;
 mod units;
 mod velocity;
 
 use std::io::{self, BufRead};
 
-pub use contents::{Deck, Interface, Named};
-pub use contents::{DeckPlace, ImpactSpeed, Include, InitialVelocity, Output, Scope, StatedUnits};
+pub use contents::Deck;
+pub use contents::DeckInterface;
+pub(crate) use contents::Include;
+pub use contents::TitledEntity;
 pub(crate) use keyword::signature;
-pub use parameters::Value;
+pub(crate) use parameters::Value;
 
 /// Reads a deck.
 ///
@@ -34,7 +36,7 @@ pub use parameters::Value;
 /// Only those of reading `source`, and where the deck with its includes has more than 4 GB.
 /// Anything else is in [`Deck::problems`]; the place of a
 /// problem in an included file is in that file, which its message names.
-pub fn read(
+pub fn parse_deck(
     source: &mut dyn BufRead,
     open: &mut dyn FnMut(&str) -> Option<Box<dyn BufRead>>,
 ) -> io::Result<Deck> {
@@ -44,6 +46,7 @@ pub fn read(
 #[cfg(test)]
 mod tests {
     use super::super::super::problem::ProblemCode;
+    use super::contents::{DeckInterface, DeckPlace, Scope, TitledEntity};
     use super::*;
     use crate::unit::UnitSystem;
     use proptest::prelude::*;
@@ -58,18 +61,18 @@ mod tests {
             let (_, text) = files.iter().find(|(n, _)| *n == name)?;
             Some(Box::new(io::Cursor::new(text.as_bytes().to_vec())) as Box<dyn BufRead>)
         };
-        read(&mut text.as_bytes(), &mut open).unwrap()
+        parse_deck(&mut text.as_bytes(), &mut open).unwrap()
     }
 
     fn messages(deck: &Deck) -> Vec<String> {
         deck.problems.iter().map(ToString::to_string).collect()
     }
 
-    fn named(list: &[Named]) -> Vec<(i64, Option<&str>)> {
+    fn named(list: &[TitledEntity]) -> Vec<(i64, Option<&str>)> {
         list.iter().map(|n| (n.id, n.title.as_deref())).collect()
     }
 
-    fn interfaces(list: &[Interface]) -> Vec<(Option<i64>, Option<&str>)> {
+    fn interfaces(list: &[DeckInterface]) -> Vec<(Option<i64>, Option<&str>)> {
         list.iter().map(|n| (n.id, n.title.as_deref())).collect()
     }
 
@@ -297,7 +300,7 @@ after the end
             let text = format!("*INCLUDE\n{name}a\n{name}b\n");
             Some(Box::new(io::Cursor::new(text.into_bytes())) as Box<dyn BufRead>)
         };
-        let d = read(&mut &b"*INCLUDE\nx\n"[..], &mut open).unwrap();
+        let d = parse_deck(&mut &b"*INCLUDE\nx\n"[..], &mut open).unwrap();
         assert_eq!(d.includes.len(), 1000);
         let messages = messages(&d);
         let deep = "include \"xaaaaaaaaaaaaaaaa\" is more than 16 files deep; it is left out";
@@ -374,7 +377,7 @@ after the end
     proptest! {
         #[test]
         fn any_bytes_are_read(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
-            read(&mut &bytes[..], &mut |_| None).unwrap();
+            parse_deck(&mut &bytes[..], &mut |_| None).unwrap();
         }
 
         /// Damaged decks reach further than bytes without sense.
@@ -383,7 +386,7 @@ after the end
             let mut bytes = CAR.as_bytes().to_vec();
             bytes[at] = with;
             bytes.truncate(cut);
-            read(&mut &bytes[..], &mut |_| None).unwrap();
+            parse_deck(&mut &bytes[..], &mut |_| None).unwrap();
         }
     }
 }

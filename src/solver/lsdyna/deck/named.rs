@@ -1,7 +1,7 @@
 //! Cards that name what a run holds: outputs, history nodes, contacts, walls, parts.
 
 use super::card::{Card, text};
-use super::contents::{DeckPlace, Interface, Named, Output};
+use super::contents::{DeckInterface, DeckPlace, Output, TitledEntity};
 use super::context::{Block, Context};
 use super::kind::Kind;
 
@@ -22,7 +22,7 @@ impl Context {
         if matches!(kind, Kind::HistoryNodeSets | Kind::HistoryNodeSetsLocal) {
             self.keep(|deck| &mut deck.history_node_sets, id, "history node sets");
         } else {
-            let node = Named { id, title: None, at: self.at(card.place) };
+            let node = TitledEntity { id, title: None, at: self.at(card.place) };
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
@@ -33,7 +33,7 @@ impl Context {
         }
         let (field, title) = card.id_and_text();
         if let Some(id) = self.required_id_of(field, card.place) {
-            let node = Named { id, title, at: self.at(card.place) };
+            let node = TitledEntity { id, title, at: self.at(card.place) };
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
@@ -46,7 +46,7 @@ impl Context {
         id: Option<i64>,
         title: Option<String>,
     ) {
-        let interface = Interface { id: id.filter(|&id| id != 0), title, keyword, at };
+        let interface = DeckInterface { id: id.filter(|&id| id != 0), title, keyword, at };
         if kind == Kind::Wall {
             self.keep(|deck| &mut deck.rigid_walls, interface, "rigid walls");
         } else {
@@ -68,7 +68,8 @@ impl Context {
                     block.ids[0] = self.required_id(card, 0);
                 }
                 if let Some(id) = block.ids[0] {
-                    let part = Named { id, title: block.text.take(), at: self.at(card.place) };
+                    let part =
+                        TitledEntity { id, title: block.text.take(), at: self.at(card.place) };
                     self.keep(|deck| &mut deck.parts, part, "parts");
                 }
             }

@@ -1,4 +1,4 @@
-//! Named values, and the numbers of fields that may name them.
+//! TitledEntity values, and the numbers of fields that may name them.
 
 use std::collections::HashMap;
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use super::super::line::{Line, Lines};
 use super::card::{Card, start, text};
-use super::contents::{Deck, Interface, Scope};
+use super::contents::{Deck, DeckInterface, Scope};
 use super::context::{Block, Context};
 use super::includes::{Included, Includes, Open};
 use super::keyword::{Format, Keyword};
@@ -256,7 +256,7 @@ fn number_interfaces(deck: &mut Deck) {
 
 /// Without ids the solver counts. How it counts through a mixture of kinds is not
 /// documented, so a mixture stays without.
-fn number_in_order(list: &mut [Interface], kind: impl Fn(&str) -> Option<&'static str>) {
+fn number_in_order(list: &mut [DeckInterface], kind: impl Fn(&str) -> Option<&'static str>) {
     let Some(first) = list.first().and_then(|i| kind(&i.keyword)) else { return };
     if list.iter().all(|i| !has_id_card(&i.keyword) && kind(&i.keyword) == Some(first)) {
         for (id, interface) in (1..).zip(list) {

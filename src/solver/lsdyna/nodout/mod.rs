@@ -8,7 +8,7 @@
 //! time. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
 //! writes the cycle of a state, so states of one time are only repeated if the cycle does not rise.
 
-mod blocks;
+pub(crate) mod blocks;
 mod rows;
 mod stride;
 
@@ -21,7 +21,7 @@ use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{States, TableId};
 use crate::solver::{Selection, SolverFile};
-pub use blocks::{Blocks, Column};
+pub use blocks::Blocks;
 use stride::Stride;
 
 /// Opens every block's state line.

@@ -334,7 +334,7 @@ pub(crate) const GRID_M: f64 = 2e-3;
 const SAME_SPEED: f64 = 1e-3;
 
 /// Whether two speeds count as one.
-pub fn is_same_speed(a: f64, b: f64) -> bool {
+pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
@@ -361,7 +361,9 @@ pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usiz
 ///
 /// # Errors
 /// [`DatasetError::Mixed`] names two that differ.
-pub fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Result<(), DatasetError> {
+pub(crate) fn of_one_kind<'a>(
+    cases: impl IntoIterator<Item = &'a Case>,
+) -> Result<(), DatasetError> {
     let mut cases = cases.into_iter();
     let Some(first) = cases.next() else { return Ok(()) };
     for other in cases {
