@@ -234,7 +234,7 @@ pub enum SourceFileError {
 ///
 /// # Errors
 /// [`ScenarioError`] names the key.
-pub(crate) fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
+pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
     let scenario: Scenario = manifest::parse(path, text)?;
     let document = Document::new(path, text);
     let checked = scenario.check().map_err(|source| {
