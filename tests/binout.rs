@@ -34,6 +34,23 @@ fn agrees(text: &SolverFile, binary: &SolverFile, digits: i32) -> usize {
     compared
 }
 
+/// A binout of the fixtures' samples, and the text that l2a printed from it.
+const WALL: &str = "samples/lasso-python/binout/lasso_r12_smp_s_sph_rwforc";
+
+#[test]
+fn a_binout_agrees_with_what_l2a_printed_from_it() {
+    let l2a = |kind: &str| {
+        let path = fixture(&format!("samples/lasso-python/{kind}/l2a_lasso_r12_smp_s"));
+        read(&path, None, &Selection::all()).unwrap()
+    };
+    // Seven digits of its float32 values.
+    let walls = section(&fixture(WALL), "rwforc/forces");
+    assert_eq!(agrees(&l2a("rwforc"), &walls, 7), 88 * 4);
+    let parts = section(&fixture(WALL), "matsum");
+    // Two parts of eleven components.
+    assert_eq!(agrees(&l2a("matsum"), &parts, 5), 88 * 2 * 11);
+}
+
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn text_and_binary_of_one_run_agree() {
@@ -59,10 +76,6 @@ fn text_and_binary_of_one_run_agree() {
             }
         }
     }
-    // l2a printed this one from the binout: seven digits of its float32 values.
-    let text = read(&folder.join("rwforc/l2a_lasso_r12_smp_s"), None, &Selection::all()).unwrap();
-    let binary = section(&folder.join("binout/lasso_r12_smp_s_sph_rwforc"), "rwforc/forces");
-    assert_eq!(agrees(&text, &binary, 7), 88 * 4);
 }
 
 /// Every value of every section that lasso-python reads, of every sample.
@@ -76,23 +89,29 @@ fn lasso_reads_the_same() {
     assert_eq!(run_python(python(), "binout.py", &arguments), 136_791, "values compared");
 }
 
+/// Whether a file has a section with so many states.
+fn has(path: &Path, section: &str, count: usize) {
+    let sections = read_sections(path, None, &Selection::nothing()).unwrap();
+    let found: Vec<(&str, usize)> =
+        sections.iter().map(|s| (s.section.as_str(), s.time.len())).collect();
+    assert!(found.contains(&(section, count)), "{}: {found:?}", path.display());
+}
+
+#[test]
+fn sections_without_states_and_with_them() {
+    let path = fixture("samples/lasso-python/binout/lasso_r7.1.2_smp_s_sph_rwforc");
+    has(&path, "rcforc", 0);
+    has(&path, "glstat", 88);
+}
+
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn sections_states_and_ids_of_every_sample() {
     let folder = shared("samples/lsdyna/binout");
-    let states = |name: &str| -> Vec<(String, usize)> {
-        let sections = read_sections(&folder.join(name), None, &Selection::nothing()).unwrap();
-        sections.into_iter().map(|s| (s.section, s.time.len())).collect()
-    };
-    let has = |name: &str, section: &str, count: usize| {
-        let found = states(name);
-        assert!(found.contains(&(section.to_string(), count)), "{name}: {found:?}");
-    };
+    let has = |name: &str, section: &str, count: usize| has(&folder.join(name), section, count);
     let mpp = "dynareadout_r11.1_mpp_s_nodout_rcforc";
     has(mpp, "nodout", 601);
     has(mpp, "rcforc", 601);
-    has("lasso_r7.1.2_smp_s_sph_rwforc", "rcforc", 0);
-    has("lasso_r7.1.2_smp_s_sph_rwforc", "glstat", 88);
     for (section, count) in [
         ("spcforc", 10),
         ("nodout", 8),
@@ -115,25 +134,23 @@ fn sections_states_and_ids_of_every_sample() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn histories_needs_a_section_and_selects() {
-    let folder = shared("samples/lsdyna/binout");
-    let path = folder.join("rowan_r14.1.1_smp_d_run0001");
+    let path = fixture(WALL);
     let path = path.to_str().unwrap();
     let here = Path::new(".");
     let error = crumple_fails(here, 1, &["histories", path]);
     assert!(
-        error.contains("it has several sections: select one of nodout, elout/solid"),
+        error.contains("it has several sections: select one of rwforc/forces, glstat, matsum"),
         "{error}"
     );
     let error = crumple_fails(here, 1, &["histories", path, "--section", "secforc"]);
-    assert!(error.contains("it has no section \"secforc\": it has nodout"), "{error}");
+    assert!(error.contains("it has no section \"secforc\": it has rwforc/forces"), "{error}");
     let csv = crumple_ok(
         here,
-        &["histories", path, "--section", "nodout", "--id", "225", "--component", "z_coordinate"],
+        &["histories", path, "--section", "matsum", "--id", "101", "--component", "z_momentum"],
     );
-    assert_eq!(csv.lines().next(), Some("time,z_coordinate[225]"));
-    assert_eq!(csv.lines().count(), 9);
+    assert_eq!(csv.lines().next(), Some("time,z_momentum[101]"));
+    assert_eq!(csv.lines().count(), 1 + 88);
 }
 
 /// Processes of one run write sections of their own; a large file continues in another.
@@ -496,7 +513,6 @@ fn damaged_containers_never_panic() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn damaged_samples_never_panic() {
     for path in samples("binout") {
         let bytes = fs::read(path).unwrap();

@@ -1,6 +1,6 @@
 //! Cut and damaged files: whole states are returned, what is missing is named, nothing panics.
 
-use crate::common::{fixture, is_thorough, samples, shared};
+use crate::common::{fixture, is_thorough, samples, samples_by_kind};
 use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
 use proptest::prelude::*;
 
@@ -108,15 +108,10 @@ fn a_missing_rotational_block_is_named() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn the_other_formats_cut_at_every_byte_of_their_end() {
-    for format in text_formats() {
-        let folder = shared("samples/lsdyna");
-        if format == "nodout" || !folder.join(format).is_dir() {
-            continue;
-        }
-        let files = samples(format);
-        for path in files {
+    let mut samples = samples_by_kind();
+    for format in text_formats().into_iter().filter(|format| *format != "nodout") {
+        for path in samples.remove(format).unwrap_or_default().into_values() {
             let text = std::fs::read(&path).unwrap();
             let whole = read(format, &text);
             let states = whole.time.len();

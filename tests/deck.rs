@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, BufRead};
 use std::path::Path;
 
-use crate::common::shared;
+use crate::common::{fixture, shared};
 use crumple::solver::{Deck, DeckInterface, TitledEntity, parse_deck};
 use crumple::unit::UnitSystem;
 
@@ -53,11 +53,27 @@ fn reads_our_decks() {
     }
 }
 
+fn ids(list: &[DeckInterface]) -> Vec<Option<i64>> {
+    list.iter().map(|i| i.id).collect()
+}
+
+#[test]
+fn reads_decks_of_others() {
+    let d = deck_in(&fixture("samples/dyna_pladebuk/keyword"), "node997_main.k");
+    assert_eq!((d.outputs.len(), d.parts.len(), d.includes.len()), (11, 3, 3));
+    assert_eq!(ids(&d.contacts), [Some(80085), Some(8008)]);
+    assert_eq!(d.problems.len(), 3, "its includes are not among the samples");
+
+    let d = deck_in(&fixture("samples/lasso-python/keyword"), "lasso_sph_test.k");
+    assert_eq!(messages(&d), [""; 0]);
+    assert_eq!(d.impact_speed().map(|s| (s.speed, s.at.line)), Some((50.0, 64)));
+    assert_eq!((named(&d.parts), ids(&d.rigid_walls)), (vec![(101, None)], vec![Some(1)]));
+}
+
 #[test]
 #[ignore = "needs ../shared (the real files)"]
-fn reads_decks_of_others() {
+fn reads_decks_with_parameters_and_includes() {
     let folder = shared("samples/lsdyna/keyword");
-    let ids = |list: &[DeckInterface]| list.iter().map(|i| i.id).collect::<Vec<_>>();
     let kg_mm_ms = UnitSystem::parse("kg-mm-ms").ok();
 
     let d = deck_in(&folder, "pillars_control_explicit.k");
@@ -75,16 +91,6 @@ fn reads_decks_of_others() {
     assert_eq!((d.outputs.len(), d.parameters.len(), d.includes.len()), (11, 15, 1));
     // Eleven expressions and an include that is not among the samples.
     assert_eq!(d.problems.len(), 12, "{:#?}", messages(&d));
-
-    let d = deck_in(&folder, "node997_main.k");
-    assert_eq!((d.outputs.len(), d.parts.len(), d.includes.len()), (11, 3, 3));
-    assert_eq!(ids(&d.contacts), [Some(80085), Some(8008)]);
-    assert_eq!(d.problems.len(), 3, "its includes are not among the samples");
-
-    let d = deck_in(&folder, "lasso_sph_test.k");
-    assert_eq!(messages(&d), [""; 0]);
-    assert_eq!(d.impact_speed().map(|s| (s.speed, s.at.line)), Some((50.0, 64)));
-    assert_eq!((named(&d.parts), ids(&d.rigid_walls)), (vec![(101, None)], vec![Some(1)]));
 
     let d = deck_in(&folder, "rowan_run0010_5_MAIN.key");
     assert_eq!(d.includes.iter().map(|i| i.at.line).collect::<Vec<_>>(), [9, 13, 17]);

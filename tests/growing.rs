@@ -128,17 +128,24 @@ fn a_growing_rwforc_is_a_beginning_of_the_whole() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn a_growing_t01_is_a_beginning_of_the_whole() {
-    let folder = shared("fe/lead-car-pair/36kmh");
-    grow_file("t01", &folder.join("crashT01"));
+    grow_file("t01", &fixture("t01/lead-car-pair/36kmh/crashT01"));
+}
+
+#[test]
+fn a_growing_binout_is_a_beginning_of_the_whole() {
+    grow_binout(&fixture("samples/lasso-python/binout/lasso_r12_smp_s_sph_rwforc"));
 }
 
 #[test]
 #[ignore = "needs ../shared (the real files)"]
-fn a_growing_binout_is_a_beginning_of_the_whole() {
+fn a_growing_binout_of_several_processes_is_a_beginning_of_the_whole() {
     let folder = shared("samples/lsdyna/binout");
-    let bytes = std::fs::read(folder.join("dynareadout_r11.1_mpp_s_nodout_rcforc")).unwrap();
+    grow_binout(&folder.join("dynareadout_r11.1_mpp_s_nodout_rcforc"));
+}
+
+fn grow_binout(path: &Path) {
+    let bytes = std::fs::read(path).unwrap();
     let sections =
         |bytes: &[u8]| read_from("binout", &[Box::new(bytes.to_vec())], &Selection::all()).unwrap();
     // As much of it as is whole.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::root;
+use crate::common::{entries, root};
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
@@ -351,6 +351,52 @@ fn dependencies_have_fixed_minor_versions() {
             assert!(version.matches('.').count() >= 1, "{name} = {version}");
         }
     }
+}
+
+/// The licence stands where people and programs look for it, and in every source that users get with
+/// an export or a report.
+#[test]
+fn the_licence_is_stated() {
+    let licence = "MIT OR Apache-2.0";
+    let read = |path: &str| fs::read_to_string(root().join(path)).unwrap();
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    let package = |key: &str| manifest["package"][key].as_str().unwrap();
+    assert_eq!(package("license"), licence);
+    assert!(read("LICENSE-MIT").contains("Copyright (c) 2026 The crumple authors"));
+    assert!(read("LICENSE-APACHE").contains("Version 2.0, January 2004"));
+    let citation = read("CITATION.cff");
+    for line in ["version: ".to_string() + package("version"), "  - MIT\n  - Apache-2.0".into()] {
+        assert!(citation.contains(&format!("\n{line}\n")), "CITATION.cff has no {line}");
+    }
+    let c = root().join("src/formats/fmu/c");
+    let mut handed_out = [files(&c, "c"), files(&c, "h")].concat();
+    assert!(handed_out.len() > 10);
+    handed_out
+        .extend(["src/formats/modelica/spring.mo", "src/report/page.js"].map(|p| root().join(p)));
+    for path in handed_out {
+        let text = fs::read_to_string(&path).unwrap();
+        let is_said = text.contains(&format!("SPDX-License-Identifier: {licence}"));
+        assert!(is_said, "{} does not say its licence", path.display());
+    }
+}
+
+/// Files of others have their source and their licence beside them.
+#[test]
+fn samples_have_source_and_licence() {
+    let folder = root().join("fixtures/samples");
+    let sources = fs::read_to_string(folder.join("SOURCES.md")).unwrap();
+    for project in entries(&folder).into_iter().filter(|name| name != "SOURCES.md") {
+        assert!(sources.contains(&format!("\n| {project} | https://")), "{project} has no source");
+        let project_folder = folder.join(&project);
+        assert!(project_folder.join("LICENSE").is_file(), "{project} has no licence");
+        for kind in entries(&project_folder).into_iter().filter(|name| name != "LICENSE") {
+            for name in entries(&project_folder.join(&kind)) {
+                let file = format!("{project}/{kind}/{name}");
+                assert!(sources.contains(&format!("\n| {file} |")), "{file} has no source");
+            }
+        }
+    }
+    assert!(fs::read_to_string(root().join("src/plot/font/LICENSE")).unwrap().contains("DejaVu"));
 }
 
 /// The fuzzer takes the dependencies of the program's own build, which one profile alone allows.

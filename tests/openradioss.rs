@@ -1,9 +1,9 @@
 //! OpenRadioss T01 against the text of the same runs, and damaged files.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::common::{crumple_ok, shared};
+use crate::common::{crumple_ok, fixture, shared};
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
 
@@ -30,6 +30,37 @@ fn agrees(text: &SolverFile, binary: &SolverFile, digits: f64) -> usize {
     compared
 }
 
+/// Holds T01 against the text of a run, of whose nodout `nodes` are left.
+fn run_agrees(text: &Path, t01: &Path, nodes: usize) {
+    let read = |name: &str| read(&text.join(name), None, &Selection::all()).unwrap();
+    let compared = agrees(&read("nodout"), &section(t01, "nodout"), 6.0);
+    assert!(compared >= 400 * 9 * nodes, "{compared} values of {}", text.display());
+    if text.join("glstat").is_file() {
+        assert!(agrees(&read("glstat"), &section(t01, "glstat"), 6.0) >= 400 * 5);
+    }
+    if text.join("rwforc").is_file() {
+        assert!(agrees(&read("rwforc"), &section(t01, "rwforc"), 7.0) >= 400 * 4);
+    }
+    if text.parent().is_some_and(|group| group.ends_with("lead-car-pair")) {
+        assert_eq!(agrees(&read("rcforc"), &section(t01, "rcforc"), 6.0), 400 * 6);
+    }
+}
+
+/// The runs whose T01 is in the fixtures, and of how many nodes the text there is.
+const RUNS: [(&str, usize); 2] = [("lead-car-pair/36kmh", 2), ("lead-car-wall/25kmh", 1)];
+
+fn t01_of(run: &str) -> PathBuf {
+    fixture(&format!("t01/{run}/crashT01"))
+}
+
+#[test]
+fn t01_and_text_of_a_run_agree_and_it_is_clean() {
+    for (run, nodes) in RUNS {
+        run_agrees(&fixture(&format!("fe/{run}")), &t01_of(run), nodes);
+        crumple_ok(Path::new("."), &["inspect", "--strict", t01_of(run).to_str().unwrap()]);
+    }
+}
+
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn t01_and_text_of_every_run_agree() {
@@ -41,18 +72,8 @@ fn t01_and_text_of_every_run_agree() {
             if !run.is_dir() {
                 continue;
             }
-            let t01 = run.join("crashT01");
-            let text = |name: &str| read(&run.join(name), None, &Selection::all()).unwrap();
-            let nodes = agrees(&text("nodout"), &section(&t01, "nodout"), 6.0);
-            assert!(nodes >= 400 * 9 * 4, "{} values of {}", nodes, run.display());
-            let energies = agrees(&text("glstat"), &section(&t01, "glstat"), 6.0);
-            assert!(energies >= 400 * 5);
-            if run.join("rwforc").is_file() {
-                assert!(agrees(&text("rwforc"), &section(&t01, "rwforc"), 7.0) >= 400 * 4);
-            }
-            if group == "lead-car-pair" {
-                assert_eq!(agrees(&text("rcforc"), &section(&t01, "rcforc"), 6.0), 400 * 6);
-            }
+            assert!(run.join("glstat").is_file(), "{}", run.display());
+            run_agrees(&run, &run.join("crashT01"), 4);
             runs += 1;
         }
     }
@@ -79,10 +100,8 @@ fn every_t01_of_the_fe_runs_is_clean() {
 
 /// A range of zeros names what it took.
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn overwritten_values_are_named_with_entity_and_component() {
-    let full = shared("fe");
-    let mut bytes = fs::read(full.join("lead-car-wall/25kmh/crashT01")).unwrap();
+    let mut bytes = fs::read(t01_of("lead-car-wall/25kmh")).unwrap();
     // A state has records of 4, 88, 24, 24, 432 (12 nodes with 9 values each) and 36 bytes.
     let at = bytes.len() - 200 * (608 + 6 * 8) + (4 + 88 + 24 + 24 + 4 * 8) + 4;
     bytes[at + 36..at + 3 * 36].fill(0);
@@ -101,23 +120,26 @@ fn overwritten_values_are_named_with_entity_and_component() {
 
 /// A study whose folders hold nothing but T01 gives the curves of the text.
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn a_study_of_t01_alone() {
-    let full = shared("fe");
     let folder = tempfile::tempdir().unwrap();
-    let manifest = fs::read_to_string(full.join("lead-car-pair/study.toml")).unwrap();
-    fs::write(folder.path().join("study.toml"), manifest).unwrap();
-    for run in ["36kmh", "48kmh", "60kmh", "72kmh"] {
-        fs::create_dir(folder.path().join(run)).unwrap();
-        let source = full.join("lead-car-pair").join(run).join("crashT01");
-        fs::copy(source, folder.path().join(run).join("crashT01")).unwrap();
+    let text = fs::read_to_string(fixture("fe/lead-car-pair/study.toml")).unwrap();
+    let one_run: Vec<&str> = text.splitn(3, "[[run]]").take(2).collect();
+    for (study, files) in [("t01", &[][..]), ("both", &["nodout", "rcforc"])] {
+        let run = folder.path().join(study).join("36kmh");
+        fs::create_dir_all(&run).unwrap();
+        fs::write(folder.path().join(study).join("study.toml"), one_run.join("[[run]]")).unwrap();
+        fs::copy(t01_of("lead-car-pair/36kmh"), run.join("crashT01")).unwrap();
+        for file in files {
+            fs::copy(fixture("fe/lead-car-pair/36kmh").join(file), run.join(file)).unwrap();
+        }
     }
     let build = |study: &str, output: &str| -> serde_json::Value {
         serde_json::from_str(&crumple_ok(folder.path(), &["build", study, "-o", output, "--json"]))
             .unwrap()
     };
-    let binary = build("study.toml", "t01.h5");
-    let text = build(full.join("lead-car-pair/study.toml").to_str().unwrap(), "text.h5");
+    let binary = build("t01/study.toml", "t01.h5");
+    let text = build("both/study.toml", "text.h5");
+    assert_eq!(text["runs"].as_array().unwrap().len(), 1);
     for (a, b) in binary["runs"].as_array().unwrap().iter().zip(text["runs"].as_array().unwrap()) {
         for key in ["work_J", "max_deflection_m", "peak_force_N"] {
             let (a, b) = (a["case"][key].as_f64().unwrap(), b["case"][key].as_f64().unwrap());
@@ -131,10 +153,8 @@ fn a_study_of_t01_alone() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn cut_anywhere_gives_the_whole_states() {
-    let full = shared("fe");
-    let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
+    let bytes = fs::read(t01_of("lead-car-pair/36kmh")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("runT01");
     fs::write(&path, &bytes).unwrap();
@@ -159,10 +179,8 @@ fn cut_anywhere_gives_the_whole_states() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
 fn damaged_files_never_panic() {
-    let full = shared("fe");
-    let bytes = fs::read(full.join("lead-car-pair/36kmh/crashT01")).unwrap();
+    let bytes = fs::read(t01_of("lead-car-pair/36kmh")).unwrap();
     let bytes = &bytes[..8_000];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("runT01");

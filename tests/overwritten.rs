@@ -194,19 +194,31 @@ macro_rules! text_samples {
             #[ignore = "needs ../shared (the real files)"]
             fn $name() {
                 let folder = shared("samples/lsdyna");
-                let path = folder.join($format).join($path);
-                damage_text($format, &path);
-                cut_the_last_state($format, &path);
+                damage_and_cut($format, &folder.join($format).join($path));
             }
         )*
     };
+}
+
+fn damage_and_cut(format: &str, path: &Path) {
+    damage_text(format, path);
+    cut_the_last_state(format, path);
+}
+
+#[test]
+fn rwforc() {
+    damage_and_cut("rwforc", &fixture("samples/lasso-python/rwforc/l2a_lasso_r12_smp_s"));
+}
+
+#[test]
+fn matsum_of_l2a() {
+    damage_and_cut("matsum", &fixture("samples/lasso-python/matsum/l2a_lasso_r12_smp_s"));
 }
 
 text_samples! {
     nodout_with_rotations: "nodout", "pillars_r13.1.1_smp_d_rot_legend";
     nodout_of_l2a: "nodout", "l2a_scheckmate_root_r10.1_smp_s_norot";
     rcforc: "rcforc", "pillars_r13.1.1_smp_d_slave_master";
-    rwforc: "rwforc", "l2a_lasso_r12_smp_s";
     glstat: "glstat", "pillars_r13.1.1_smp_d";
     matsum: "matsum", "pillars_r13.1.1_smp_d";
     secforc: "secforc", "l2a_scheckmate_root_r10.1_smp_s";
@@ -220,8 +232,7 @@ text_samples! {
 
 #[test]
 fn our_nodout_with_many_nodes() {
-    damage_text("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
-    cut_the_last_state("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
+    damage_and_cut("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
 }
 
 /// A binary file has no check sums: zeros among values are only known by what stands around
@@ -297,8 +308,12 @@ fn binout_of_few_nodes() {
 }
 
 #[test]
-#[ignore = "needs ../shared (the real files)"]
+fn binout_of_a_wall() {
+    let path = fixture("samples/lasso-python/binout/lasso_r12_smp_s_sph_rwforc");
+    damage_binary("binout", &path, 100_000);
+}
+
+#[test]
 fn openradioss_t01() {
-    let folder = shared("fe/lead-car-pair/36kmh");
-    damage_binary("t01", &folder.join("crashT01"), 60_000);
+    damage_binary("t01", &fixture("t01/lead-car-pair/36kmh/crashT01"), 60_000);
 }

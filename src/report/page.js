@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 "use strict";
 // Gives the pictures of the page a legend of buttons, values under the pointer, and zoom.
 (() => {

@@ -26,12 +26,43 @@ pub fn shared(folder: &str) -> PathBuf {
     path
 }
 
+/// Whether the real files beside the repository are to be read too: they are there, or must be.
+pub fn is_with_shared() -> bool {
+    let must = std::env::var_os("CRUMPLE_REQUIRE_ALL").is_some_and(|value| !value.is_empty());
+    must || root().join("../shared").is_dir()
+}
+
+/// The folders of real LS-DYNA samples: one per project in the fixtures, and those of `../shared`
+/// where they are. In each, one folder per kind of file.
+fn sample_folders() -> Vec<PathBuf> {
+    let own = fixture("samples");
+    let mut folders: Vec<PathBuf> = entries(&own).into_iter().map(|name| own.join(name)).collect();
+    folders.retain(|path| path.is_dir());
+    if is_with_shared() {
+        folders.push(shared("samples/lsdyna"));
+    }
+    folders
+}
+
+/// The real LS-DYNA samples by their kinds and names. What is in `../shared` as well counts once.
+pub fn samples_by_kind() -> BTreeMap<String, BTreeMap<String, PathBuf>> {
+    let mut kinds: BTreeMap<String, BTreeMap<String, PathBuf>> = BTreeMap::new();
+    for folder in sample_folders() {
+        for kind in entries(&folder).into_iter().filter(|kind| folder.join(kind).is_dir()) {
+            for name in entries(&folder.join(&kind)) {
+                let path = folder.join(&kind).join(&name);
+                kinds.entry(kind.clone()).or_default().entry(name).or_insert(path);
+            }
+        }
+    }
+    kinds
+}
+
 /// The real LS-DYNA samples of one kind of file.
-pub fn samples(format: &str) -> Vec<PathBuf> {
-    let folder = shared(&format!("samples/lsdyna/{format}"));
-    let files: Vec<PathBuf> = entries(&folder).into_iter().map(|name| folder.join(name)).collect();
-    assert!(!files.is_empty(), "{} is empty", folder.display());
-    files
+pub fn samples(kind: &str) -> Vec<PathBuf> {
+    let files = samples_by_kind().remove(kind).unwrap_or_default();
+    assert!(!files.is_empty(), "no sample of {kind}");
+    files.into_values().collect()
 }
 
 /// A file of the fixtures.

@@ -1,4 +1,6 @@
 
+  // The functions and models below are part of crumple. Copyright (c) 2026 The crumple authors
+  // SPDX-License-Identifier: MIT OR Apache-2.0
   function loading "Force of the loading branch, N; beyond the table the last slope goes on"
     input Real x "Deflection, m";
     output Real y;

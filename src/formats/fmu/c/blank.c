@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* The table of a ready binary, before a curve is written into it. */
 #include "table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Partial derivatives of the spring's outputs by its input and its parameter. */
 #include "spring.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* FMI 2.0, model exchange and co-simulation: the functions an importer calls, on top of spring.h.
  * Written from the standard's text (fmi-standard.org, 2.0.4); no headers of the standard are
  * needed. */

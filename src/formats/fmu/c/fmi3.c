@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* FMI 3.0, model exchange and co-simulation: the functions an importer calls, on top of spring.h.
  * Written from the standard's text (fmi-standard.org, 3.0.2); no headers of the standard are
  * needed. What the spring has none of stands in fmi3_none.c. */

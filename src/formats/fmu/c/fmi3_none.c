@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* FMI 3.0: functions for what the spring has none of. Every one must be there; an error follows
  * where an importer asks for something. */
 #include <stdbool.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Instances of the spring: made, reset and freed, their modes, and what they say. */
 #include "spring.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Knots of the law as state events: an integrator that stops at each of them sees straight lines
  * alone, and keeps its order on a curve with hundreds of kinks. */
 #include "spring.h"

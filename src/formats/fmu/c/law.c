@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Force law of an interface, operation by operation as crumple's own (multibody/law), so that the
  * results are the same bits. Compile without contraction of a*b+c (-ffp-contract=off). */
 #include "law.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Force law of an interface: force and energies over the deflection and the largest one so far. */
 #ifndef CRUMPLE_LAW_H
 #define CRUMPLE_LAW_H

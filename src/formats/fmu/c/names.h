@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Names seen by the linker: plain in a shared library, with the importer's prefix where several
  * FMUs are linked into one program from their sources. */
 #ifndef CRUMPLE_NAMES_H

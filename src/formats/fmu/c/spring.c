@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* The spring's variables, its memory and its steps. */
 #include "spring.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* An instance of the spring: what both versions of the interface share. */
 #ifndef CRUMPLE_SPRING_H
 #define CRUMPLE_SPRING_H

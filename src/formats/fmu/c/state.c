@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Saved states: copies of an instance's state, and the same as bytes. */
 #include "spring.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* Sum that tells whether a table came through whole. */
 #include "table.h"
 

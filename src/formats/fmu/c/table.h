@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* The numbers of one spring. In a ready binary the exporter finds this block by its mark and writes
  * the curve into it; among the sources it is a generated C file (table.c). */
 #ifndef CRUMPLE_TABLE_H
