@@ -12,24 +12,22 @@ use crate::charts::{HistoryError, LeftOutError};
 use crate::curate::CurateError;
 use crate::database::DatabaseError;
 use crate::dataset::DatasetError;
-use crate::file::{LockError, WriteError};
+
+use crate::error::{self, ErrorCode, Place};
 use crate::formats::ExportError;
 use crate::formats::read::ReadCurveError;
 use crate::formats::read::json::CurveFileError;
 use crate::history_hdf5::ConvertError;
 use crate::import::ImportError;
 use crate::init::InitError;
-use crate::manifest::{ManifestError, Place};
 use crate::multibody::SimulationError;
 use crate::nsdm::NsdmError;
 use crate::plot::PngError;
 use crate::rating::SignalError;
 use crate::report::ReportError;
-use crate::scenario::ScenarioError;
 use crate::solver::ReadError;
 use crate::study::{RunError, StudyError};
 use crate::surrogate::{ModelError, PredictError};
-use crate::sweep::{MergeError, SweepError};
 
 /// What `--json` prints on standard output when a command fails.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -61,58 +59,6 @@ pub struct ErrorReport {
     pub hint: Option<String>,
 }
 
-/// Kinds of errors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ErrorCode {
-    /// The arguments make no sense, or do not fit together or with the file.
-    Usage,
-    /// A file cannot be opened, read or written.
-    Io,
-    /// Another process writes the file.
-    Locked,
-    /// A TOML file is no TOML, or has an unknown key or a value that cannot be.
-    Toml,
-    /// A study contradicts itself, or none of its runs can be used.
-    Study,
-    /// A run of a study gives no curve.
-    Run,
-    /// A scenario contradicts itself, or what it names does not fit.
-    Scenario,
-    /// A plan of a sweep is wrong, or its results are of another sweep.
-    Sweep,
-    /// A file is no curve database, is damaged, or has no such group or case.
-    Database,
-    /// A solver's file cannot be read, or lacks what is asked of it.
-    SolverFile,
-    /// A curve's file cannot be read.
-    CurveFile,
-    /// Curves cannot be taken into a database.
-    Import,
-    /// Cases make no training set.
-    Dataset,
-    /// A model cannot be fitted or read.
-    Model,
-    /// A model gives no curve.
-    Prediction,
-    /// Models cannot be validated.
-    Validation,
-    /// Methods cannot be compared.
-    Comparison,
-    /// A multi-body run cannot be made.
-    Simulation,
-    /// A file for another tool cannot be made.
-    Export,
-    /// Signals cannot be rated.
-    Rating,
-    /// A chart cannot be drawn.
-    Plot,
-    /// There is no report.
-    Report,
-    /// Anything else.
-    Other,
-}
-
 /// The error as a type, also where it is boxed.
 fn of<'e, T: Error + 'static>(error: &'e (dyn Error + 'static)) -> Option<&'e T> {
     error.downcast_ref::<T>().or_else(|| Some(&**error.downcast_ref::<Box<T>>()?))
@@ -125,14 +71,13 @@ fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
             $($(if of::<$kind>(error).is_some() { return Some(ErrorCode::$code); })+)*
         };
     }
+    if let Some(error) = of::<error::Error>(error) {
+        return Some(error.code());
+    }
     codes! {
-        io::Error, WriteError => Io;
-        LockError => Locked;
-        ManifestError => Toml;
+        io::Error => Io;
         BuildError, StudyError, InitError => Study;
         RunFailure, RunError => Run;
-        ScenarioError => Scenario;
-        SweepError, MergeError => Sweep;
         DatabaseError, CurateError => Database;
         ReadError, ConvertError => SolverFile;
         ReadCurveError, CurveFileError => CurveFile;
@@ -164,10 +109,8 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> ErrorCode {
 /// The place in a TOML file that an error is about.
 pub(crate) fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
     chain(error).find_map(|error| {
-        (of::<ManifestError>(error).and_then(ManifestError::place))
+        (of::<error::Error>(error).and_then(error::Error::place))
             .or_else(|| of::<StudyError>(error).and_then(StudyError::place))
-            .or_else(|| of::<ScenarioError>(error).and_then(ScenarioError::place))
-            .or_else(|| of::<SweepError>(error).and_then(SweepError::place))
             .or_else(|| of::<TrainError>(error).and_then(TrainError::place))
             .or_else(|| of::<BuildError>(error).and_then(BuildError::place))
             .or_else(|| of::<RunFailure>(error).and_then(|failure| failure.place.as_deref()))

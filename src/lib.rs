@@ -30,6 +30,9 @@
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
 
+pub mod error;
+pub use error::Error;
+
 pub mod unit;
 
 mod clock;

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::common::{crumple_fails, crumple_in, crumple_ok, demo_folder, python, root};
-use crumple::sweep::{Chunk, Shard, Sweep, SweepError, WriteOptions, merge, write};
+use crumple::sweep::{Chunk, Shard, Sweep, WriteOptions, merge, write};
 use serde_json::Value;
 
 /// Two trains with two cars each; short, with long steps.
@@ -85,7 +85,12 @@ impl Folder {
         Sweep::load(&self.path().join("s.toml"), None).unwrap()
     }
 
-    fn write(&self, sweep: &Sweep, name: &str, options: &WriteOptions) -> Result<u64, SweepError> {
+    fn write(
+        &self,
+        sweep: &Sweep,
+        name: &str,
+        options: &WriteOptions,
+    ) -> Result<u64, crumple::Error> {
         write(sweep, &self.path().join(name), options, |_| ControlFlow::Continue(()))
             .map(|report| report.resumed)
     }

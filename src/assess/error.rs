@@ -6,12 +6,12 @@ use super::reference::MotionError;
 use crate::curve::EnvelopeError;
 use crate::database::DatabaseError;
 use crate::dataset::DatasetError;
+use crate::error::Error;
+use crate::error::Place;
 use crate::guess;
-use crate::manifest::Place;
 use crate::multibody::SimulationError;
 use crate::nsdm::NsdmError;
 use crate::rating::SignalError;
-use crate::scenario::ScenarioError;
 use crate::solver::ReadError;
 use crate::surrogate::ModelError;
 use crate::surrogate::predict::PredictError;
@@ -220,7 +220,7 @@ pub enum TrainError {
     Read(#[from] ReadError),
     /// The scenario cannot be run.
     #[error("{0}")]
-    Scenario(#[from] Box<ScenarioError>),
+    Scenario(#[from] Error),
     /// The database cannot be read.
     #[error(transparent)]
     Database(#[from] DatabaseError),
@@ -237,8 +237,8 @@ impl TrainError {
     }
 }
 
-impl From<ScenarioError> for CompareError {
-    fn from(error: ScenarioError) -> Self {
-        TrainError::from(Box::new(error)).into()
+impl From<Error> for CompareError {
+    fn from(error: Error) -> Self {
+        TrainError::from(error).into()
     }
 }

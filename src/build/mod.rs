@@ -2,6 +2,7 @@
 
 mod previous;
 
+use crate::error::Error;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -10,8 +11,8 @@ use rayon::prelude::*;
 use crate::clock;
 use crate::curve::{Case, Origin};
 use crate::database::{CasePath, Database, DatabaseError};
-use crate::file::{LockError, WriterLock};
-use crate::manifest::Place;
+use crate::error::Place;
+use crate::file::WriterLock;
 use crate::study::{self, LocatedRun, RunError, Study, StudyError};
 use previous::{Named, Previous};
 
@@ -26,7 +27,7 @@ pub enum BuildError {
     Database(#[from] DatabaseError),
     /// Another process writes the database.
     #[error("{0}")]
-    Lock(#[from] LockError),
+    Lock(#[from] Error),
     /// No run is usable.
     #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
     NoRun {

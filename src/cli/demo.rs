@@ -1,5 +1,6 @@
 //! `crumple demo`: the whole flow on the bundled FE runs.
 
+use crate::error::Error;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,7 +10,7 @@ use crate::assess::validate::{train_chosen, validate};
 use crate::build::{self, BuiltRun, RunOutcome};
 use crate::curve::Case;
 use crate::database::Database;
-use crate::file::{WriteError, write_at, write_whole};
+use crate::file::{not_written, write_at, write_whole};
 use crate::formats::{self, ExportInput};
 use crate::multibody::Run;
 use crate::report::{MethodSpeeds, ReportSettings, report};
@@ -253,9 +254,9 @@ impl Flow<'_> {
 }
 
 /// Writes the bundled files of a folder and all below it.
-fn extract(bundled: &Dir, target: &Path) -> Result<(), WriteError> {
+fn extract(bundled: &Dir, target: &Path) -> Result<(), Error> {
     let folder = target.join(bundled.path());
-    std::fs::create_dir_all(&folder).map_err(|e| WriteError::new(&folder, e))?;
+    std::fs::create_dir_all(&folder).map_err(|e| not_written(&folder, e))?;
     for file in bundled.files() {
         write_at(&target.join(file.path()), |mut out| out.write_all(file.contents()).map(Some))?;
     }

@@ -1,9 +1,10 @@
 //! Where exported files go: standard output, a file, or a folder of several.
 
+use crate::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::file::{WriteError, write_all_whole};
+use crate::file::{not_written, write_all_whole};
 use crate::formats::{Exported, Format};
 use serde::Serialize;
 
@@ -110,10 +111,10 @@ impl Destination<'_> {
 }
 
 /// The folders of files within the folder that was named.
-fn make_folders(files: &[PathBuf]) -> Result<(), WriteError> {
+fn make_folders(files: &[PathBuf]) -> Result<(), Error> {
     let folders = files.iter().filter_map(|f| f.parent());
     for folder in folders.filter(|f| !f.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(|e| WriteError::new(folder, e))?;
+        fs::create_dir_all(folder).map_err(|e| not_written(folder, e))?;
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 
 use serde::Serialize;
 
-use crate::manifest::Place;
+use crate::error::Place;
 
 use super::{Failure, GlobalOptions, terminal};
 

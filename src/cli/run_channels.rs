@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::file::{WriteError, write_all_whole};
+use crate::file::{not_written, write_all_whole};
 use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
 use crate::multibody::Run;
 use crate::scenario::Prepared;
@@ -64,7 +64,7 @@ pub(super) fn write(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), F
     };
     let exported = folder(&test, &channels)?;
     let inside = path.join("Channel");
-    std::fs::create_dir_all(&inside).map_err(|e| WriteError::new(&inside, e))?;
+    std::fs::create_dir_all(&inside).map_err(|e| not_written(&inside, e))?;
     let files: Vec<(PathBuf, &[u8])> =
         exported.files.iter().map(|(name, bytes)| (path.join(name), &**bytes)).collect();
     let files: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (&**path, *bytes)).collect();

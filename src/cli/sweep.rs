@@ -9,9 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::sweep::{
-    self, ColumnStatistics, Report, Shard, Sweep, SweepError, VariableSummary, WriteOptions,
-};
+use crate::error::Error;
+use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, VariableSummary, WriteOptions};
 use serde::Serialize;
 
 use super::output;
@@ -175,7 +174,7 @@ fn write(
             true => output::print_data(write),
             false => {
                 let device = OpenOptions::new().write(true).open(output);
-                let failed = |source| crate::file::WriteError::new(output, source);
+                let failed = |source| crate::file::not_written(output, source);
                 Ok(write(&mut device.map_err(failed)?)?)
             }
         }
@@ -215,7 +214,7 @@ fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandRes
         keep_input(input, output)?;
     }
     let begun = Instant::now();
-    let report: Result<Report, SweepError> = sweep::merge(shards, output);
+    let report: Result<Report, Error> = sweep::merge(shards, output);
     say(&Document::new(&report?, begun, output), global, false)
 }
 

@@ -1,9 +1,9 @@
 //! Why nothing was chosen or changed.
 
+use crate::error::Error;
 use std::path::PathBuf;
 
 use crate::database::{CasePath, DatabaseError};
-use crate::file::{LockError, WriteError};
 
 /// Why nothing was chosen or changed; the databases are as they were.
 #[derive(Debug, thiserror::Error)]
@@ -11,12 +11,9 @@ pub(crate) enum CurateError {
     /// A database cannot be read or written.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// Another process writes it.
+    /// A room below says why.
     #[error(transparent)]
-    Lock(#[from] LockError),
-    /// A table cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
+    Below(#[from] Error),
     /// No case has such a name.
     #[error("{path}: there is no case \"{name}\": there are {known}")]
     NoCase {

@@ -1,5 +1,6 @@
 //! Cases as CSV tables: one of the cases, and long ones of the samples of their curves.
 
+use crate::error::Error;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::CurateError;
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Parameter};
-use crate::file::{WriteError, write_at};
+use crate::file::{not_written, write_at};
 
 /// Which tables are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,13 +25,13 @@ pub(crate) enum Tables {
 /// does not have is empty.
 ///
 /// # Errors
-/// [`WriteError`] if the folder cannot be made or a table not be written.
+/// [`Error`] if the folder cannot be made or a table not be written.
 pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,
     tables: Tables,
 ) -> Result<Vec<PathBuf>, CurateError> {
-    std::fs::create_dir_all(path).map_err(|e| WriteError::new(path, e))?;
+    std::fs::create_dir_all(path).map_err(|e| not_written(path, e))?;
     let mut written = Vec::new();
     let mut table = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = path.join(name);
@@ -41,7 +42,7 @@ pub(crate) fn write_tables(
             file.sync_all().map(Some)
         })?;
         written.push(path);
-        Ok::<(), WriteError>(())
+        Ok::<(), Error>(())
     };
     table("cases.csv", &|out| write_cases(out, cases))?;
     table("curves.csv", &|out| write_sampled(out, cases))?;

@@ -29,6 +29,7 @@ mod group;
 mod layout;
 pub(crate) mod names;
 
+use crate::error::Error;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::io;
@@ -36,7 +37,7 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CurveError, Origin, StoppedMass};
-use crate::file::{WriteError, write_whole};
+use crate::file::write_whole;
 use crate::guess;
 
 /// The cases of one database file.
@@ -191,9 +192,9 @@ pub enum DatabaseError {
         /// What is wrong, in the words of the library.
         detail: String,
     },
-    /// It cannot be written.
+    /// A room below says why.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Below(#[from] Error),
 }
 
 impl Database {
@@ -227,7 +228,7 @@ impl Database {
     /// there, attributes, datasets and groups, stays in it.
     ///
     /// # Errors
-    /// [`DatabaseError::Write`] if the target cannot be written, [`DatabaseError::WouldDrop`] if
+    /// If the target cannot be written, and [`DatabaseError::WouldDrop`] if
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), DatabaseError> {
         if path.is_file() {

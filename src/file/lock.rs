@@ -5,25 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::folder::explained;
-
-/// Why the lock was not given.
-#[derive(Debug, thiserror::Error)]
-pub enum LockError {
-    /// Another process holds it.
-    #[error("{path} is being written by another process: try again when it has finished")]
-    Busy {
-        /// The file that is to be written.
-        path: PathBuf,
-    },
-    /// No lock can be made.
-    #[error("cannot write {path}, because no lock can be made beside it: {source}")]
-    Io {
-        /// The file that is to be written.
-        path: PathBuf,
-        /// Why there is no lock.
-        source: io::Error,
-    },
-}
+use crate::error::{Error, error};
 
 /// Held while a database or the result of a sweep is read, changed and written back.
 #[derive(Debug)]
@@ -37,11 +19,17 @@ impl WriterLock {
     /// Takes the lock of the file at `target`: one beside it, of its name and `.lock`.
     ///
     /// # Errors
-    /// [`LockError::Busy`] if another process holds it; [`LockError::Io`] if none can be made.
-    pub fn take(target: &Path) -> Result<Self, LockError> {
+    /// Of code [`ErrorCode::Locked`](crate::error::ErrorCode::Locked) if another process holds it, and of code
+    /// [`ErrorCode::Io`](crate::error::ErrorCode::Io) if its file cannot be created.
+    pub fn take(target: &Path) -> Result<Self, Error> {
         let error = |source| {
             let source = explained(target, source);
-            LockError::Io { path: target.into(), source }
+            error!(
+                Io,
+                "cannot write {}, because no lock can be made beside it: {source}",
+                target.display()
+            )
+            .caused_by(source)
         };
         // A link and its target are one file.
         let real = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
@@ -50,7 +38,11 @@ impl WriterLock {
         let path = real.with_file_name(name);
         match lock(&path).map_err(error)? {
             Some(file) => Ok(Self { _file: file, path }),
-            None => Err(LockError::Busy { path: target.into() }),
+            None => Err(error!(
+                Locked,
+                "{} is being written by another process: try again when it has finished",
+                target.display()
+            )),
         }
     }
 }
@@ -102,13 +94,14 @@ pub(super) fn is_at(_: &File, path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::ErrorCode;
 
     #[test]
     fn a_second_writer_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let database = folder.path().join("a.h5");
         let held = WriterLock::take(&database).unwrap();
-        assert!(matches!(WriterLock::take(&database), Err(LockError::Busy { .. })));
+        assert_eq!(WriterLock::take(&database).unwrap_err().code(), ErrorCode::Locked);
         drop(held);
         WriterLock::take(&database).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -9,9 +9,8 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-pub use lock::LockError;
 pub use lock::WriterLock;
-pub use write::WriteError;
+pub(crate) use write::not_written;
 pub(crate) use write::write_all_whole;
 pub use write::write_at;
 pub(crate) use write::write_by_path;

@@ -7,25 +7,13 @@ use std::path::{Path, PathBuf};
 
 use super::folder::{explained, folder_of};
 use super::lock::{is_at, lock};
+use crate::error::{Error, error};
 
-/// A file could not be written; whatever stood there before still does.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}{}", if *.is_old_kept { "; what was there before is unchanged" } else { "" })]
-pub struct WriteError {
-    /// The file.
-    pub path: PathBuf,
-    /// Whether there was anything before.
-    is_old_kept: bool,
-    /// Why not.
-    #[source]
-    pub source: io::Error,
-}
-
-impl WriteError {
-    /// Says of some causes what to do.
-    pub(crate) fn new(path: &Path, source: io::Error) -> Self {
-        Self { path: path.into(), is_old_kept: path.is_file(), source: explained(path, source) }
-    }
+/// The error of a file that cannot be written; what was there before still is.
+pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
+    let source = explained(path, source);
+    let unchanged = if path.is_file() { "; what was there before is unchanged" } else { "" };
+    error!(Io, "cannot write {}: {source}{unchanged}", path.display()).caused_by(source)
 }
 
 /// Writes `bytes` to `path` as a whole: to a temporary file beside it, then by renaming.
@@ -33,8 +21,8 @@ impl WriteError {
 /// A device or a pipe cannot be renamed over and is written directly.
 ///
 /// # Errors
-/// [`WriteError`] names the path; nothing half-written stays behind.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+/// [`Error`] names the path; nothing half-written stays behind.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_all_whole(&[(path, bytes)])
 }
 
@@ -42,11 +30,11 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 /// them are written.
 ///
 /// # Errors
-/// [`WriteError`] names the first path that cannot be written.
-pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
+/// [`Error`] names the first path that cannot be written.
+pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), Error> {
     let mut prepared: Vec<(&Path, Draft)> = Vec::new();
     for (path, bytes) in files {
-        let failed = |source| WriteError::new(path, source);
+        let failed = |source| not_written(path, source);
         let target = target_of(path);
         if prepared.iter().any(|(_, draft)| draft.target == target) {
             return Err(failed(io::Error::new(
@@ -59,7 +47,7 @@ pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError
         }
     }
     for (path, draft) in prepared {
-        draft.place().map_err(|source| WriteError::new(path, source))?;
+        draft.place().map_err(|source| not_written(path, source))?;
     }
     Ok(())
 }
@@ -70,11 +58,11 @@ pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), WriteError
 /// The content is not forced to the disk: it is derived from a file that is still there.
 ///
 /// # Errors
-/// [`WriteError`] names the path; nothing half-written stays behind.
+/// [`Error`] names the path; nothing half-written stays behind.
 pub fn write_at<T>(
     path: &Path,
     fill: impl FnOnce(&File) -> io::Result<Option<T>>,
-) -> Result<Option<T>, WriteError> {
+) -> Result<Option<T>, Error> {
     let write = || -> io::Result<Option<T>> {
         let draft = Draft::beside(path)?;
         let done = fill(&draft.file)?;
@@ -83,19 +71,19 @@ pub fn write_at<T>(
         }
         Ok(done)
     };
-    write().map_err(|source| WriteError::new(path, source))
+    write().map_err(|source| not_written(path, source))
 }
 
 /// Writes a file as `write_whole` does, by a function that is given the path of the temporary
 /// file and may do with it what it likes but remove it.
 ///
 /// # Errors
-/// [`WriteError`] names the path, or of `fill`; nothing is replaced then.
-pub(crate) fn write_by_path<E: From<WriteError>>(
+/// [`Error`] names the path, or of `fill`; nothing is replaced then.
+pub(crate) fn write_by_path<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,
 ) -> Result<(), E> {
-    let failed = |source| WriteError::new(path, source);
+    let failed = |source| not_written(path, source);
     let draft = Draft::beside(path).map_err(failed)?;
     fill(&draft.path)?;
     draft.file.sync_all().and_then(|()| draft.place()).map_err(failed)?;

@@ -12,8 +12,6 @@ use std::io;
 use std::path::Path;
 
 use crate::file;
-pub use table::TableError;
-
 pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
     FileLocking, Group,

@@ -8,40 +8,9 @@ use std::path::{Path, PathBuf};
 use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
 use super::skeleton::{Skeleton, write_all_at};
-use super::{AttrValue, Dataset, Error, File, FileBuilder, OpenError, declared_bytes};
-use crate::file::{WriteError, write_at};
-
-/// Why a table cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub enum TableError {
-    /// It cannot be opened as HDF5.
-    #[error("{path}: {source}")]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        source: OpenError,
-    },
-    /// What it holds is not what it should.
-    #[error("{path}: {place}: {detail}")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Column or attribute.
-        place: String,
-        /// What is wrong with it.
-        detail: String,
-    },
-    /// The library did not write the values of a column in one piece, as writing it later needs.
-    #[error("{path}: a large column is not written in one piece")]
-    InPieces {
-        /// The file that was to be written.
-        path: PathBuf,
-    },
-    /// The target cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-}
+use super::{AttrValue, Dataset, File, FileBuilder, OpenError, declared_bytes};
+use crate::error::{Error, error};
+use crate::file::write_at;
 
 /// What the values of a column are; all have a fixed number of bytes, little endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,13 +87,13 @@ const SMALL_BYTES: u64 = 1 << 16;
 /// and the same values give the same bytes in whatever pieces they are put.
 ///
 /// # Errors
-/// [`TableError`] if the target cannot be written, or of `fill`.
+/// It if the target cannot be written, or of `fill`.
 pub(crate) fn write_table(
     path: &Path,
     attributes: &[(&str, Attribute)],
     columns: &[Column],
     fill: impl FnOnce(&mut Put<'_>) -> io::Result<()>,
-) -> Result<(), TableError> {
+) -> Result<(), Error> {
     let mut held: Vec<Option<Vec<u8>>> = columns
         .iter()
         .map(|c| {
@@ -159,7 +128,9 @@ pub(crate) fn write_table(
         }
         file.sync_all().map(Some)
     })?;
-    written.ok_or_else(|| TableError::InPieces { path: path.into() })
+    written.ok_or_else(|| {
+        error!(Other, "{}: a large column is not written in one piece", path.display())
+    })
 }
 
 /// The file with the values of the columns that are held, and places for the others.
@@ -220,10 +191,12 @@ impl Table {
     /// Opens a table whose root attribute `format` is `format`; values are not read yet.
     ///
     /// # Errors
-    /// [`TableError`] if it is not HDF5, or no such table.
-    pub(crate) fn open(path: &Path, format: &str) -> Result<Self, TableError> {
-        let file =
-            super::open(path).map_err(|source| TableError::Open { path: path.into(), source })?;
+    /// It if it is not HDF5, or no such table.
+    pub(crate) fn open(path: &Path, format: &str) -> Result<Self, Error> {
+        let file = super::open(path).map_err(|source| match source {
+            OpenError::Io(source) => Error::io(path, source),
+            source => error!(Other, "{}: {source}", path.display()),
+        })?;
         let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
         match table.attribute("format")? {
             Some(Attribute::Text(found)) if found == format => {}
@@ -246,8 +219,8 @@ impl Table {
         Ok(table)
     }
 
-    fn column(&self, name: &str, dataset: &Dataset) -> Result<Column, TableError> {
-        let failed = |e: Error| self.damaged(name, e.to_string());
+    fn column(&self, name: &str, dataset: &Dataset) -> Result<Column, Error> {
+        let failed = |e: hdf5_pure::Error| self.damaged(name, e.to_string());
         let values = match dataset.datatype().map_err(failed)? {
             Datatype::String { size, .. } if size > 0 => Values::Text { width: size as usize },
             found if found == make_i64_type() => Values::Integer,
@@ -262,8 +235,8 @@ impl Table {
     /// An attribute of the file, if it has it.
     ///
     /// # Errors
-    /// [`TableError::Damaged`] if attributes cannot be read.
-    pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, TableError> {
+    /// [`Error::Damaged`] if attributes cannot be read.
+    pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, Error> {
         let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
         Ok(match all.remove(name) {
             Some(AttrValue::VarLenString(text) | AttrValue::String(text)) => {
@@ -277,8 +250,8 @@ impl Table {
     /// Bytes of `rows` values of a column from `row` on.
     ///
     /// # Errors
-    /// [`TableError::Damaged`] names the column.
-    pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, TableError> {
+    /// [`Error::Damaged`] names the column.
+    pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, Error> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);
         if bytes > MAX_PIECE_BYTES {
@@ -292,8 +265,8 @@ impl Table {
         }
     }
 
-    fn damaged(&self, place: &str, detail: String) -> TableError {
-        TableError::Damaged { path: self.path.clone(), place: place.into(), detail }
+    fn damaged(&self, place: &str, detail: String) -> Error {
+        error!(Other, "{}: {place}: {detail}", self.path.display())
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod units;
 
+use crate::error::Error;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io;
@@ -11,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use crate::file::{WriteError, write_at, write_whole};
+use crate::file::{write_at, write_whole};
 use crate::hdf5::dimensions::{Dimensions, Scale};
 use crate::hdf5::skeleton::{Skeleton, write_all_at};
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
@@ -33,9 +34,9 @@ pub enum ConvertError {
         /// Why not, in the words of the library.
         detail: String,
     },
-    /// The output cannot be written.
+    /// A room below says why.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Below(#[from] Error),
 }
 
 /// What is known of a file's histories beside the file.

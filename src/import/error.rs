@@ -1,11 +1,11 @@
 //! Why nothing was added.
 
+use crate::error::Error;
 use std::path::PathBuf;
 
 use crate::curve::ForceKind;
 use crate::curve::from_table::FromTableError;
 use crate::database::DatabaseError;
-use crate::file::LockError;
 use crate::formats::read::ReadCurveError;
 
 /// Why nothing was added.
@@ -125,7 +125,7 @@ pub(crate) enum ImportError {
     /// The database is not ours, or damaged.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// Another process writes it.
+    /// A room below says why.
     #[error(transparent)]
-    Lock(#[from] LockError),
+    Below(#[from] Error),
 }

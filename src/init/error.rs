@@ -4,7 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use super::LeftOut;
-use crate::scenario::ScenarioError;
+use crate::error::Error;
 use crate::study::StudyError;
 use crate::surrogate::ModelError;
 
@@ -101,7 +101,7 @@ pub enum InitError {
     Model(#[from] ModelError),
     /// The proposal itself is no scenario.
     #[error(transparent)]
-    Scenario(#[from] ScenarioError),
+    Scenario(#[from] Error),
 }
 
 fn listed(left_out: &[LeftOut]) -> String {

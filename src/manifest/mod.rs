@@ -1,70 +1,34 @@
 //! TOML files written by users: parsing, with errors that name file, line and column and show the line.
 
-mod place;
-
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
+use crate::error::{Error, Place, error};
 use crate::file;
 use crate::guess;
-pub use place::Place;
-pub(crate) use place::{Document, KeyPath};
 
 /// Manifests have a few kilobytes; anything beyond this is another kind of file.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// Why a TOML file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum ManifestError {
-    /// The file cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The text is no TOML, or has a key or value that does not belong there.
-    #[error("{place}: {message}")]
-    Toml {
-        /// Where.
-        place: Place,
-        /// What is wrong.
-        message: String,
-    },
-}
-
-impl ManifestError {
-    /// Where in the file it is wrong.
-    pub(crate) fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Io { .. } => None,
-            Self::Toml { place, .. } => Some(place),
-        }
-    }
-}
-
 /// Reads and parses the TOML file at `path`.
 ///
 /// # Errors
-/// [`ManifestError`] with the place of an unknown key, a missing key or a bad value.
-pub(crate) fn load<T: DeserializeOwned>(path: &Path) -> Result<T, ManifestError> {
+/// Of code [`Toml`](crate::error::ErrorCode::Toml), with the place of an unknown key, a missing key or a bad value.
+pub(crate) fn load<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     parse(path, &read_text(path)?)
 }
 
 /// Reads the text of the TOML file at `path`.
 ///
 /// # Errors
-/// [`ManifestError::Io`] for what is no file, not UTF-8 or too large.
-pub(crate) fn read_text(path: &Path) -> Result<String, ManifestError> {
-    file::read_text(path, MAX_BYTES)
-        .map_err(|source| ManifestError::Io { path: path.into(), source })
+/// Of code [`Io`](crate::error::ErrorCode::Io) for what is no file, not UTF-8 or too large.
+pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
+    file::read_text(path, MAX_BYTES).map_err(|source| Error::io(path, source))
 }
 
 /// Parses TOML text; `path` is for messages.
-pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ManifestError> {
+pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Error> {
     toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', "; ");
         // What the file lacks as a whole is shown at its first line.
@@ -73,7 +37,7 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, M
             None => Place::new(path, text, 0..0),
         };
         let message = format!("{message}{}", guess_of(&message));
-        ManifestError::Toml { place, message }
+        error!(Toml, "{message}").placed(|_| place)
     })
 }
 

@@ -3,6 +3,7 @@
 //! Exponential, logarithm and error function are those of `libm`, so that the values do not
 //! depend on the machine's C library.
 
+use crate::error::{Error, error};
 use crate::stream::{Stream, mix};
 
 /// Least share of a distribution that its bounds may leave.
@@ -39,29 +40,6 @@ pub(crate) fn permuted(k: u64, n: u64, key_of_order: u64) -> u64 {
             return at;
         }
     }
-}
-
-/// Why numbers make no distribution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DistributionError {
-    /// The ends are not in order.
-    #[error("from must lie below to")]
-    Ends,
-    /// The three points are not in order.
-    #[error("from, mode and to must rise")]
-    Triangle,
-    /// The bounds are not in order.
-    #[error("min must lie below max")]
-    Bounds,
-    /// No deviation.
-    #[error("sd must be above 0")]
-    Deviation,
-    /// A lognormal quantity is above 0.
-    #[error("a lognormal distribution needs mean and max above 0")]
-    NotPositive,
-    /// Hardly anything lies between the bounds.
-    #[error("min and max leave nothing of the distribution")]
-    NothingLeft,
 }
 
 /// A distribution by its quantile function.
@@ -105,13 +83,15 @@ pub(crate) struct Truncated {
 }
 
 impl Truncated {
-    fn new(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, DistributionError> {
+    fn new(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, Error> {
         let (low, high) = ((min - mean) / sd, (max - mean) / sd);
         let (signed_sd, low, high) = if low > 0.0 { (-sd, -high, -low) } else { (sd, low, high) };
         let below = normal_share(low);
         let between = normal_share(high) - below;
         if between.is_nan() || between <= LEAST_SHARE {
-            return Err(DistributionError::NothingLeft);
+            return Err(
+                error!(Sweep at "distribution", "min and max leave nothing of the distribution"),
+            );
         }
         Ok(Self { mean, sd: signed_sd, min, max, below, between })
     }
@@ -127,35 +107,30 @@ impl Distribution {
     /// Every value between the ends is equally likely.
     ///
     /// # Errors
-    /// [`DistributionError`] if the ends are not in order.
-    pub(crate) fn uniform(from: f64, to: f64) -> Result<Self, DistributionError> {
+    /// [`Error`] if the ends are not in order.
+    pub(crate) fn uniform(from: f64, to: f64) -> Result<Self, Error> {
         match from < to {
             true => Ok(Self::Uniform { from, to }),
-            false => Err(DistributionError::Ends),
+            false => Err(error!(Sweep at "to", "from must lie below to")),
         }
     }
 
     /// The density rises from 0 at `from` to `mode`, and falls to 0 at `to`.
     ///
     /// # Errors
-    /// [`DistributionError`] if the three are not in order.
-    pub(crate) fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, DistributionError> {
+    /// [`Error`] if the three are not in order.
+    pub(crate) fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, Error> {
         match from < to && from <= mode && mode <= to {
             true => Ok(Self::Triangular { from, mode, to }),
-            false => Err(DistributionError::Triangle),
+            false => Err(error!(Sweep at "mode", "from, mode and to must rise")),
         }
     }
 
     /// Normal of mean and standard deviation, truncated to `[min, max]` (infinite: not).
     ///
     /// # Errors
-    /// [`DistributionError`] if the deviation is not above 0 or the bounds leave nothing.
-    pub(crate) fn normal(
-        mean: f64,
-        sd: f64,
-        min: f64,
-        max: f64,
-    ) -> Result<Self, DistributionError> {
+    /// [`Error`] if the deviation is not above 0 or the bounds leave nothing.
+    pub(crate) fn normal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, Error> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
@@ -166,17 +141,15 @@ impl Distribution {
     ///
     /// # Errors
     /// As of [`Distribution::normal`], and if mean or `max` is not above 0.
-    pub(crate) fn lognormal(
-        mean: f64,
-        sd: f64,
-        min: f64,
-        max: f64,
-    ) -> Result<Self, DistributionError> {
+    pub(crate) fn lognormal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, Error> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
         }
         if !(mean > 0.0 && max > 0.0) {
-            return Err(DistributionError::NotPositive);
+            return Err(
+                error!(Sweep at "distribution", "a lognormal distribution needs mean and max above 0"
+                ),
+            );
         }
         let variance = libm::log1p((sd / mean) * (sd / mean));
         let log = |bound: f64| if bound > 0.0 { libm::log(bound) } else { f64::NEG_INFINITY };
@@ -202,8 +175,12 @@ impl Distribution {
     }
 }
 
-fn order(sd: f64) -> DistributionError {
-    if sd > 0.0 { DistributionError::Bounds } else { DistributionError::Deviation }
+fn order(sd: f64) -> Error {
+    if sd > 0.0 {
+        error!(Sweep at "max", "min must lie below max")
+    } else {
+        error!(Sweep at "sd", "sd must be above 0")
+    }
 }
 
 /// Share of the standard normal distribution below `z`.

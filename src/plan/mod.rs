@@ -4,18 +4,15 @@
 //! item `k` its values.
 
 pub(crate) mod draw;
-mod error;
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::error::{Error, error};
 use crate::unit::{LENGTH, MASS, SPEED};
 use draw::Distribution;
-pub use draw::DistributionError;
-pub use error::PlanError;
-pub use error::VaryError;
 
 /// More items than any cluster could run; keeps a mistyped number from passing.
 pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
@@ -283,18 +280,33 @@ impl Plan {
     /// The design of these spreads, one per variable.
     ///
     /// # Errors
-    /// [`PlanError`] if `samples` is missing or without use, or the items are too many.
-    pub(crate) fn design(&self, spreads: Vec<Spread>) -> Result<Design, PlanError> {
+    /// [`Error`] if `samples` is missing or without use, or the items are too many.
+    pub(crate) fn design(&self, spreads: Vec<Spread>) -> Result<Design, Error> {
         let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
         let samples = match (self.samples, drawn) {
-            (Some(0), _) => return Err(PlanError::NoSample),
+            (Some(0), _) => {
+                return Err(error!(Sweep at "samples", "sweep.samples is 0: expected 1 or more"));
+            }
             (Some(samples), true) => samples,
-            (None, true) => return Err(PlanError::SamplesMissing),
-            (Some(_), false) => return Err(PlanError::SamplesUnused),
+            (None, true) => {
+                return Err(
+                    error!(Sweep at "samples", "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid"
+                    ),
+                );
+            }
+            (Some(_), false) => {
+                return Err(
+                    error!(Sweep at "samples", "sweep.samples is given, but no variable has a distribution: remove samples"
+                    ),
+                );
+            }
             (None, false) => 1,
         };
         if self.sampling == Sampling::LatinHypercube && !drawn {
-            return Err(PlanError::SamplingUnused);
+            return Err(
+                error!(Sweep at "sampling", "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"
+                ),
+            );
         }
         let items = spreads
             .iter()
@@ -302,7 +314,13 @@ impl Plan {
             .filter(|items| *items <= MAX_ITEMS);
         let Some(items) = items else {
             let factors = [samples].into_iter().chain(spreads.iter().map(Spread::len));
-            return Err(PlanError::TooMany { factors: factors.filter(|n| *n > 1).collect() });
+            let factors: Vec<String> = factors.filter(|n| *n > 1).map(|n| n.to_string()).collect();
+            let key = if self.samples.is_some() { "samples" } else { "vary" };
+            return Err(
+                error!(Sweep at key, "the sweep has {} items: {MAX_ITEMS} at most; shorten values, steps or samples",
+                    factors.join(" × ")
+                ),
+            );
         };
         let (seed, sampling) = (self.seed, self.sampling);
         Ok(Design { spreads, samples, items, seed, sampling })
@@ -368,8 +386,8 @@ impl Vary {
     /// Its values or distribution.
     ///
     /// # Errors
-    /// [`VaryError`] names the key.
-    pub(crate) fn spread(&self) -> Result<Spread, VaryError> {
+    /// [`Error`] names the key.
+    pub(crate) fn spread(&self) -> Result<Spread, Error> {
         if let Some(name) = self.distribution {
             self.refuse("distribution", &["values", "steps"])?;
             return Ok(Spread::Drawn(self.drawn(name)?));
@@ -378,35 +396,34 @@ impl Vary {
         match (&self.values, &self.from, &self.to, self.steps) {
             (Some(values), None, None, None) => {
                 if values.is_empty() {
-                    return Err(VaryError::NoValues);
+                    return Err(error!(Sweep at "values", "values is empty: give one or more"));
                 }
                 if self.what == What::Curve {
                     return Ok(Spread::Names(values.iter().map(|v| v.0.clone()).collect()));
                 }
-                let numbers: Result<Vec<f64>, VaryError> =
+                let numbers: Result<Vec<f64>, Error> =
                     values.iter().map(|value| self.number("values", value)).collect();
                 Ok(Spread::List(numbers?))
             }
             (None, Some(from), Some(to), Some(steps)) => {
                 if self.what == What::Curve {
-                    return Err(VaryError::CurveValues);
+                    return Err(error!(Sweep, "a curve needs values = [\"…\"], names in [curves]"));
                 }
                 if steps < 2 {
-                    return Err(VaryError::Steps { found: steps });
+                    return Err(error!(Sweep at "steps", "steps is {steps}: expected 2 or more"));
                 }
                 let (from, to) = (self.number("from", from)?, self.number("to", to)?);
                 Ok(Spread::Even { from, to, steps })
             }
-            _ => Err(VaryError::NoSpread),
+            _ => Err(error!(Sweep, "give values = […], or from, to and steps, or a distribution")),
         }
     }
 
-    fn drawn(&self, name: DistributionName) -> Result<Distribution, VaryError> {
+    fn drawn(&self, name: DistributionName) -> Result<Distribution, Error> {
         if self.what == What::Curve {
-            return Err(VaryError::CurveValues);
+            return Err(error!(Sweep, "a curve needs values = [\"…\"], names in [curves]"));
         }
-        let ends =
-            || Ok::<_, VaryError>((self.need("from", &self.from)?, self.need("to", &self.to)?));
+        let ends = || Ok::<_, Error>((self.need("from", &self.from)?, self.need("to", &self.to)?));
         match name {
             DistributionName::Uniform => {
                 self.refuse("uniform", &["mean", "sd", "mode", "min", "max"])?;
@@ -434,15 +451,15 @@ impl Vary {
         }
     }
 
-    fn need(&self, key: &'static str, entry: &Option<Entry>) -> Result<f64, VaryError> {
+    fn need(&self, key: &'static str, entry: &Option<Entry>) -> Result<f64, Error> {
         match entry {
             Some(entry) => self.number(key, entry),
-            None => Err(VaryError::Missing { key }),
+            None => Err(error!(Sweep at "distribution", "the distribution needs {key} = …")),
         }
     }
 
     /// Refuses keys that do not go with `with`.
-    fn refuse(&self, with: &'static str, keys: &[&'static str]) -> Result<(), VaryError> {
+    fn refuse(&self, with: &'static str, keys: &[&'static str]) -> Result<(), Error> {
         let given = |key: &str| match key {
             "values" => self.values.is_some(),
             "from" => self.from.is_some(),
@@ -455,13 +472,16 @@ impl Vary {
             _ => self.max.is_some(),
         };
         match keys.iter().find(|key| given(key)) {
-            Some(&key) => Err(VaryError::Together { key, with }),
+            Some(&key) => {
+                Err(error!(Sweep at key, "{key} does not go with {with}: remove one of them")
+                    .itself())
+            }
             None => Ok(()),
         }
     }
 
     /// SI value of an entry.
-    fn number(&self, key: &'static str, entry: &Entry) -> Result<f64, VaryError> {
+    fn number(&self, key: &'static str, entry: &Entry) -> Result<f64, Error> {
         let text = &entry.0;
         let dimension = match (self.what, self.factor) {
             (What::Speed, false) => Some(&SPEED),
@@ -471,14 +491,11 @@ impl Vary {
         };
         let value = match dimension {
             Some(dimension) => {
-                dimension.parse(text).map_err(|source| VaryError::Unit { key, source })?
+                dimension.parse(text).map_err(|source| error!(Sweep at key, "{key}: {source}"))?
             }
-            None => text
-                .trim()
-                .parse()
-                .ok()
-                .filter(|v: &f64| v.is_finite())
-                .ok_or_else(|| VaryError::NoNumber { key, text: text.clone() })?,
+            None => text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
+                error!(Sweep at key, "{key}: \"{text}\" is no number: write a plain one, such as 0.9")
+            })?,
         };
         let (low, high) = match (self.what, self.factor) {
             // How far values scatter has no sign of its own to check here.
@@ -493,7 +510,12 @@ impl Vary {
             _ => (0.0, f64::INFINITY),
         };
         if value < low || value > high {
-            return Err(VaryError::Range { key, text: text.clone(), low, high });
+            let range = if high.is_finite() {
+                format!("from {low} to {high}")
+            } else {
+                format!("{low} or more")
+            };
+            return Err(error!(Sweep at key, "{key}: {text} is out of range: expected {range}"));
         }
         Ok(value)
     }
@@ -505,7 +527,7 @@ mod tests {
 
     fn design(text: &str) -> Result<Design, String> {
         let plan: Plan = toml::from_str(text).map_err(|e| e.message().to_string())?;
-        let spreads: Result<Vec<Spread>, VaryError> = plan.vary.iter().map(Vary::spread).collect();
+        let spreads: Result<Vec<Spread>, Error> = plan.vary.iter().map(Vary::spread).collect();
         plan.design(spreads.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
     }
 

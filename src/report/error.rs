@@ -2,7 +2,7 @@
 
 use crate::assess::error::{CompareError, ValidateError};
 use crate::database::DatabaseError;
-use crate::scenario::ScenarioError;
+use crate::error::Error;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -16,13 +16,7 @@ pub(crate) enum ReportError {
     /// Methods cannot be compared.
     #[error("{0}")]
     Compare(#[from] CompareError),
-    /// A scenario is wrong.
+    /// A room below says why.
     #[error("{0}")]
-    Scenario(#[from] Box<ScenarioError>),
-}
-
-impl From<ScenarioError> for ReportError {
-    fn from(error: ScenarioError) -> Self {
-        Self::Scenario(Box::new(error))
-    }
+    Below(#[from] Error),
 }

@@ -3,79 +3,29 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::end::{Crush, PlatesError, crush_between, crush_end, plates};
+use super::end::{Crush, crush_between, crush_end, plates};
 use super::layout::{End, Joint, Layout, Role, Slot, layout};
 use super::place::{self, Origin};
-use super::spring::{NoSpring, Spring, SpringError, spring};
-use super::{
-    CheckedScenario, CurveSource, LawName, LimitsTable, Prepared, ScenarioError, Sources, Used,
-};
+use super::spring::{Spring, scale_error, spring};
+use super::{CheckedScenario, CurveSource, LawName, LimitsTable, Prepared, Sources, Used};
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::multibody::{
-    Chain, ChainError, Damping, DampingError, ForceLaw, Interface, Method, RunSettings, Tension,
+    Chain, ChainError, Damping, ForceLaw, Interface, Method, RunSettings, Tension,
 };
 use crate::surrogate::Model;
 use crate::unit::SpeedKind;
-
-/// Why a curve cannot stand where the scenario puts it.
-#[derive(Debug, thiserror::Error)]
-pub enum AssemblyError {
-    /// The sources are those of another scenario.
-    #[error("curve \"{curve}\" has not been read")]
-    NotRead {
-        /// The curve.
-        curve: String,
-    },
-    /// It gives no force law.
-    #[error("curve \"{curve}\": {source}")]
-    NoSpring {
-        /// The curve.
-        curve: String,
-        /// Why not.
-        source: SpringError,
-    },
-    /// Its damper breaks the rules of a damper.
-    #[error("curve \"{curve}\": {source}")]
-    Damping {
-        /// The curve.
-        curve: String,
-        /// What is wrong with it.
-        source: DampingError,
-    },
-    /// The plates of two ends.
-    #[error("between two plates: {source}")]
-    Plates {
-        /// What is wrong.
-        source: PlatesError,
-    },
-    /// It was measured at speeds of the other kind.
-    #[error(
-        "curve \"{curve}\" was measured at {} speeds, but interface {interface} needs one of {} speeds",
-        .kind.name(),
-        .expected.name()
-    )]
-    Speeds {
-        /// The curve.
-        curve: String,
-        /// Kind of its speeds.
-        kind: SpeedKind,
-        /// The interface that it should stand at.
-        interface: String,
-        /// Kind of that interface's speed.
-        expected: SpeedKind,
-    },
-}
 
 /// Puts a scenario together with what its files hold, with curves for given speeds of the
 /// interfaces, in the order of the chain; `path` is for messages.
 ///
 /// # Errors
-/// [`ScenarioError`] names the key or curve.
+/// It names the key or curve.
 pub(super) fn assemble_at(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     sources: &Sources,
     speeds_m_per_s: &[f64],
-) -> Result<Prepared, ScenarioError> {
+) -> Result<Prepared, Error> {
     let Layout { bodies, slots, order, vehicles } = layout(scenario);
     let mut builder = Builder { path, scenario, sources, made: Vec::new(), warnings: Vec::new() };
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
@@ -133,12 +83,12 @@ fn limited(scenario: &CheckedScenario<'_>, vehicles: &[usize], limits: &LimitsTa
 /// on gaps too if it is sought for the interface's own speed.
 ///
 /// # Errors
-/// [`ScenarioError`] as of [`assemble`](super::assemble); the chain is then not to be run.
+/// As of [`assemble`](super::assemble); the chain is then not to be run.
 pub(crate) fn adjust(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     prepared: &mut Prepared,
-) -> Result<(), ScenarioError> {
+) -> Result<(), Error> {
     let Layout { bodies, slots, .. } = layout(scenario);
     let motions: Vec<(f64, f64)> = bodies.iter().map(|b| (b.mass_kg, b.speed_m_per_s)).collect();
     let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
@@ -155,8 +105,9 @@ pub(crate) fn adjust(
     adjusted.map_err(|source| no_chain(path, scenario, source))
 }
 
-fn no_chain(path: &Path, scenario: &CheckedScenario<'_>, source: ChainError) -> ScenarioError {
-    ScenarioError::Chain { place: scenario.place(path, &scenario.chain_key(&source)), source }
+fn no_chain(path: &Path, scenario: &CheckedScenario<'_>, source: ChainError) -> Error {
+    let key = scenario.chain_key(&source);
+    Error::below(ErrorCode::Scenario, source).at(key).placed(|key| scenario.place(path, key))
 }
 
 /// What results name as the curve where plates meet.
@@ -181,13 +132,19 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn failed(&self, source: AssemblyError) -> ScenarioError {
-        let place = self.scenario.place(self.path, &place::assembly_key(&source));
-        ScenarioError::Assembly { place, source: source.into() }
+    /// Puts an error at the place of its key.
+    fn failed(&self, error: Error) -> Error {
+        error.placed(|key| self.scenario.place(self.path, key))
     }
 
-    fn no_spring(&self, curve: &str, source: SpringError) -> ScenarioError {
-        self.failed(AssemblyError::NoSpring { curve: curve.into(), source })
+    /// Puts an error at the place of its key in the table of a curve.
+    fn no_spring(&self, curve: &str, error: Error) -> Error {
+        self.failed(error.of(format_args!("curve \"{curve}\"")).inside(place::curve(curve)))
+    }
+
+    fn not_read(&self, curve: &str) -> Error {
+        let error = error!(Scenario, "curve \"{curve}\" has not been read");
+        self.failed(error.at(place::curve(curve)))
     }
 
     /// An interface that a curve of the scenario tells.
@@ -196,7 +153,7 @@ impl<'a> Builder<'a> {
         slot: &Slot<'_>,
         curve: &str,
         speed: f64,
-    ) -> Result<(Interface, Used), ScenarioError> {
+    ) -> Result<(Interface, Used), Error> {
         let made = self.law(slot, curve, speed)?;
         let table = &self.scenario.curves[curve];
         let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
@@ -208,7 +165,8 @@ impl<'a> Builder<'a> {
         if let Some(damping) = &table.damping {
             let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
             let damping = Damping::new(points.0, points.1).map_err(|source| {
-                self.failed(AssemblyError::Damping { curve: curve.into(), source })
+                let error = Error::below(ErrorCode::Scenario, source);
+                self.no_spring(curve, error.at_key("damping"))
             })?;
             interface.damping = Some(damping);
         }
@@ -221,7 +179,7 @@ impl<'a> Builder<'a> {
         slot: &Slot<'_>,
         end: &End<'_>,
         speed: f64,
-    ) -> Result<(Interface, Used), ScenarioError> {
+    ) -> Result<(Interface, Used), Error> {
         let (model, scale) = self.model(end.curve)?;
         let crush = crush_end(model, end, speed, scale)
             .map_err(|source| self.no_spring(end.curve, source))?;
@@ -238,7 +196,7 @@ impl<'a> Builder<'a> {
         curve: &str,
         sides: (usize, Option<usize>),
         speed: f64,
-    ) -> Result<(Interface, Used), ScenarioError> {
+    ) -> Result<(Interface, Used), Error> {
         let (model, scale) = self.model(curve)?;
         self.check_kind(slot, curve, Some(model.speed_kind))?;
         let crush = crush_between(model, slot, sides, speed, scale)
@@ -249,14 +207,15 @@ impl<'a> Builder<'a> {
     }
 
     /// The model of a curve, and the factor on its forces.
-    fn model(&self, curve: &str) -> Result<(&'a Model, f64), ScenarioError> {
+    fn model(&self, curve: &str) -> Result<(&'a Model, f64), Error> {
         let Some(CurveSource::Model(model)) = self.sources.curves.get(curve) else {
-            return Err(self.failed(AssemblyError::NotRead { curve: curve.into() }));
+            return Err(self.not_read(curve));
         };
         let factor = self.scenario.curves[curve].scale.unwrap_or(1.0);
-        match factor > 0.0 && factor.is_finite() {
-            true => Ok((model, factor)),
-            false => Err(self.no_spring(curve, SpringError::Scale { factor })),
+        if factor > 0.0 && factor.is_finite() {
+            Ok((model, factor))
+        } else {
+            Err(self.no_spring(curve, scale_error(factor)))
         }
     }
 
@@ -266,7 +225,7 @@ impl<'a> Builder<'a> {
         slot: &Slot<'_>,
         curve: &str,
         crush: Crush,
-    ) -> Result<(Interface, Used), ScenarioError> {
+    ) -> Result<(Interface, Used), Error> {
         let table = &self.scenario.curves[curve];
         let spring = |source| self.no_spring(curve, source);
         let (law, of_law) = Spring { curve: crush.curve, warnings: crush.warnings }
@@ -288,33 +247,37 @@ impl<'a> Builder<'a> {
         slot: &Slot<'_>,
         curve: &str,
         kind: Option<SpeedKind>,
-    ) -> Result<(), ScenarioError> {
+    ) -> Result<(), Error> {
         let expected = match slot.role {
             Role::Wall => Some(SpeedKind::Wall),
             Role::Noses | Role::Vehicles => Some(SpeedKind::Closing),
             Role::Within => None,
         };
         let (Some(kind), Some(expected)) = (kind, expected) else { return Ok(()) };
-        let (curve, interface) = (curve.into(), slot.name.clone());
-        match kind == expected {
-            true => Ok(()),
-            false => Err(self.failed(AssemblyError::Speeds { curve, kind, interface, expected })),
+        if kind == expected {
+            return Ok(());
         }
+        let (kind, expected, interface) = (kind.name(), expected.name(), &slot.name);
+        let error = error!(
+            Scenario,
+            "curve \"{curve}\" was measured at {kind} speeds, but interface {interface} needs one of {expected} speeds"
+        );
+        Err(self.failed(error.at(place::curve(curve))))
     }
 
     /// Where the plates of two ends meet.
-    fn plates(&mut self, slot: &Slot<'_>) -> Result<(Interface, Used), ScenarioError> {
-        let interface = plates(&slot.name, slot.gap_m.unwrap_or(0.0))
-            .map_err(|source| self.failed(AssemblyError::Plates { source }))?;
+    fn plates(&mut self, slot: &Slot<'_>) -> Result<(Interface, Used), Error> {
+        let interface = plates(&slot.name, slot.gap_m.unwrap_or(0.0)).map_err(|error| {
+            self.failed(error.of("between two plates").at(KeyPath::of("contact")))
+        })?;
         Ok((interface, Used { curve: PLATES.into(), force: Some("contact"), speed_m_per_s: None }))
     }
 
     /// The law of a curve at a slot: made once for all slots that need the same.
-    fn law(&mut self, slot: &Slot<'_>, curve: &str, speed: f64) -> Result<Made, ScenarioError> {
+    fn law(&mut self, slot: &Slot<'_>, curve: &str, speed: f64) -> Result<Made, Error> {
         let table = &self.scenario.curves[curve];
         let source = self.sources.curves.get(curve);
-        let source =
-            source.ok_or_else(|| self.failed(AssemblyError::NotRead { curve: curve.into() }))?;
+        let source = source.ok_or_else(|| self.not_read(curve))?;
         let is_model = matches!(source, CurveSource::Model(_));
         let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
         let key = (
@@ -327,13 +290,8 @@ impl<'a> Builder<'a> {
         if let Some(made) = self.made.iter().find(|m| m.curve == curve && m.key == key) {
             return Ok(made.clone());
         }
-        let spring = spring(source, table, slot, speed).map_err(|e| match e {
-            NoSpring::Spring(source) => self.no_spring(curve, source),
-            NoSpring::Predict(source) => {
-                let place = self.scenario.place(self.path, &place::predict_key(curve, &source));
-                ScenarioError::Predict { place, curve: curve.into(), source }
-            }
-        })?;
+        let spring =
+            spring(source, table, slot, speed).map_err(|error| self.no_spring(curve, error))?;
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
         let force = spring.curve.force.map(|f| f.name());

@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use std::ops::Deref;
 
 use super::layout::layout;
+use super::place;
 use super::{CrushZone, CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
-use crate::guess;
-use crate::manifest::Document;
+use crate::error::{Document, Error, KeyPath, error};
 use crate::unit::km_per_h;
 
 /// A scenario that has been checked; read its tables as those of the [`Scenario`] it was.
@@ -31,210 +31,16 @@ impl Deref for CheckedScenario<'_> {
     }
 }
 
-/// What is wrong with a scenario as a whole.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CheckError {
-    /// A wall takes the place of the second train.
-    #[error("a [wall] needs exactly one [[train]], found {trains}")]
-    WallTrains {
-        /// Number of trains.
-        trains: usize,
-    },
-    /// There is nothing to meet, or too much.
-    #[error("expected two [[train]], or one and a [wall], found {trains} [[train]] and no [wall]")]
-    Trains {
-        /// Number of trains.
-        trains: usize,
-    },
-    /// A limit that nothing keeps.
-    #[error("[limits] mean_deceleration_g = {found}: expected more than 0")]
-    Limit {
-        /// As written, in g.
-        found: f64,
-    },
-    /// Both trains have one name.
-    #[error("two trains are named \"{name}\": give them different names")]
-    TrainTwice {
-        /// The name.
-        name: String,
-    },
-    /// Limits for no train.
-    #[error("[limits] trains is empty: name one, or remove it for all")]
-    NoLimitedTrain,
-    /// Limits for a train that is not there.
-    #[error(
-        "[limits] trains: there is no train \"{name}\": the scenario has {known}{}",
-        guess::hint(name, known)
-    )]
-    UnknownTrain {
-        /// The train.
-        name: String,
-        /// The trains there are.
-        known: String,
-    },
-    /// Two bodies have one name.
-    #[error(
-        "two bodies are named \"{name}\": vehicles, their front and rear and the wall need different names"
-    )]
-    BodyTwice {
-        /// The name.
-        name: String,
-    },
-    /// A name that cannot stand in the columns of the result.
-    #[error("the name \"{}\" may not be empty or contain , | [ ] or quotes", .name.escape_debug())]
-    Name {
-        /// The name.
-        name: String,
-    },
-    /// A train without vehicles.
-    #[error("train \"{train}\" has no vehicles")]
-    NoVehicles {
-        /// The train.
-        train: String,
-    },
-    /// No curve between two vehicles.
-    #[error("train \"{train}\" has {vehicles} vehicles but no inner = \"…\" curve between them")]
-    NoInner {
-        /// The train.
-        train: String,
-        /// How many vehicles it has.
-        vehicles: usize,
-    },
-    /// A contact without a curve between what has no ends of a model.
-    #[error(
-        "[contact] needs curve = \"…\": it can be left out only where the noses that meet come from models (front or ends)"
-    )]
-    NoContact,
-    /// One of two facing ends comes from a model.
-    #[error(
-        "{end} of vehicle \"{vehicle}\" comes from a model and the end that it meets does not: give both, or neither"
-    )]
-    OneEnd {
-        /// The vehicle whose end comes from a model.
-        vehicle: String,
-        /// `front` or `rear`.
-        end: &'static str,
-    },
-    /// A curve where the ends of models meet.
-    #[error(
-        "curve \"{curve}\" stands between ends that come from models, where plates meet: remove it"
-    )]
-    BetweenEnds {
-        /// The curve.
-        curve: String,
-    },
-    /// An end without a mass whose curve is no model.
-    #[error(
-        "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which tells the mass that is stopped"
-    )]
-    EndNeedsModel {
-        /// The vehicle.
-        vehicle: String,
-        /// `front`, `rear` or `ends`.
-        end: &'static str,
-    },
-    /// A curve behind the last vehicle.
-    #[error("there is nothing behind the last vehicle \"{vehicle}\"")]
-    NothingBehind {
-        /// The vehicle.
-        vehicle: String,
-    },
-    /// A crush zone is joined to its body without a gap.
-    #[error(
-        "curve \"{curve}\" has a gap, but {end} of vehicle \"{vehicle}\" is joined to the body without one: give it a curve without gap"
-    )]
-    ZoneGap {
-        /// Curve of the crush zone.
-        curve: String,
-        /// `front` or `rear`.
-        end: &'static str,
-        /// The vehicle.
-        vehicle: String,
-    },
-    /// The crush zones take the whole vehicle.
-    #[error(
-        "the crush zones of vehicle \"{vehicle}\" have all of its mass: nothing is left for the body"
-    )]
-    NoBodyMass {
-        /// The vehicle.
-        vehicle: String,
-    },
-    /// Stages that make no curve.
-    #[error("curve \"{curve}\": stages is empty")]
-    NoStages {
-        /// The curve.
-        curve: String,
-    },
-    /// A key that the kind of curve does not take.
-    #[error("curve \"{curve}\": {key} belongs to {of}: remove it")]
-    ForeignKey {
-        /// The curve.
-        curve: String,
-        /// The key.
-        key: &'static str,
-        /// What takes it.
-        of: &'static str,
-    },
-    /// A tension curve that is not there.
-    #[error(
-        "curve \"{curve}\": its tension curve \"{tension}\" is not in [curves]: it has {known}{}",
-        guess::hint(tension, known)
-    )]
-    UnknownTension {
-        /// The curve.
-        curve: String,
-        /// Its tension curve.
-        tension: String,
-        /// The curves there are.
-        known: String,
-    },
-    /// A tension curve with a tension curve or a damper.
-    #[error(
-        "curve \"{tension}\" is the tension of \"{curve}\": it can have no tension or damping of its own"
-    )]
-    TensionOfTension {
-        /// The curve.
-        curve: String,
-        /// Its tension curve.
-        tension: String,
-    },
-    /// A model as a tension curve.
-    #[error(
-        "curve \"{tension}\" is the tension of \"{curve}\": models know compression only; give a file or stages"
-    )]
-    TensionModel {
-        /// The curve.
-        curve: String,
-        /// Its tension curve.
-        tension: String,
-    },
-    /// The first train does not reach what is in front of it.
-    #[error("train \"{train}\" at {} never meets what is in front of it: it must be faster", km_per_h(*.speed_m_per_s))]
-    NeverMeets {
-        /// The first train.
-        train: String,
-        /// Its speed.
-        speed_m_per_s: f64,
-    },
-    /// A curve that is used and not there.
-    #[error(
-        "there is no curve \"{curve}\" in [curves]: it has {known}{}",
-        guess::hint(curve, known)
-    )]
-    UnknownCurve {
-        /// The curve.
-        curve: String,
-        /// The curves there are.
-        known: String,
-    },
-}
-
 impl Scenario {
+    fn curve_names(&self) -> impl Iterator<Item = &str> {
+        self.curves.keys().map(String::as_str)
+    }
+
     /// Checks the scenario as a whole.
     ///
     /// # Errors
-    /// [`CheckError`] names the key, vehicle or curve.
-    pub(crate) fn check(&self) -> Result<CheckedScenario<'_>, CheckError> {
+    /// It names the key, vehicle or curve.
+    pub(crate) fn check(&self) -> Result<CheckedScenario<'_>, Error> {
         check_shape(self)?;
         if let Some(limits) = &self.limits {
             check_limits(limits, &self.train)?;
@@ -247,8 +53,9 @@ impl Scenario {
         let checked = check_values(self)?;
         for curve in layout(&checked).slots.iter().filter_map(|slot| slot.joint.curve()) {
             if !self.curves.contains_key(curve) {
-                let (curve, known) = (curve.into(), curve_names(self));
-                return Err(CheckError::UnknownCurve { curve, known });
+                return Err(error!(Scenario, "there is no curve \"{curve}\" in [curves]: it has")
+                    .names(curve, self.curve_names())
+                    .at(self.use_of(curve)));
             }
         }
         check_ends(self)?;
@@ -281,58 +88,84 @@ impl CheckedScenario<'_> {
     /// curves stand where: what these cannot break is not looked at again.
     ///
     /// # Errors
-    /// [`CheckError`] as of [`Scenario::check`].
-    pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, CheckError> {
+    /// As of [`Scenario::check`].
+    pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, Error> {
         check_values(varied)
     }
 }
 
 /// Two trains, or one and a wall.
-fn check_shape(scenario: &Scenario) -> Result<(), CheckError> {
+fn check_shape(scenario: &Scenario) -> Result<(), Error> {
     let trains = scenario.train.len();
     match (&scenario.wall, scenario.train.as_slice()) {
         (Some(_), [_]) => Ok(()),
-        (Some(_), _) => Err(CheckError::WallTrains { trains }),
+        (Some(_), _) => {
+            let key = if trains > 1 { place::train(1) } else { KeyPath::of("wall") };
+            Err(error!(Scenario, "a [wall] needs exactly one [[train]], found {trains}").at(key))
+        }
         (None, [first, second]) if first.name == second.name => {
-            Err(CheckError::TrainTwice { name: first.name.clone() })
+            let name = &first.name;
+            Err(error!(Scenario, "two trains are named \"{name}\": give them different names")
+                .at(place::train(1).key("name")))
         }
         (None, [_, _]) => Ok(()),
-        (None, _) => Err(CheckError::Trains { trains }),
+        (None, _) => Err(error!(
+            Scenario,
+            "expected two [[train]], or one and a [wall], found {trains} [[train]] and no [wall]"
+        )
+        .at(place::train(if trains > 2 { 2 } else { 0 }))),
     }
 }
 
-fn check_limits(limits: &LimitsTable, trains: &[TrainTable]) -> Result<(), CheckError> {
+fn check_limits(limits: &LimitsTable, trains: &[TrainTable]) -> Result<(), Error> {
     let found = limits.mean_deceleration_g;
     if !(found > 0.0 && found.is_finite()) {
-        return Err(CheckError::Limit { found });
+        return Err(error!(
+            Scenario at "limits.mean_deceleration_g",
+            "[limits] mean_deceleration_g = {found}: expected more than 0"
+        ));
     }
     if limits.trains.as_ref().is_some_and(Vec::is_empty) {
-        return Err(CheckError::NoLimitedTrain);
+        return Err(error!(
+            Scenario at "limits.trains",
+            "[limits] trains is empty: name one, or remove it for all"
+        ));
     }
-    for name in limits.trains.iter().flatten() {
+    for (k, name) in limits.trains.iter().flatten().enumerate() {
         if !trains.iter().any(|train| train.name == *name) {
-            let known: Vec<&str> = trains.iter().map(|t| t.name.as_str()).collect();
-            return Err(CheckError::UnknownTrain { name: name.clone(), known: known.join(", ") });
+            return Err(error!(
+                Scenario,
+                "[limits] trains: there is no train \"{name}\": the scenario has"
+            )
+            .names(name, trains.iter().map(|t| t.name.as_str()))
+            .at(KeyPath::of("limits.trains").item(k)));
         }
     }
     Ok(())
 }
 
 /// Names of bodies, and that every train has vehicles with something between them.
-fn check_names(scenario: &Scenario) -> Result<(), CheckError> {
+fn check_names(scenario: &Scenario) -> Result<(), Error> {
     let mut names = HashSet::new();
-    let mut take = |name: String| match names.insert(name.clone()) {
-        true => Ok(()),
-        false => Err(CheckError::BodyTwice { name }),
+    let mut take = |name: String| {
+        if names.insert(name.clone()) {
+            return Ok(());
+        }
+        Err(error!(
+            Scenario,
+            "two bodies are named \"{name}\": vehicles, their front and rear and the wall need different names"
+        )
+        .at(scenario.body_twice(&name)))
     };
     if let Some(wall) = &scenario.wall {
-        check_name(&wall.name)?;
+        check_name(&wall.name).map_err(|e| e.at_key("wall.name"))?;
         take(wall.name.clone())?;
     }
     for train in &scenario.train {
-        check_vehicles(train)?;
+        check_vehicles(scenario, train)?;
         for vehicle in &train.vehicles {
-            check_name(&vehicle.name)?;
+            check_name(&vehicle.name)
+                .map_err(|e| e.at(scenario.vehicle(&vehicle.name).key("name")))?;
             take(vehicle.name.clone())?;
             for zone in vehicle.zones() {
                 take(format!("{} {}", vehicle.name, zone.end))?;
@@ -342,39 +175,61 @@ fn check_names(scenario: &Scenario) -> Result<(), CheckError> {
     Ok(())
 }
 
-fn check_vehicles(train: &TrainTable) -> Result<(), CheckError> {
-    let (name, vehicles) = (train.name.clone(), train.vehicles.len());
+fn check_vehicles(scenario: &Scenario, train: &TrainTable) -> Result<(), Error> {
+    let (name, vehicles) = (&train.name, train.vehicles.len());
     let Some(last) = train.vehicles.last() else {
-        return Err(CheckError::NoVehicles { train: name });
+        return Err(error!(Scenario, "train \"{name}\" has no vehicles")
+            .at(scenario.train_named(name).key("vehicles")));
     };
     for pair in train.vehicles.windows(2) {
         let plates = facing(
+            scenario,
             (&pair[0].name, pair[0].rear_zone()),
             Some((&pair[1].name, pair[1].front_zone())),
         )?;
         match (plates, &pair[0].behind) {
             (true, Some(curve)) => {
-                return Err(CheckError::BetweenEnds { curve: curve.clone() });
+                return Err(between_ends(scenario, curve));
             }
             (false, None) if train.inner.is_none() => {
-                return Err(CheckError::NoInner { train: name, vehicles });
+                return Err(error!(
+                    Scenario,
+                    "train \"{name}\" has {vehicles} vehicles but no inner = \"…\" curve between them"
+                )
+                .at(scenario.train_named(name)));
             }
             _ => {}
         }
     }
     if last.behind.is_some() {
-        return Err(CheckError::NothingBehind { vehicle: last.name.clone() });
+        let vehicle = &last.name;
+        return Err(error!(Scenario, "there is nothing behind the last vehicle \"{vehicle}\"")
+            .at(scenario.vehicle(vehicle).key("behind").itself()));
     }
     Ok(())
 }
 
+fn between_ends(scenario: &Scenario, curve: &str) -> Error {
+    error!(
+        Scenario,
+        "curve \"{curve}\" stands between ends that come from models, where plates meet: remove it"
+    )
+    .at(scenario.use_of(curve))
+}
+
 /// Whether two facing ends, or an end and the wall, meet as plates: both come from models.
 fn facing(
+    scenario: &Scenario,
     (name, end): (&str, Option<CrushZone<'_>>),
     other: Option<(&str, Option<CrushZone<'_>>)>,
-) -> Result<bool, CheckError> {
+) -> Result<bool, Error> {
     let one = |vehicle: &str, end: CrushZone<'_>| {
-        Err(CheckError::OneEnd { vehicle: vehicle.into(), end: end.end })
+        let end = end.end;
+        Err(error!(
+            Scenario,
+            "{end} of vehicle \"{vehicle}\" comes from a model and the end that it meets does not: give both, or neither"
+        )
+        .at(scenario.end_of(vehicle, end)))
     };
     let other = other.map(|(name, end)| (name, end.filter(CrushZone::is_of_model)));
     match (end.filter(CrushZone::is_of_model), other) {
@@ -386,32 +241,40 @@ fn facing(
 }
 
 /// The curve between the noses, or between plates none.
-fn check_contact(scenario: &Scenario) -> Result<(), CheckError> {
+fn check_contact(scenario: &Scenario) -> Result<(), Error> {
     let nose = |train: usize| {
         let vehicle = scenario.train.get(train)?.vehicles.first()?;
         Some((vehicle.name.as_str(), vehicle.front_zone()))
     };
     let Some(first) = nose(0) else { return Ok(()) };
-    match (facing(first, nose(1))?, &scenario.contact.curve) {
-        (true, Some(curve)) => Err(CheckError::BetweenEnds { curve: curve.clone() }),
-        (false, None) => Err(CheckError::NoContact),
+    match (facing(scenario, first, nose(1))?, &scenario.contact.curve) {
+        (true, Some(curve)) => Err(between_ends(scenario, curve)),
+        (false, None) => Err(error!(
+            Scenario at "contact",
+            "[contact] needs curve = \"…\": it can be left out only where the noses that meet come from models (front or ends)"
+        )),
         _ => Ok(()),
     }
 }
 
 /// Names stand in the columns of the result.
-fn check_name(name: &str) -> Result<(), CheckError> {
+fn check_name(name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);
-    match name.is_empty() || name.contains(breaks) {
-        true => Err(CheckError::Name { name: name.into() }),
-        false => Ok(()),
+    if name.is_empty() || name.contains(breaks) {
+        let name = name.escape_debug();
+        return Err(error!(
+            Scenario,
+            "the name \"{name}\" may not be empty or contain , | [ ] or quotes"
+        ));
     }
+    Ok(())
 }
 
 /// Keys that only some kinds of curves take.
-fn check_keys(name: &str, table: &CurveTable) -> Result<(), CheckError> {
+fn check_keys(name: &str, table: &CurveTable) -> Result<(), Error> {
     if table.stages.as_ref().is_some_and(Vec::is_empty) {
-        return Err(CheckError::NoStages { curve: name.into() });
+        return Err(error!(Scenario, "curve \"{name}\": stages is empty")
+            .at(place::curve(name).key("stages")));
     }
     let no_model = table.model.is_none();
     let foreign = [
@@ -438,13 +301,18 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), CheckError> {
         ("tension", "law = \"memory\"", rate && table.tension.is_some()),
     ];
     match foreign.into_iter().chain(of_rate).find(|(.., is_foreign)| *is_foreign) {
-        Some((key, of, _)) => Err(CheckError::ForeignKey { curve: name.into(), key, of }),
+        Some((key, of, _)) => Err(foreign_key(name, key, of)),
         None => Ok(()),
     }
 }
 
+fn foreign_key(curve: &str, key: &str, of: &str) -> Error {
+    error!(Scenario, "curve \"{curve}\": {key} belongs to {of}: remove it")
+        .at(place::curve(curve).key(key).itself())
+}
+
 /// What depends on numbers and on which curve stands where.
-fn check_values(scenario: &Scenario) -> Result<CheckedScenario<'_>, CheckError> {
+fn check_values(scenario: &Scenario) -> Result<CheckedScenario<'_>, Error> {
     for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
         check_zones(vehicle, scenario)?;
     }
@@ -457,31 +325,41 @@ fn check_values(scenario: &Scenario) -> Result<CheckedScenario<'_>, CheckError> 
     let speed_m_per_s = first.speed.0;
     let meeting_m_per_s = speed_m_per_s - scenario.train.get(1).map_or(0.0, |t| t.speed.0);
     if meeting_m_per_s <= 0.0 {
-        return Err(CheckError::NeverMeets { train: first.name.clone(), speed_m_per_s });
+        let (train, speed) = (&first.name, km_per_h(speed_m_per_s));
+        return Err(error!(
+            Scenario,
+            "train \"{train}\" at {speed} never meets what is in front of it: it must be faster"
+        )
+        .at(place::train(0).key("speed")));
     }
     Ok(CheckedScenario { tables: Cow::Borrowed(scenario), meeting_m_per_s, document: None })
 }
 
-fn curve_names(scenario: &Scenario) -> String {
-    scenario.curves.keys().map(String::as_str).collect::<Vec<_>>().join(", ")
-}
-
-fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), CheckError> {
+fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), Error> {
     for zone in vehicle.zones() {
         let gap = scenario.curves.get(zone.curve).and_then(|curve| curve.gap);
         if gap.is_some_and(|gap| gap.0 > 0.0) {
-            let (curve, vehicle) = (zone.curve.into(), vehicle.name.clone());
-            return Err(CheckError::ZoneGap { curve, end: zone.end, vehicle });
+            let (curve, end, vehicle) = (zone.curve, zone.end, &vehicle.name);
+            return Err(error!(
+                Scenario,
+                "curve \"{curve}\" has a gap, but {end} of vehicle \"{vehicle}\" is joined to the body without one: give it a curve without gap"
+            )
+            .at(scenario.end_of(vehicle, end)));
         }
     }
-    match vehicle.zones().next().is_some() && vehicle.body_mass_kg() <= 0.0 {
-        true => Err(CheckError::NoBodyMass { vehicle: vehicle.name.clone() }),
-        false => Ok(()),
+    if vehicle.zones().next().is_some() && vehicle.body_mass_kg() <= 0.0 {
+        let vehicle = &vehicle.name;
+        return Err(error!(
+            Scenario,
+            "the crush zones of vehicle \"{vehicle}\" have all of its mass: nothing is left for the body"
+        )
+        .at(scenario.vehicle(vehicle).key("mass")));
     }
+    Ok(())
 }
 
 /// Ends without a mass of their own come from models.
-fn check_ends(scenario: &Scenario) -> Result<(), CheckError> {
+fn check_ends(scenario: &Scenario) -> Result<(), Error> {
     for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
         for zone in vehicle.zones().filter(CrushZone::is_of_model) {
             let Some(table) = scenario.curves.get(zone.curve) else { continue };
@@ -494,29 +372,39 @@ fn check_ends(scenario: &Scenario) -> Result<(), CheckError> {
                 ("damping", table.damping.is_some()),
             ];
             if let Some((key, _)) = foreign.into_iter().find(|(_, given)| *given) {
-                return Err(CheckError::ForeignKey { curve: zone.curve.into(), key, of: between });
+                return Err(foreign_key(zone.curve, key, between));
             }
             if table.model.is_none() {
                 let by_both = vehicle.ends.as_deref() == Some(zone.curve);
                 let end = if by_both { "ends" } else { zone.end };
-                return Err(CheckError::EndNeedsModel { vehicle: vehicle.name.clone(), end });
+                let vehicle = &vehicle.name;
+                return Err(error!(
+                    Scenario,
+                    "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which tells the mass that is stopped"
+                )
+                .at(scenario.vehicle(vehicle).key(end)));
             }
         }
     }
     Ok(())
 }
 
-fn check_tension(name: &str, tension: &str, scenario: &Scenario) -> Result<(), CheckError> {
-    let (curve, tension) = (name.to_string(), tension.to_string());
-    match scenario.curves.get(&tension) {
-        None => {
-            let known = curve_names(scenario);
-            Err(CheckError::UnknownTension { curve, tension, known })
-        }
-        Some(other) if other.tension.is_some() || other.damping.is_some() => {
-            Err(CheckError::TensionOfTension { curve, tension })
-        }
-        Some(other) if other.model.is_some() => Err(CheckError::TensionModel { curve, tension }),
-        Some(_) => Ok(()),
-    }
+fn check_tension(curve: &str, tension: &str, scenario: &Scenario) -> Result<(), Error> {
+    let fault = match scenario.curves.get(tension) {
+        None => error!(
+            Scenario,
+            "curve \"{curve}\": its tension curve \"{tension}\" is not in [curves]: it has"
+        )
+        .names(tension, scenario.curve_names()),
+        Some(other) if other.tension.is_some() || other.damping.is_some() => error!(
+            Scenario,
+            "curve \"{tension}\" is the tension of \"{curve}\": it can have no tension or damping of its own"
+        ),
+        Some(other) if other.model.is_some() => error!(
+            Scenario,
+            "curve \"{tension}\" is the tension of \"{curve}\": models know compression only; give a file or stages"
+        ),
+        Some(_) => return Ok(()),
+    };
+    Err(fault.at(place::curve(curve).key("tension")))
 }

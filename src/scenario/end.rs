@@ -7,10 +7,10 @@
 use std::sync::Arc;
 
 use super::layout::{End, Role, Slot};
-use super::spring::SpringError;
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope};
+use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
-    Damping, DampingError, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
+    Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
 };
 use crate::surrogate::crush_law::{CrushCurve, CrushLaw, per_crush_force};
 use crate::surrogate::{Model, QueryPoint};
@@ -55,11 +55,15 @@ impl Coordinates {
     }
 
     /// The envelope over the deflection of the end, with values times `factor`.
-    fn per_end(&self, of_model: &Envelope, factor: f64) -> Result<Envelope, SpringError> {
+    fn per_end(&self, of_model: &Envelope, factor: f64) -> Result<Envelope, Error> {
         let d = of_model.deflection_m().iter().map(|d| d / self.deflection).collect();
         let f = of_model.force_n().iter().map(|f| f * factor).collect();
-        Ok(Envelope::new(d, f)?)
+        Envelope::new(d, f).map_err(below)
     }
+}
+
+fn below(error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    Error::below(ErrorCode::Scenario, error)
 }
 
 /// Least share of the give of end and plates together that is the end's.
@@ -68,13 +72,13 @@ const LEAST_OF_END: f64 = 0.1;
 /// The end of a vehicle whose neighbours close at `closing_m_per_s`.
 ///
 /// # Errors
-/// [`SpringError::NoCrushLaw`] if the model's runs do not tell stopped mass and crush force.
+/// If the model's runs do not tell stopped mass and crush force.
 pub(super) fn crush_end(
     model: &Model,
     end: &End<'_>,
     closing_m_per_s: f64,
     scale: f64,
-) -> Result<Crush, SpringError> {
+) -> Result<Crush, Error> {
     let coordinates = Coordinates::of(model.speed_kind, end.at);
     let speed_m_per_s = coordinates.speed * closing_m_per_s;
     let (law, at) = crush_curve(model, speed_m_per_s)?;
@@ -123,7 +127,7 @@ pub(super) fn crush_between(
     (behind, ahead): (usize, Option<usize>),
     speed_m_per_s: f64,
     scale: f64,
-) -> Result<Crush, SpringError> {
+) -> Result<Crush, Error> {
     let (law, at) = crush_curve(model, speed_m_per_s)?;
     // Of two equal masses half is what moves along their deflection.
     let moved_kg = if slot.role == Role::Wall { slot.mass_kg } else { 0.5 * slot.mass_kg };
@@ -133,7 +137,7 @@ pub(super) fn crush_between(
     let force_n = points.map(|(&d, f)| f * scale * factor(d)).collect();
     let stiffness = model.unloading_n_per_m(speed_m_per_s).map(|k| k * scale);
     let unloading = CurveUnloading::of(stiffness);
-    let curve = DrivingCurve::bare(Envelope::new(deflection_m, force_n)?);
+    let curve = DrivingCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
     let sensitivity_sqrt_s_per_m = law.sensitivity;
     Ok(Crush {
         curve: DrivingCurve { unloading, ..curve },
@@ -144,9 +148,14 @@ pub(super) fn crush_between(
     })
 }
 
-fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCurve), SpringError> {
-    let no_law = || SpringError::NoCrushLaw { group: model.group.clone() };
-    model.crush_curve(speed_m_per_s).ok_or_else(no_law)
+fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCurve), Error> {
+    model.crush_curve(speed_m_per_s).ok_or_else(|| {
+        error!(
+            Scenario at "model",
+            "its group \"{}\" tells no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve",
+            model.group
+        )
+    })
 }
 
 fn warnings(model: &Model, speed_m_per_s: f64) -> Vec<String> {
@@ -159,20 +168,9 @@ fn warnings(model: &Model, speed_m_per_s: f64) -> Vec<String> {
 ///
 /// # Errors
 /// None that the constants cause.
-pub(super) fn plates(name: &str, gap_m: f64) -> Result<Interface, PlatesError> {
-    let spring = Envelope::new(vec![0.0, 1.0], vec![0.0, PLATES_N_PER_M])?;
+pub(super) fn plates(name: &str, gap_m: f64) -> Result<Interface, Error> {
+    let spring = Envelope::new(vec![0.0, 1.0], vec![0.0, PLATES_N_PER_M]).map_err(below)?;
     let law = ForceLaw::new(spring, Unloading::Elastic, EnvelopeEnd::Slope);
-    let damping = Damping::constant(PLATES_N_S_PER_M)?;
+    let damping = Damping::constant(PLATES_N_S_PER_M).map_err(below)?;
     Ok(Interface::new(name, law, gap_m).with_damping(damping))
-}
-
-/// What could be wrong with the constants of plates.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlatesError {
-    /// Their spring.
-    #[error("{0}")]
-    Spring(#[from] crate::curve::EnvelopeError),
-    /// Their damper.
-    #[error("{0}")]
-    Damper(#[from] DampingError),
 }

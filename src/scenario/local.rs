@@ -12,7 +12,8 @@ use std::path::Path;
 
 use super::assemble::assemble_at;
 use super::layout::{Joint, Role, layout};
-use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, ScenarioError, Sources};
+use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, Sources};
+use crate::error::Error;
 use crate::multibody::{Chain, Method, Run, simulate};
 use crate::signal::peaks::peaks;
 use crate::unit::km_per_h;
@@ -36,12 +37,12 @@ const SLOWEST_M_PER_S: f64 = 0.1;
 /// the trains' speed.
 ///
 /// # Errors
-/// [`ScenarioError`] names the curve.
+/// It names the curve.
 pub(crate) fn assemble(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     sources: &Sources,
-) -> Result<Prepared, ScenarioError> {
+) -> Result<Prepared, Error> {
     let own: Vec<bool> = layout(scenario)
         .slots
         .iter()
@@ -60,7 +61,7 @@ pub(crate) fn assemble(
         if !prepared.chain.has_rates() {
             settings = settings.with_method(Method::FourthOrder);
         }
-        let failed = |source| ScenarioError::Local { place: prepared.place_of(&source), source };
+        let failed = |source| prepared.failed(source, "while the interfaces' speeds were sought: ");
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
         let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
         if largest < CHANGE_M_PER_S {

@@ -40,24 +40,15 @@ mod tables;
 
 use std::path::Path;
 
-pub use assemble::AssemblyError;
 pub(crate) use assemble::{PLATES, adjust};
-pub use check::CheckError;
 pub use check::CheckedScenario;
 pub(crate) use local::assemble;
-pub use sources::SourceError;
-pub use sources::StageError;
 pub(crate) use sources::{CurveSource, Sources};
-pub use spring::SpringError;
 pub(crate) use tables::*;
 
-use crate::database::DatabaseError;
-use crate::formats::read::{ReadCurveError, json};
-use crate::manifest::{self, Document, ManifestError, Place};
-use crate::multibody::{Chain, ChainError, Run, RunSettings, SimulationError, simulate};
-use crate::surrogate::ModelError;
-use crate::surrogate::predict::PredictError;
-pub use end::PlatesError;
+use crate::error::{Document, Error, Place, error};
+use crate::manifest;
+use crate::multibody::{Chain, Run, RunSettings, SimulationError, simulate};
 use place::Origin;
 pub use tables::ContactTable;
 pub use tables::CrushZoneTable;
@@ -102,10 +93,15 @@ impl Prepared {
     /// Runs it.
     ///
     /// # Errors
-    /// [`ScenarioError::Run`] with the place of the key that decides it.
-    pub fn run(&self) -> Result<Run, ScenarioError> {
-        simulate(&self.chain, &self.settings)
-            .map_err(|source| ScenarioError::Run { place: self.place_of(&source), source })
+    /// At the place of the key that decides it.
+    pub fn run(&self) -> Result<Run, Error> {
+        simulate(&self.chain, &self.settings).map_err(|source| self.failed(source, ""))
+    }
+
+    /// The error of a run, at the place of the key that decides it.
+    fn failed(&self, source: SimulationError, when: &str) -> Error {
+        let (place, text) = (self.place_of(&source), format!("{when}{source}"));
+        error!(Simulation, "{text}").caused_by(source).placed(|_| place)
     }
 }
 
@@ -120,157 +116,38 @@ pub struct Used {
     pub speed_m_per_s: Option<f64>,
 }
 
-/// Why a scenario cannot be run.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// It is no TOML, or has other keys.
-    #[error("{0}")]
-    Manifest(#[from] ManifestError),
-    /// It is wrong as a whole.
-    #[error("{place}: {source}")]
-    Check {
-        /// Where in the scenario.
-        place: Place,
-        /// What is wrong.
-        source: Box<CheckError>,
-    },
-    /// A curve's source is wrong.
-    #[error("{place}: {source}")]
-    Source {
-        /// Where in the scenario.
-        place: Place,
-        /// Which curve, and what is wrong.
-        source: SourceError,
-    },
-    /// A curve cannot stand where the scenario puts it.
-    #[error("{place}: {source}")]
-    Assembly {
-        /// Where in the scenario.
-        place: Place,
-        /// Which curve, and why not.
-        source: Box<AssemblyError>,
-    },
-    /// A file that a curve names cannot be used.
-    #[error("{place}: curve \"{curve}\": {source}")]
-    File {
-        /// Where the scenario names it.
-        place: Place,
-        /// Name of the curve.
-        curve: String,
-        /// Why.
-        source: Box<SourceFileError>,
-    },
-    /// A model gives no curve.
-    #[error("{place}: curve \"{curve}\": {source}")]
-    Predict {
-        /// Where in the scenario.
-        place: Place,
-        /// Name of the curve.
-        curve: String,
-        /// Why.
-        source: PredictError,
-    },
-    /// Its bodies make no chain.
-    #[error("{place}: {source}")]
-    Chain {
-        /// Where in the scenario.
-        place: Place,
-        /// Why.
-        source: ChainError,
-    },
-    /// The run that looks for the speeds of the interfaces failed.
-    #[error("{place}: while the interfaces' speeds were sought: {source}")]
-    Local {
-        /// Where in the scenario.
-        place: Place,
-        /// Why.
-        source: SimulationError,
-    },
-    /// The run failed.
-    #[error("{place}: {source}")]
-    Run {
-        /// Where in the scenario.
-        place: Place,
-        /// Why.
-        source: SimulationError,
-    },
-}
-
-impl ScenarioError {
-    /// Where in the scenario it is wrong.
-    pub(crate) fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Manifest(error) => error.place(),
-            Self::Check { place, .. }
-            | Self::Source { place, .. }
-            | Self::Assembly { place, .. }
-            | Self::File { place, .. }
-            | Self::Predict { place, .. }
-            | Self::Chain { place, .. }
-            | Self::Local { place, .. }
-            | Self::Run { place, .. } => Some(place),
-        }
-    }
-}
-
-/// Why a file that a curve names cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum SourceFileError {
-    /// A model file.
-    #[error("{0}")]
-    Model(#[from] ModelError),
-    /// A database.
-    #[error("{0}")]
-    Database(#[from] DatabaseError),
-    /// A predicted curve.
-    #[error("{0}")]
-    Predicted(#[from] json::CurveFileError),
-    /// A table of a curve.
-    #[error("{0}")]
-    Table(#[from] ReadCurveError),
-}
-
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.
 ///
 /// # Errors
-/// [`ScenarioError`] names the key.
-pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, ScenarioError> {
+/// It names the key.
+pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, Error> {
     let scenario: Scenario = manifest::parse(path, text)?;
     let document = Document::new(path, text);
-    let checked = scenario.check().map_err(|source| {
-        let place = document.place(&scenario.check_key(&source));
-        ScenarioError::Check { place, source: source.into() }
-    })?;
+    let checked = scenario.check().map_err(|error| error.placed(|key| document.place(key)))?;
     Ok(checked.with(document).into_owned())
 }
 
 /// Checks a scenario that is not as its file has it, with the file's path in the message.
 ///
 /// # Errors
-/// [`ScenarioError::Check`] names the key.
-pub(crate) fn check<'a>(
-    path: &Path,
-    scenario: &'a Scenario,
-) -> Result<CheckedScenario<'a>, ScenarioError> {
-    scenario.check().map_err(|source| ScenarioError::Check {
-        place: Place::of_file(path),
-        source: source.into(),
-    })
+/// It names the key.
+pub(crate) fn check<'a>(path: &Path, scenario: &'a Scenario) -> Result<CheckedScenario<'a>, Error> {
+    scenario.check().map_err(|error| error.placed(|_| Place::of_file(path)))
 }
 
 /// Reads and checks a scenario; curves are not read.
 ///
 /// # Errors
-/// [`ScenarioError`] names the key.
-pub fn read(path: &Path) -> Result<CheckedScenario<'static>, ScenarioError> {
+/// It names the key.
+pub fn read(path: &Path) -> Result<CheckedScenario<'static>, Error> {
     parse(path, &manifest::read_text(path)?)
 }
 
 /// Loads a scenario and everything it names.
 ///
 /// # Errors
-/// [`ScenarioError`] names the key, curve or file.
-pub fn load(path: &Path) -> Result<Prepared, ScenarioError> {
+/// It names the key, curve or file.
+pub fn load(path: &Path) -> Result<Prepared, Error> {
     let scenario = read(path)?;
     let sources = Sources::read(path, &scenario)?;
     assemble(path, &scenario, &sources)

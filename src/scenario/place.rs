@@ -2,11 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{
-    AssemblyError, CheckError, CheckedScenario, Prepared, Scenario, SourceError, SpringError,
-    StageError, TrainTable, VehicleTable,
-};
-use crate::manifest::{Document, KeyPath, Place};
+use super::{CheckedScenario, Prepared, Scenario, TrainTable, VehicleTable};
+use crate::error::{Document, KeyPath, Place};
 use crate::multibody::{ChainError, SimulationError};
 use crate::surrogate::predict::PredictError;
 
@@ -66,51 +63,12 @@ pub(super) fn curve(name: &str) -> KeyPath {
     KeyPath::of("curves").key(name)
 }
 
-fn train(at: usize) -> KeyPath {
+pub(super) fn train(at: usize) -> KeyPath {
     KeyPath::of("train").item(at)
 }
 
 impl Scenario {
-    /// The key that tells what is wrong.
-    pub(super) fn check_key(&self, error: &CheckError) -> KeyPath {
-        use CheckError as E;
-        match error {
-            E::WallTrains { trains } if *trains > 1 => train(1),
-            E::WallTrains { .. } => KeyPath::of("wall"),
-            E::Trains { trains } => train(if *trains > 2 { 2 } else { 0 }),
-            E::Limit { .. } => KeyPath::of("limits.mean_deceleration_g"),
-            E::TrainTwice { .. } => train(1).key("name"),
-            E::NoLimitedTrain => KeyPath::of("limits.trains"),
-            E::UnknownTrain { name, .. } => {
-                let mut limited = self.limits.iter().flat_map(|l| l.trains.iter().flatten());
-                let trains = KeyPath::of("limits.trains");
-                limited.position(|n| n == name).map_or(trains.clone(), |k| trains.item(k))
-            }
-            E::BodyTwice { name } => self.body_twice(name),
-            E::Name { name } if self.wall.as_ref().is_some_and(|wall| wall.name == *name) => {
-                KeyPath::of("wall.name")
-            }
-            E::Name { name } => self.vehicle(name).key("name"),
-            E::NoVehicles { train } => self.train_named(train).key("vehicles"),
-            E::NoInner { train, .. } => self.train_named(train),
-            E::NoContact => KeyPath::of("contact"),
-            E::OneEnd { vehicle, end } => self.end_of(vehicle, end),
-            E::EndNeedsModel { vehicle, end } => self.vehicle(vehicle).key(end),
-            E::BetweenEnds { curve } => self.use_of(curve),
-            E::NothingBehind { vehicle } => self.vehicle(vehicle).key("behind").itself(),
-            E::ZoneGap { end, vehicle, .. } => self.end_of(vehicle, end),
-            E::NoBodyMass { vehicle } => self.vehicle(vehicle).key("mass"),
-            E::NoStages { curve: name } => curve(name).key("stages"),
-            E::ForeignKey { curve: name, key, .. } => curve(name).key(key).itself(),
-            E::UnknownTension { curve: name, .. }
-            | E::TensionOfTension { curve: name, .. }
-            | E::TensionModel { curve: name, .. } => curve(name).key("tension"),
-            E::NeverMeets { .. } => train(0).key("speed"),
-            E::UnknownCurve { curve, .. } => self.use_of(curve),
-        }
-    }
-
-    fn train_named(&self, name: &str) -> KeyPath {
+    pub(super) fn train_named(&self, name: &str) -> KeyPath {
         train(self.train.iter().position(|t| t.name == name).unwrap_or(0))
     }
 
@@ -122,13 +80,13 @@ impl Scenario {
         })
     }
 
-    fn vehicle(&self, name: &str) -> KeyPath {
+    pub(super) fn vehicle(&self, name: &str) -> KeyPath {
         let found = self.vehicles().find(|(_, vehicle)| vehicle.name == name);
         found.map_or(KeyPath::of("train"), |(path, _)| path)
     }
 
     /// Where a vehicle says what its end is: the curve of `front` or `rear`, or `ends`.
-    fn end_of(&self, vehicle: &str, end: &str) -> KeyPath {
+    pub(super) fn end_of(&self, vehicle: &str, end: &str) -> KeyPath {
         let has_own = self.vehicles().any(|(_, table)| {
             let own = if end == "front" { &table.front } else { &table.rear };
             table.name == vehicle && own.is_some()
@@ -140,7 +98,7 @@ impl Scenario {
     }
 
     /// The second body of that name, in the order in which names are checked.
-    fn body_twice(&self, name: &str) -> KeyPath {
+    pub(super) fn body_twice(&self, name: &str) -> KeyPath {
         let bodies = self.vehicles().flat_map(|(path, vehicle)| {
             let body = (path.clone().key("name"), vehicle.name.clone());
             let zones: Vec<(KeyPath, String)> = vehicle
@@ -158,7 +116,7 @@ impl Scenario {
     }
 
     /// The first place that names a curve.
-    fn use_of(&self, curve: &str) -> KeyPath {
+    pub(super) fn use_of(&self, curve: &str) -> KeyPath {
         let contact = self.contact.curve.iter();
         let contact = contact.map(|name| (KeyPath::of("contact.curve"), name.as_str()));
         let trains = self.train.iter().enumerate();
@@ -209,56 +167,17 @@ impl Scenario {
         let found = self.vehicles().find(|(_, vehicle)| is_of(vehicle));
         found.map_or(KeyPath::of("train"), |(path, _)| path)
     }
-
-    /// The key that tells what is wrong with a curve's source.
-    pub(super) fn source_key(&self, error: &SourceError) -> KeyPath {
-        match error {
-            SourceError::NotOne { curve: name } => curve(name),
-            SourceError::NoCase { curve: name } => {
-                let has_case = self.curves.get(name).is_some_and(|table| table.case.is_some());
-                curve(name).key(if has_case { "case" } else { "database" })
-            }
-            SourceError::OtherForce { curve: name, .. } => curve(name).key("force"),
-            SourceError::Stages { curve: name, source: StageError::NoCurve(_) } => {
-                curve(name).key("stages")
-            }
-            SourceError::Stages { curve: name, source: StageError::Short { number, .. } } => {
-                curve(name).key("stages").item(number - 1).key("stroke")
-            }
-        }
-    }
-}
-
-/// The key that tells why a curve cannot stand where it is put.
-pub(super) fn assembly_key(error: &AssemblyError) -> KeyPath {
-    match error {
-        AssemblyError::NotRead { curve: name } | AssemblyError::Speeds { curve: name, .. } => {
-            curve(name)
-        }
-        AssemblyError::Plates { .. } => KeyPath::of("contact"),
-        AssemblyError::Damping { curve: name, .. } => curve(name).key("damping"),
-        AssemblyError::NoSpring { curve: name, source } => match source {
-            SpringError::NoBand => curve(name).key("band"),
-            SpringError::Scale { .. } => curve(name).key("scale"),
-            SpringError::CrushZoneTwice { .. } => curve(name).key("force"),
-            SpringError::StagesUnload => curve(name).key("stages"),
-            SpringError::NoCrushLaw { .. } => curve(name).key("model"),
-            SpringError::Envelope(_) | SpringError::NoMotion | SpringError::NeverRises => {
-                curve(name)
-            }
-        },
-    }
 }
 
 /// The key that tells why a model gives no curve.
-pub(super) fn predict_key(name: &str, error: &PredictError) -> KeyPath {
+pub(super) fn predict_key(error: &PredictError) -> KeyPath {
     match error {
-        PredictError::Parameters(_) => curve(name).key("parameters"),
+        PredictError::Parameters(_) => KeyPath::of("parameters"),
         PredictError::UnknownParameter { name: parameter, .. } => {
-            curve(name).key("parameters").key(parameter).itself()
+            KeyPath::of("parameters").key(parameter).itself()
         }
-        PredictError::NoContactForce | PredictError::NoBodyForce => curve(name).key("force"),
-        PredictError::MaxCrush { .. } => curve(name).key("max_crush"),
-        _ => curve(name).key("model"),
+        PredictError::NoContactForce | PredictError::NoBodyForce => KeyPath::of("force"),
+        PredictError::MaxCrush { .. } => KeyPath::of("max_crush"),
+        _ => KeyPath::of("model"),
     }
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::place;
-use super::{CheckedScenario, CurveTable, Scenario, ScenarioError, SourceFileError, StageTable};
-use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError};
+use super::{CheckedScenario, CurveTable, Scenario, StageTable};
+use crate::curve::{Case, DrivingCurve, Envelope};
 use crate::database::{Database, DatabaseError};
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
 
@@ -64,19 +65,13 @@ impl Sources {
     /// Reads what `scenario`, which stands at `path`, names.
     ///
     /// # Errors
-    /// [`ScenarioError`] names the curve or file.
-    pub(crate) fn read(path: &Path, scenario: &CheckedScenario<'_>) -> Result<Self, ScenarioError> {
+    /// It names the curve or file.
+    pub(crate) fn read(path: &Path, scenario: &CheckedScenario<'_>) -> Result<Self, Error> {
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
-            let source = CurveSource::read(path, name, table).map_err(|wrong| match wrong {
-                NoSource::Table(source) => {
-                    let place = scenario.place(path, &scenario.source_key(&source));
-                    ScenarioError::Source { place, source }
-                }
-                NoSource::File(key, source) => {
-                    let place = scenario.place(path, &place::curve(name).key(key));
-                    ScenarioError::File { place, curve: name.clone(), source: source.into() }
-                }
+            let read = CurveSource::read(path, name, table);
+            let source = read.map_err(|error| {
+                error.inside(place::curve(name)).placed(|key| scenario.place(path, key))
             })?;
             curves.insert(name.clone(), source);
         }
@@ -105,116 +100,71 @@ impl Sources {
     }
 }
 
-/// Why a curve's table does not say where the curve comes from.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SourceError {
-    /// It names no source, or several.
-    #[error("curve \"{curve}\" needs exactly one of model, file, database and stages")]
-    NotOne {
-        /// Name of the curve.
-        curve: String,
-    },
-    /// It names a database and no case in it.
-    #[error("curve \"{curve}\": write case = \"group/case\" beside database")]
-    NoCase {
-        /// Name of the curve.
-        curve: String,
-    },
-    /// It says which force the curve is, and the file says another.
-    #[error(
-        "curve \"{curve}\": force names another force than {} says it holds: remove force",
-        .file.display()
-    )]
-    OtherForce {
-        /// Name of the curve.
-        curve: String,
-        /// The curve's file.
-        file: PathBuf,
-    },
-    /// Its stages make no curve.
-    #[error("curve \"{curve}\": {source}")]
-    Stages {
-        /// Name of the curve.
-        curve: String,
-        /// Why not.
-        source: StageError,
-    },
-}
-
-/// Why a curve has no source: its table, or the file that it names with a key.
-enum NoSource {
-    Table(SourceError),
-    File(&'static str, SourceFileError),
-}
-
-/// Why stages in series make no curve.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StageError {
-    /// A stage is shorter than what joins it to the next.
-    #[error("stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm")]
-    Short {
-        /// Name of the stage, or its number.
-        stage: String,
-        /// Its number, counted from 1.
-        number: usize,
-        /// Its stroke, in m.
-        stroke_m: f64,
-    },
-    /// The points that they give are no envelope.
-    #[error("its stages make no curve: {0}")]
-    NoCurve(#[from] EnvelopeError),
-}
-
 impl CurveSource {
     /// Reads what the table of curve `name` in the scenario at `path` asks for.
-    fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, NoSource> {
+    fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let curve = || name.to_string();
-        let wrong = NoSource::Table;
+        let of_curve = |error: Error| error.of(format_args!("curve \"{name}\""));
         match (&table.model, &table.file, &table.database, &table.stages) {
             (Some(model), None, None, None) => {
                 let read = Model::read(&folder.join(model));
-                Ok(Self::Model(Box::new(read.map_err(|e| NoSource::File("model", e.into()))?)))
+                let below = |e| of_curve(Error::below(ErrorCode::Model, e)).at_key("model");
+                Ok(Self::Model(Box::new(read.map_err(below)?)))
             }
             (None, Some(file), None, None) => {
                 let file = folder.join(file);
+                let below = |e: Error| of_curve(e).at_key("file");
                 if file.extension().is_some_and(|e| e == "json") {
-                    let read =
-                        json::predicted(&file).map_err(|e| NoSource::File("file", e.into()))?;
+                    let read = json::predicted(&file);
+                    let read = read.map_err(|e| below(Error::below(ErrorCode::CurveFile, e)))?;
                     return Ok(Self::Predicted(Box::new(read)));
                 }
                 let read = csv::driving(&file);
-                let mut held = read.map_err(|e| NoSource::File("file", e.into()))?;
+                let mut held = read.map_err(|e| below(Error::below(ErrorCode::CurveFile, e)))?;
                 let stated = table.force.or(held.force);
                 if held.force.is_some() && stated != held.force {
-                    return Err(wrong(SourceError::OtherForce { curve: curve(), file }));
+                    return Err(of_curve(error!(
+                        Scenario at "force",
+                        "force names another force than {} says it holds: remove force",
+                        file.display()
+                    )));
                 }
                 held.force = stated;
                 Ok(Self::Curve(Box::new(held)))
             }
             (None, None, Some(database), None) => {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));
-                let (group, case) =
-                    case.ok_or_else(|| wrong(SourceError::NoCase { curve: curve() }))?;
+                let (group, case) = case.ok_or_else(|| {
+                    let key = if table.case.is_some() { "case" } else { "database" };
+                    of_curve(error!(
+                        Scenario at key,
+                        "write case = \"group/case\" beside database"
+                    ))
+                })?;
                 let database = folder.join(database);
                 let read = Database::read_case(&database, Some(group), case);
                 let read = read.map_err(|e| {
                     let is_name =
                         matches!(e, DatabaseError::NoGroup { .. } | DatabaseError::NoCase { .. });
-                    NoSource::File(if is_name { "case" } else { "database" }, e.into())
+                    of_curve(Error::below(ErrorCode::Database, e)).at_key(if is_name {
+                        "case"
+                    } else {
+                        "database"
+                    })
                 })?;
                 Ok(Self::Case(Box::new(read)))
             }
-            (None, None, None, Some(stages)) => staged(stages)
-                .map(Self::Stages)
-                .map_err(|source| wrong(SourceError::Stages { curve: curve(), source })),
-            _ => Err(wrong(SourceError::NotOne { curve: curve() })),
+            (None, None, None, Some(stages)) => staged(stages).map(Self::Stages).map_err(of_curve),
+            _ => Err(error!(
+                Scenario,
+                "curve \"{name}\" needs exactly one of model, file, database and stages"
+            )),
         }
     }
 }
 
 /// Stages in series on one stroke.
-fn staged(stages: &[StageTable]) -> Result<Envelope, StageError> {
+fn staged(stages: &[StageTable]) -> Result<Envelope, Error> {
     let (mut d, mut f) = (Vec::new(), Vec::new());
     let mut begin = 0.0;
     for (i, stage) in stages.iter().enumerate() {
@@ -223,7 +173,11 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, StageError> {
         let stroke_m = stage.stroke.0;
         if stroke_m <= 2.0 * STEP_M {
             let stage = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
-            return Err(StageError::Short { stage, number: i + 1, stroke_m });
+            return Err(error!(
+                Scenario,
+                "stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm"
+            )
+            .at(KeyPath::of("stages").item(i).key("stroke")));
         }
         match f.last() {
             None => {
@@ -240,5 +194,7 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, StageError> {
         d.push(begin);
         f.push(to);
     }
-    Ok(Envelope::new(d, f)?)
+    Envelope::new(d, f).map_err(|error| {
+        Error::below(ErrorCode::Scenario, error).of("its stages make no curve").at_key("stages")
+    })
 }

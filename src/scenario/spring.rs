@@ -1,9 +1,11 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
 use super::layout::{Role, Slot};
+use super::place;
 use super::{CurveSource, CurveTable as Table, EndName, LawName};
 use crate::curve::driving::NoDrivingCurve;
 use crate::curve::{DrivingCurve, EnvelopeError, ForceKind};
+use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::{PredictError, predict_driving};
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
@@ -14,77 +16,20 @@ pub(super) struct Spring {
     pub warnings: Vec<String>,
 }
 
-/// Why a source gives no force law at an interface.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SpringError {
-    /// A band is asked of a source that has none.
-    #[error("band needs a model or a predicted curve (.json), which has one")]
-    NoBand,
-    /// The case's loading branch is no envelope, or `scale` makes it none.
-    #[error("{0}")]
-    Envelope(#[from] EnvelopeError),
-    /// The case's body force cannot be told from its speeds.
-    #[error("its sampled states make no loading branch")]
-    NoMotion,
-    /// The factor on the force is not above 0.
-    #[error("scale = {factor}: expected more than 0")]
-    Scale {
-        /// The factor.
-        factor: f64,
-    },
-    /// A body force would count the mass of the crush zone twice.
-    #[error(
-        "interface {interface} has a vehicle with a crush zone of its own mass, which a body force already contains: use a contact force, or no front and rear"
-    )]
-    CrushZoneTwice {
-        /// Name of the interface.
-        interface: String,
-    },
-    /// The runs of the group do not tell stopped mass and crush force.
-    #[error(
-        "its group \"{group}\" tells no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve"
-    )]
-    NoCrushLaw {
-        /// The group.
-        group: String,
-    },
-    /// It has stages, and its unloading stiffness is not stated.
-    #[error(
-        "it has stages, which do not say how they unload, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
-    )]
-    StagesUnload,
-    /// Its force never rises, and its unloading stiffness is not stated.
-    #[error(
-        "it never rises, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
-    )]
-    NeverRises,
+/// The error of a factor on the force that is not above 0.
+pub(super) fn scale_error(factor: f64) -> Error {
+    error!(Scenario at "scale", "scale = {factor}: expected more than 0")
 }
 
-/// Why there is no spring: of the curve's table or source, or of the model that is asked.
-pub(super) enum NoSpring {
-    Spring(SpringError),
-    Predict(PredictError),
+/// The error of a curve that is no envelope, or none any more.
+fn envelope_error(error: EnvelopeError) -> Error {
+    Error::below(ErrorCode::Scenario, error)
 }
 
-impl From<SpringError> for NoSpring {
-    fn from(error: SpringError) -> Self {
-        Self::Spring(error)
-    }
-}
-
-impl From<PredictError> for NoSpring {
-    fn from(error: PredictError) -> Self {
-        Self::Predict(error)
-    }
-}
-
-impl From<NoDrivingCurve> for NoSpring {
-    fn from(error: NoDrivingCurve) -> Self {
-        Self::Spring(match error {
-            NoDrivingCurve::Envelope(error) => SpringError::Envelope(error),
-            NoDrivingCurve::NoMotion => SpringError::NoMotion,
-        })
-    }
+/// The error of a model that gives no curve, at the key that tells why.
+fn predict_error(error: PredictError) -> Error {
+    let key = place::predict_key(&error);
+    Error::below(ErrorCode::Prediction, error).at(key)
 }
 
 /// The curve of a source that the interface needs, at `speed_m_per_s` if a model gives it.
@@ -93,7 +38,7 @@ pub(super) fn spring(
     table: &Table,
     slot: &Slot<'_>,
     speed_m_per_s: f64,
-) -> Result<Spring, NoSpring> {
+) -> Result<Spring, Error> {
     let (declared, has_body) = match source {
         CurveSource::Model(model) => (Some(model.force_kind), model.has_body_force()),
         CurveSource::Predicted(curve) => {
@@ -106,7 +51,10 @@ pub(super) fn spring(
     let force = which_force(table.force, slot, declared, has_body)?;
     if table.band.is_some() && !matches!(source, CurveSource::Model(_) | CurveSource::Predicted(_))
     {
-        return Err(SpringError::NoBand.into());
+        return Err(error!(
+            Scenario at "band",
+            "band needs a model or a predicted curve (.json), which has one"
+        ));
     }
     let Spring { mut curve, mut warnings } = match source {
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
@@ -121,7 +69,13 @@ pub(super) fn spring(
         }
         CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
-            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.force_kind))?;
+            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.force_kind));
+            let curve = curve.map_err(|error| match error {
+                NoDrivingCurve::Envelope(error) => envelope_error(error),
+                NoDrivingCurve::NoMotion => {
+                    error!(Scenario, "its sampled states make no loading branch")
+                }
+            })?;
             Spring { curve, warnings: truncated.into_iter().collect() }
         }
     };
@@ -132,9 +86,9 @@ pub(super) fn spring(
     }
     if let Some(factor) = table.scale {
         if !(factor > 0.0 && factor.is_finite()) {
-            return Err(SpringError::Scale { factor }.into());
+            return Err(scale_error(factor));
         }
-        curve = curve.scaled(factor).map_err(SpringError::Envelope)?;
+        curve = curve.scaled(factor).map_err(envelope_error)?;
     }
     Ok(Spring { curve, warnings })
 }
@@ -146,7 +100,7 @@ fn of_model(
     slot: &Slot<'_>,
     speed_m_per_s: f64,
     force: Option<ForceKind>,
-) -> Result<Spring, NoSpring> {
+) -> Result<Spring, Error> {
     let query = Query {
         mass_kg: Some(slot.mass_kg),
         rule: table.max_crush,
@@ -157,8 +111,9 @@ fn of_model(
         ..Query::at(speed_m_per_s)
     };
     let force = force.unwrap_or(model.force_kind);
-    let (curve, warnings) = predict_driving(model, &query, force, table.band)?;
-    let curve = curve.continued().map_err(PredictError::Envelope)?;
+    let (curve, warnings) =
+        predict_driving(model, &query, force, table.band).map_err(predict_error)?;
+    let curve = curve.continued().map_err(|e| predict_error(PredictError::Envelope(e)))?;
     Ok(Spring { curve, warnings: texts(&warnings) })
 }
 
@@ -167,9 +122,9 @@ fn of_predicted(
     curve: &PredictedCurve,
     table: &Table,
     force: Option<ForceKind>,
-) -> Result<Spring, NoSpring> {
+) -> Result<Spring, Error> {
     let force = force.unwrap_or(curve.provenance.force_kind);
-    let driving = curve.driving_member(force, table.band)?;
+    let driving = curve.driving_member(force, table.band).map_err(predict_error)?;
     Ok(Spring { curve: driving, warnings: texts(&curve.warnings) })
 }
 
@@ -191,12 +146,16 @@ fn which_force(
     slot: &Slot<'_>,
     declared: Option<ForceKind>,
     has_body: bool,
-) -> Result<Option<ForceKind>, NoSpring> {
+) -> Result<Option<ForceKind>, Error> {
     if asked == Some(ForceKind::Contact) && declared == Some(ForceKind::Body) {
-        return Err(PredictError::NoContactForce.into());
+        return Err(predict_error(PredictError::NoContactForce));
     }
     if slot.split && slot.role != Role::Within && asked.or(declared) == Some(ForceKind::Body) {
-        return Err(SpringError::CrushZoneTwice { interface: slot.name.clone() }.into());
+        return Err(error!(
+            Scenario at "force",
+            "interface {} has a vehicle with a crush zone of its own mass, which a body force already contains: use a contact force, or no front and rear",
+            slot.name
+        ));
     }
     Ok(asked.or((has_body && !slot.split).then_some(ForceKind::Body)))
 }
@@ -206,7 +165,7 @@ impl Spring {
     pub(crate) fn law_with_warnings(
         mut self,
         table: &Table,
-    ) -> Result<(ForceLaw, Vec<String>), SpringError> {
+    ) -> Result<(ForceLaw, Vec<String>), Error> {
         let end = match table.end {
             EndName::Hold => EnvelopeEnd::Hold,
             EndName::Slope => EnvelopeEnd::Slope,
@@ -220,7 +179,7 @@ impl Spring {
         Ok((ForceLaw::of_curve(&self.curve, unloading, end), self.warnings))
     }
 
-    fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), SpringError> {
+    fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), Error> {
         let asked = table.unloading.map(|u| u.0);
         let known = self.curve.unloading.stiffness_n_per_m();
         let steepest = self.curve.loading.max_slope();
@@ -243,10 +202,14 @@ impl Spring {
         }
         let stiffness = asked.or(known).unwrap_or(steepest);
         if stiffness.max(steepest) <= 0.0 || asked.is_none() && table.stages.is_some() {
-            return Err(match table.stages {
-                Some(_) => SpringError::StagesUnload,
-                None => SpringError::NeverRises,
-            });
+            let (why, key) = match table.stages {
+                Some(_) => ("has stages, which do not say how they unload", "stages"),
+                None => ("never rises", ""),
+            };
+            return Err(error!(
+                Scenario at key,
+                "it {why}, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
+            ));
         }
         Ok((asked.map_or(UnloadingChoice::Own, UnloadingChoice::Stiffness), warnings))
     }

@@ -6,7 +6,7 @@ use super::manifest::{Head, Manifest, RunEntry, StudyKind};
 use crate::curve::Parameter;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::recipe::{ForceSource, Recipe};
-use crate::manifest::KeyPath;
+use crate::error::KeyPath;
 
 /// What does not fit in a study manifest.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::check::InvalidStudy;
 use crate::curve::extract::ExtractError;
+use crate::error::{Error, Place};
 use crate::guess;
-use crate::manifest::{ManifestError, Place};
 use crate::solver::ReadError;
 
 /// Why a study cannot be used.
@@ -14,7 +14,7 @@ use crate::solver::ReadError;
 pub enum StudyError {
     /// The file cannot be read, or is no manifest.
     #[error("{0}")]
-    Manifest(#[from] ManifestError),
+    Manifest(#[from] Error),
     /// It contradicts itself.
     #[error("{place}: {source}")]
     Invalid {

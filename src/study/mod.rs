@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::Masses;
 use crate::curve::extract::{Stated, StatedContact};
-use crate::manifest::{self as toml_file, Document};
+use crate::error::Document;
+use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub use check::InvalidStudy;
 pub use error::RunError;

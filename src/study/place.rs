@@ -5,7 +5,7 @@ use std::path::Path;
 use super::files::force_file;
 use super::{RunEntry, RunError, Study};
 use crate::curve::recipe::ForceSource;
-use crate::manifest::{KeyPath, Place};
+use crate::error::{KeyPath, Place};
 use crate::solver::ReadError;
 
 impl Study {

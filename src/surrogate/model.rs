@@ -1,5 +1,6 @@
 //! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
 
+use crate::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,7 +19,6 @@ use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnvelopeError, ForceKind, Masses};
 use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};
-use crate::file::WriteError;
 use crate::forest::ForestError;
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -145,9 +145,9 @@ pub enum ModelError {
         /// How.
         detail: String,
     },
-    /// The file cannot be written.
+    /// A room below says why.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Below(#[from] Error),
 }
 
 impl Model {

@@ -224,7 +224,7 @@ impl Model {
     /// Writes the model file as a whole.
     ///
     /// # Errors
-    /// [`ModelError::Write`] if the target cannot be written.
+    /// If the target cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ModelError> {
         let bytes = self
             .to_json()

@@ -1,6 +1,7 @@
 //! The journal of a run: CSV beside the output, taken up again where it ends, renamed or
 //! converted when it is complete.
 
+use crate::error::Error;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -12,8 +13,8 @@ use super::run::{self, Chunk};
 use super::shard_file::{ShardFile, read_line};
 use super::tally::Tally;
 use super::to_hdf5::{self, is_hdf5};
-use super::{Report, Shard, Sweep, SweepError};
-use crate::file::{WriteError, WriterLock};
+use super::{Report, Shard, Sweep, foreign};
+use crate::file::{WriterLock, not_written};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
@@ -47,14 +48,14 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 /// run and after each chunk, and may break: then `OUTPUT.part` stays for the next time.
 ///
 /// # Errors
-/// [`SweepError::Changed`] if what is there is another sweep's, [`SweepError::Lock`] if another
+/// If what is there is another sweep's, if another
 /// process is writing it; items that fail are rows and no errors.
 pub fn write(
     sweep: &Sweep,
     output: &Path,
     options: &WriteOptions,
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
-) -> Result<Report, SweepError> {
+) -> Result<Report, Error> {
     // A link is followed, so that its target is replaced and not the link.
     let output = &fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf());
     let _lock = WriterLock::take(output)?;
@@ -107,14 +108,14 @@ pub fn write(
 /// again.
 ///
 /// # Errors
-/// [`SweepError::Write`] with `name` if the stream cannot be written.
+/// With `name` if the stream cannot be written.
 pub fn write_rows(
     sweep: &Sweep,
     out: &mut dyn Write,
     name: &Path,
     options: &WriteOptions,
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
-) -> Result<Report, SweepError> {
+) -> Result<Report, Error> {
     let head = Head::of(sweep, options.shard);
     let mut tally = Tally::new(&head);
     out.write_all(head.text().as_bytes()).map_err(failed(name))?;
@@ -129,22 +130,20 @@ pub fn write_rows(
     Ok(tally.close())
 }
 
-fn failed(path: &Path) -> impl Fn(io::Error) -> SweepError + '_ {
-    move |source| WriteError::new(path, source).into()
+fn failed(path: &Path) -> impl Fn(io::Error) -> Error + '_ {
+    move |source| not_written(path, source)
 }
 
 /// Opens the file under work behind its last whole row; makes it if it is not there.
-fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepError> {
-    let io = |source| SweepError::Read { path: part.into(), source };
+fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, Error> {
+    let io = |source| Error::io(part, source);
     let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(part);
     let mut file = open.map_err(failed(part))?;
     let wanted = head.text();
     let mut reader = BufReader::new(&file);
     let end = match Head::read(&mut reader).map_err(io)? {
         Some((found, length)) => {
-            if let Some(differs) = found.differs_from(head) {
-                return Err(SweepError::Changed { path: part.into(), differs });
-            }
+            found.check_same(part, head)?;
             let mut end = length;
             let mut line = Vec::new();
             loop {
@@ -161,7 +160,7 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepErr
             (&file).seek(SeekFrom::Start(0)).map_err(io)?;
             (&file).take(wanted.len() as u64 + 1).read_to_end(&mut begun).map_err(io)?;
             if !wanted.as_bytes().starts_with(&begun) {
-                return Err(SweepError::Foreign { path: part.into() });
+                return Err(foreign(part));
             }
             0
         }
@@ -174,14 +173,12 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, SweepErr
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.
-fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
+fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), Error> {
     if is_hdf5(output) {
         return to_hdf5::complete(output, head, tally);
     }
     let found = ShardFile::read_head(output)?;
-    let found = found.ok_or_else(|| SweepError::Foreign { path: output.into() })?;
-    if let Some(differs) = found.head.differs_from(head) {
-        return Err(SweepError::Changed { path: output.into(), differs });
-    }
+    let found = found.ok_or_else(|| foreign(output))?;
+    found.head.check_same(output, head)?;
     found.rows(|line| tally.see_line(line).then_some(()))
 }

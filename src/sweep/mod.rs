@@ -21,7 +21,6 @@
 
 mod journal;
 mod merge;
-mod place;
 mod row;
 mod run;
 mod shard_file;
@@ -30,27 +29,23 @@ mod tally;
 mod to_hdf5;
 mod variables;
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::file::{self, LockError, WriteError};
-use crate::hdf5::TableError;
-use crate::manifest::{self, Document, KeyPath, ManifestError, Place};
+use crate::error::{Document, Error, KeyPath, error};
+use crate::file;
+use crate::manifest;
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
-use crate::scenario::{self, CheckedScenario, Prepared, Scenario, ScenarioError, Sources};
+use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::WriteOptions;
 pub use journal::write;
 pub use journal::write_rows;
-pub use merge::MergeError;
 pub use merge::merge;
 pub use run::Chunk;
 pub use statistics::ColumnStatistics;
-pub use variables::BindError;
 use variables::Variable;
-pub use variables::VariableError;
 pub use variables::VariableSummary;
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
@@ -89,153 +84,18 @@ impl Shard {
     }
 }
 
-impl SweepError {
-    /// Where in the scenario or plan it is wrong.
-    pub fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Manifest(error) => error.place(),
-            Self::Scenario(error) => error.place(),
-            Self::NoPlan { place } | Self::Plan { place, .. } => Some(place),
-            _ => None,
-        }
-    }
+/// The error of rows that are missing or not whole.
+fn damaged(path: &Path, what: &str) -> Error {
+    error!(Sweep, "{}: {what}", path.display())
 }
 
-/// Why a sweep was not run, not written or not merged.
-#[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    /// A TOML file is wrong.
-    #[error("{0}")]
-    Manifest(#[from] ManifestError),
-    /// The scenario is wrong, or a file it names.
-    #[error("{0}")]
-    Scenario(#[from] ScenarioError),
-    /// Neither scenario nor plan say what is varied.
-    #[error("{place}: there is no [sweep]: add one, or give it in another file with --plan")]
-    NoPlan {
-        /// The beginning of the scenario.
-        place: Place,
-    },
-    /// The plan does not go with the scenario.
-    #[error("{place}: {source}")]
-    Plan {
-        /// Where in the file with the plan.
-        place: Place,
-        /// Why.
-        source: Box<BindError>,
-    },
-    /// A file cannot be read.
-    #[error("{path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The output cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// HDF5 cannot be written or read.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// Another process writes the output.
-    #[error(transparent)]
-    Lock(#[from] LockError),
-    /// What is there is of another sweep.
-    #[error("{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it")]
-    Changed {
-        /// The file.
-        path: PathBuf,
-        /// What is not the same.
-        differs: Difference,
-    },
-    /// A file is there that this program has not written.
-    #[error("{path} is there and is no sweep's: --restart replaces it, another -o keeps it")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Rows are missing or not whole.
-    #[error("{path}: {source}")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Damage,
-    },
-    /// The files are not the shards of one sweep.
-    #[error(transparent)]
-    Merge(#[from] MergeError),
-}
-
-/// What a file that is there does not share with the sweep that would write it.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Difference {
-    /// Another version of this program wrote it.
-    #[error("it is of crumple {found}, this is {this}")]
-    Version {
-        /// The version that wrote it.
-        found: String,
-        /// This version.
-        this: String,
-    },
-    /// Its rows are results of other inputs.
-    #[error("plan, scenario or a file it names have changed since")]
-    Inputs,
-    /// It is another part of the sweep.
-    #[error(
-        "it is shard {}/{}, this is {}/{}",
-        .found.index, .found.count, .this.index, .this.count
-    )]
-    Shard {
-        /// The part in the file.
-        found: Shard,
-        /// The part that was asked for.
-        this: Shard,
-    },
-}
-
-/// What is wrong with the file of a sweep.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Damage {
-    /// The rows end too early.
-    #[error(
-        "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
-    )]
-    Short {
-        /// The first item whose row is not there.
-        item: u64,
-        /// The last item there should be.
-        last: u64,
-    },
-    /// More stands in the file than its rows.
-    #[error("there is something behind the last row: run its sweep again with --restart")]
-    Behind,
-    /// A row is not there, or not as it should be.
-    #[error("the row of item {item} is missing or damaged: run its sweep again with --restart")]
-    Row {
-        /// Its item.
-        item: u64,
-    },
-    /// The attributes of an HDF5 file are not those of a sweep.
-    #[error("its attributes are not those of a sweep of this layout")]
-    Attributes,
-    /// A column of an HDF5 file has too few or too many rows.
-    #[error("{column} has {rows} rows, expected {expected}")]
-    Rows {
-        /// Name of the column.
-        column: String,
-        /// Rows that it has.
-        rows: u64,
-        /// Rows that the sweep has.
-        expected: u64,
-    },
-    /// A column of an HDF5 file has numbers for text, or the other way round.
-    #[error("{column} does not hold the kind of values it should")]
-    Kind {
-        /// Name of the column.
-        column: String,
-    },
+/// The error of a file that this program has not written.
+fn foreign(path: &Path) -> Error {
+    error!(
+        Sweep,
+        "{} is there and is no sweep's: --restart replaces it, another -o keeps it",
+        path.display()
+    )
 }
 
 /// What has been done.
@@ -285,8 +145,8 @@ impl Sweep {
     /// Loads a scenario with its `[sweep]`, or with that of `plan`, and all it names.
     ///
     /// # Errors
-    /// [`SweepError`] names file and key.
-    pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, SweepError> {
+    /// It names file and key.
+    pub fn load(path: &Path, plan: Option<&Path>) -> Result<Self, Error> {
         let text = manifest::read_text(path)?;
         let scenario = scenario::parse(path, &text)?;
         let plan_path = plan.unwrap_or(path);
@@ -299,13 +159,12 @@ impl Sweep {
             None => None,
         };
         let document = Document::new(plan_path, plan_text);
-        let plan = of_file
-            .or_else(|| scenario.sweep.clone())
-            .ok_or_else(|| SweepError::NoPlan { place: document.place(&KeyPath::default()) })?;
-        let invalid = |source: BindError| SweepError::Plan {
-            place: document.place(&place::key(&plan, &source)),
-            source: source.into(),
-        };
+        let plan = of_file.or_else(|| scenario.sweep.clone()).ok_or_else(|| {
+            error!(Sweep, "there is no [sweep]: add one, or give it in another file with --plan")
+                .placed(|key| document.place(key))
+        })?;
+        let invalid =
+            |error: Error| error.inside(KeyPath::of("sweep")).placed(|key| document.place(key));
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
         let results = results(&plan).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
@@ -354,12 +213,14 @@ impl Sweep {
     }
 }
 
-fn results(plan: &Plan) -> Result<Vec<ResultName>, BindError> {
+fn results(plan: &Plan) -> Result<Vec<ResultName>, Error> {
     let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
     match kept.len() == asked.len() && !kept.is_empty() {
         true => Ok(kept),
-        false => Err(BindError::Results),
+        false => Err(
+            error!(Sweep at "results", "sweep.results: name each result once, and at least one"),
+        ),
     }
 }
 
@@ -385,12 +246,7 @@ fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec
 }
 
 /// BLAKE3 of everything that decides the rows. Comments and order of keys do not.
-fn hash(
-    path: &Path,
-    text: &str,
-    plan_path: &Path,
-    scenario: &Scenario,
-) -> Result<String, SweepError> {
+fn hash(path: &Path, text: &str, plan_path: &Path, scenario: &Scenario) -> Result<String, Error> {
     let mut table: toml::Table = manifest::parse(path, text)?;
     if plan_path != path
         && let Some(plan) = manifest::load::<toml::Table>(plan_path)?.remove("sweep")
@@ -408,7 +264,7 @@ fn hash(
     for curve in scenario.curves.values() {
         for file in [&curve.model, &curve.file, &curve.database].into_iter().flatten() {
             let file = folder.join(file);
-            let io = |source| SweepError::Read { path: file.clone(), source };
+            let io = |source| Error::io(&file, source);
             let mut hash = blake3::Hasher::new();
             hash.update_reader(file::open(&file).map_err(io)?).map_err(io)?;
             part(hash.finalize().as_bytes());

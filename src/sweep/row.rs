@@ -1,6 +1,9 @@
 //! A row of results as numbers and as a line of CSV, and what stands above the rows.
 
-use super::{Damage, Difference, Shard, Sweep, SweepError};
+use std::path::Path;
+
+use super::{Shard, Sweep, damaged};
+use crate::error::{Error, error};
 
 /// First line of every file.
 pub(crate) const FORMAT: &str = "crumple sweep";
@@ -220,23 +223,42 @@ impl Head {
     }
 
     /// Why rows under this head do not belong under `wanted`; `None` if they do.
-    pub(crate) fn differs_from(&self, wanted: &Self) -> Option<Difference> {
+    pub(crate) fn differs_from(&self, wanted: &Self) -> Option<String> {
         if self.version != wanted.version {
-            let (found, this) = (self.version.clone(), wanted.version.clone());
-            return Some(Difference::Version { found, this });
+            return Some(format!("it is of crumple {}, this is {}", self.version, wanted.version));
         }
         if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
         {
-            return Some(Difference::Inputs);
+            return Some("plan, scenario or a file it names have changed since".into());
         }
-        (self.shard != wanted.shard)
-            .then_some(Difference::Shard { found: self.shard, this: wanted.shard })
+        let (found, this) = (self.shard, wanted.shard);
+        (found != this).then(|| {
+            format!(
+                "it is shard {}/{}, this is {}/{}",
+                found.index, found.count, this.index, this.count
+            )
+        })
+    }
+
+    /// Refuses a file under this head that is there, unless its rows belong under `wanted`.
+    pub(crate) fn check_same(&self, path: &Path, wanted: &Self) -> Result<(), Error> {
+        let Some(differs) = self.differs_from(wanted) else { return Ok(()) };
+        let path = path.display();
+        Err(error!(
+            Sweep,
+            "{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it"
+        ))
     }
 }
 
 /// The error of a row that cannot be read.
-pub(crate) fn bad_row(path: &std::path::Path, item: u64) -> SweepError {
-    SweepError::Damaged { path: path.into(), source: Damage::Row { item } }
+pub(crate) fn bad_row(path: &Path, item: u64) -> Error {
+    damaged(
+        path,
+        &format!(
+            "the row of item {item} is missing or damaged: run its sweep again with --restart"
+        ),
+    )
 }
 
 #[cfg(test)]

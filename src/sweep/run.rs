@@ -6,11 +6,12 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use super::Sweep;
 use super::row::{Row, Status};
-use super::{Sweep, SweepError};
-use crate::multibody::{Record, Run, RunSettings, SimulationError, simulate};
+use crate::error::{Error, ErrorCode};
+use crate::multibody::{Record, Run, RunSettings, simulate};
 use crate::plan::ResultName;
-use crate::scenario::{self, CheckError, Prepared, Scenario, ScenarioError};
+use crate::scenario::{self, Prepared, Scenario};
 
 /// How many items are run before their rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,30 +36,6 @@ const BLOCKS_PER_THREAD: usize = 4;
 /// Chains that a worker keeps.
 const KEPT_CHAINS: usize = 16;
 
-/// Why an item has no result.
-#[derive(Debug, thiserror::Error)]
-enum RowError {
-    /// The values make no scenario.
-    #[error(transparent)]
-    Check(#[from] CheckError),
-    /// The scenario with these values cannot be put together. The scenario's path is the same for
-    /// all items and known to whoever reads the message.
-    #[error("{}", without_path(.0))]
-    Scenario(#[from] ScenarioError),
-    /// The run failed.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-}
-
-fn without_path(error: &ScenarioError) -> String {
-    match error {
-        ScenarioError::Source { source, .. } => source.to_string(),
-        ScenarioError::Assembly { source, .. } => source.to_string(),
-        ScenarioError::Chain { source, .. } => source.to_string(),
-        other => other.to_string(),
-    }
-}
-
 /// A row with its line.
 pub(crate) struct Written {
     pub row: Row,
@@ -70,8 +47,8 @@ pub(crate) fn rows(
     sweep: &Sweep,
     items: Range<u64>,
     chunk: Chunk,
-    mut give: impl FnMut(&[Written]) -> Result<ControlFlow<()>, SweepError>,
-) -> Result<(), SweepError> {
+    mut give: impl FnMut(&[Written]) -> Result<ControlFlow<()>, Error>,
+) -> Result<(), Error> {
     let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names().to_vec()).collect();
     let workers = Mutex::new(Vec::new());
     let threads = rayon::current_num_threads();
@@ -162,7 +139,8 @@ impl<'a> Worker<'a> {
                 let chain = &sweep.base.chain;
                 let columns = super::result_columns(&sweep.results, chain, &sweep.base.order);
                 row.values.resize(self.values.len() + columns.len(), f64::NAN);
-                vec![error.to_string()]
+                // The scenario's path is the same for all items and known to the reader.
+                vec![error.message().to_string()]
             }
         };
         row.message = messages.join("; ").replace(|c: char| c.is_control(), " ");
@@ -170,12 +148,13 @@ impl<'a> Worker<'a> {
     }
 
     /// Appends the results of the scenario as it stands; gives back warnings, or why it failed.
-    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, RowError> {
+    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, Error> {
         let sweep = self.sweep;
         let prepared = self.prepared()?;
         // A row needs the summary only.
         let settings = RunSettings { record: Record::Summary, ..prepared.settings };
-        let run = simulate(&prepared.chain, &settings)?;
+        let run = simulate(&prepared.chain, &settings)
+            .map_err(|error| Error::below(ErrorCode::Simulation, error))?;
         push_results(&sweep.results, prepared, &run, values);
         // What holds for the scenario as written has been said once; here it has other numbers.
         let said = |w: &String| {
@@ -192,7 +171,7 @@ impl<'a> Worker<'a> {
     }
 
     /// The chain of the scenario as it stands; laws that do not change are not made again.
-    fn prepared(&mut self) -> Result<&Prepared, RowError> {
+    fn prepared(&mut self) -> Result<&Prepared, Error> {
         let Self { sweep, scenario, values, shaping, chains } = self;
         let scenario = &sweep.scenario.vary(scenario)?;
         let shaping = values.iter().zip(&*shaping).filter(|(_, shapes)| **shapes);

@@ -3,8 +3,9 @@
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+use super::damaged;
 use super::row::{Head, MAX_HEAD_BYTES, bad_row};
-use super::{Damage, SweepError};
+use crate::error::Error;
 use crate::file;
 
 /// The finished CSV file of a shard.
@@ -15,8 +16,8 @@ pub(super) struct ShardFile {
 
 impl ShardFile {
     /// Reads the head of a file; `None` if this program has not written it.
-    pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, SweepError> {
-        let io = |source| SweepError::Read { path: path.into(), source };
+    pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, Error> {
+        let io = |source| Error::io(path, source);
         let mut reader = BufReader::new(file::open(path).map_err(io)?);
         let head = Head::read(&mut reader).map_err(io)?;
         Ok(head.map(|(head, _)| Self { path: path.into(), head }))
@@ -26,9 +27,9 @@ impl ShardFile {
     /// whole.
     ///
     /// # Errors
-    /// [`SweepError::Damaged`] names the first row that is missing or not whole.
-    pub(crate) fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), SweepError> {
-        let io = |source| SweepError::Read { path: self.path.clone(), source };
+    /// It names the first row that is missing or not whole.
+    pub(crate) fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), Error> {
+        let io = |source| Error::io(&self.path, source);
         let file = file::open(&self.path).map_err(io)?;
         let mut reader = BufReader::with_capacity(1 << 16, file);
         Head::read(&mut reader).map_err(io)?;
@@ -51,19 +52,24 @@ fn each_line(
     reader: &mut impl BufRead,
     mut see: impl FnMut(&[u8]) -> Option<()>,
     head: &Head,
-) -> Result<(), SweepError> {
-    let io = |source| SweepError::Read { path: path.into(), source };
+) -> Result<(), Error> {
+    let io = |source| Error::io(path, source);
     let mut line = Vec::new();
     for item in head.rows() {
         if read_line(reader, &mut line).map_err(io)? == 0 {
             let last = head.rows().end - 1;
-            let source = Damage::Short { item, last };
-            return Err(SweepError::Damaged { path: path.into(), source });
+            let what = format!(
+                "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
+            );
+            return Err(damaged(path, &what));
         }
         see(&line).ok_or_else(|| bad_row(path, item))?;
     }
     match read_line(reader, &mut line).map_err(io)? {
         0 => Ok(()),
-        _ => Err(SweepError::Damaged { path: path.into(), source: Damage::Behind }),
+        _ => Err(damaged(
+            path,
+            "there is something behind the last row: run its sweep again with --restart",
+        )),
     }
 }

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
 use super::shard_file::ShardFile;
 use super::tally::Tally;
-use super::{Damage, Shard, SweepError};
-use crate::hdf5::table::{Attribute, Column, Put, Table, TableError, Values, write_table};
+use super::{Shard, damaged, foreign};
+use crate::error::{Error, ErrorCode};
+use crate::hdf5::table::{Attribute, Column, Put, Table, Values, write_table};
 
 /// Whether a path is to become HDF5.
 pub(super) fn is_hdf5(path: &Path) -> bool {
@@ -67,10 +68,10 @@ fn attributes(head: &Head) -> [(&'static str, Attribute); 6] {
 
 /// Writes the rows of CSV files, in this order, as one HDF5 file under `head`. The files have
 /// been written by this program and are read twice.
-pub(super) fn convert(files: &[ShardFile], head: &Head, output: &Path) -> Result<(), SweepError> {
+pub(super) fn convert(files: &[ShardFile], head: &Head, output: &Path) -> Result<(), Error> {
     let columns = head.columns.len();
     let mut widths = Widths::new(columns);
-    let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), SweepError> {
+    let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), Error> {
         for file in files {
             let mut item = file.head.rows().start;
             file.rows(|bytes| {
@@ -203,17 +204,17 @@ impl FinishedTable {
     /// Opens a finished file.
     ///
     /// # Errors
-    /// [`SweepError::Table`] if it is no HDF5 file, or not the result of a sweep.
-    fn open(path: &Path) -> Result<Self, SweepError> {
-        let table = Table::open(path, FORMAT)?;
-        let head = head(&table)?
-            .ok_or_else(|| SweepError::Damaged { path: path.into(), source: Damage::Attributes })?;
+    /// If it is no HDF5 file, or not the result of a sweep.
+    fn open(path: &Path) -> Result<Self, Error> {
+        let table = Table::open(path, FORMAT).map_err(|e| e.coded(ErrorCode::Sweep))?;
+        let head = head(&table)?.ok_or_else(|| {
+            damaged(path, "its attributes are not those of a sweep of this layout")
+        })?;
         let rows = head.rows().end - head.rows().start;
         let messages = table.columns.len() - 1;
         if let Some(short) = table.columns[..messages].iter().find(|c| c.rows != rows) {
-            let (column, found) = (short.name.clone(), short.rows);
-            let source = Damage::Rows { column, rows: found, expected: rows };
-            return Err(SweepError::Damaged { path: path.into(), source });
+            let what = format!("{} has {} rows, expected {rows}", short.name, short.rows);
+            return Err(damaged(path, &what));
         }
         // Widths of texts are the file's own, everything else is what this program writes.
         let is_text = |c: &Column| matches!(c.values, Values::Text { .. });
@@ -222,8 +223,8 @@ impl FinishedTable {
             is_text(found) != is_text(wanted) || !is_text(found) && found.values != wanted.values
         };
         if let Some((other, _)) = table.columns.iter().zip(&expected).find(is_other) {
-            let source = Damage::Kind { column: other.name.clone() };
-            return Err(SweepError::Damaged { path: path.into(), source });
+            let what = format!("{} does not hold the kind of values it should", other.name);
+            return Err(damaged(path, &what));
         }
         Ok(Self { path: path.into(), table, head })
     }
@@ -235,13 +236,13 @@ impl FinishedTable {
     /// Rows by blocks: first row, rows, and the bytes of every column but the messages.
     fn blocks(
         &self,
-        mut see: impl FnMut(u64, u64, &mut [Vec<u8>]) -> Result<(), SweepError>,
-    ) -> Result<(), SweepError> {
+        mut see: impl FnMut(u64, u64, &mut [Vec<u8>]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let messages = self.table.columns.len() - 1;
         let mut first = 0;
         while first < self.rows() {
             let rows = ROWS.min(self.rows() - first);
-            let columns: Result<Vec<Vec<u8>>, TableError> =
+            let columns: Result<Vec<Vec<u8>>, Error> =
                 (0..messages).map(|c| self.table.read(c, first, rows)).collect();
             let mut columns = columns?;
             for (k, item) in columns[0].chunks_exact(8).enumerate() {
@@ -257,7 +258,7 @@ impl FinishedTable {
     }
 
     /// Counts all rows.
-    fn tally(&self, tally: &mut Tally) -> Result<(), SweepError> {
+    fn tally(&self, tally: &mut Tally) -> Result<(), Error> {
         let numbers: Vec<usize> =
             (1..self.head.columns.len()).filter(|&c| !self.head.is_text(c)).collect();
         let status = self.head.columns.len() - 2;
@@ -298,7 +299,7 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
 }
 
 /// The head that a file's attributes and columns tell.
-fn head(table: &Table) -> Result<Option<Head>, TableError> {
+fn head(table: &Table) -> Result<Option<Head>, Error> {
     let mut texts = Vec::new();
     for name in ["written_by", "hash", "shard"] {
         match table.attribute(name)? {
@@ -325,11 +326,8 @@ fn head(table: &Table) -> Result<Option<Head>, TableError> {
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.
-pub(super) fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), SweepError> {
-    let foreign = |_| SweepError::Foreign { path: output.into() };
-    let file = FinishedTable::open(output).map_err(foreign)?;
-    if let Some(differs) = file.head.differs_from(head) {
-        return Err(SweepError::Changed { path: output.into(), differs });
-    }
+pub(super) fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), Error> {
+    let file = FinishedTable::open(output).map_err(|_| foreign(output))?;
+    file.head.check_same(output, head)?;
     file.tally(tally)
 }

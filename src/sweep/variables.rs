@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::guess;
-use crate::plan::{Design, Plan, PlanError, Spread, Vary, VaryError, Vehicles, What};
+use crate::error::{Error, KeyPath, error};
+use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
 use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
@@ -39,156 +39,25 @@ pub struct VariableSummary {
     pub values: Option<u64>,
 }
 
-/// Why a plan cannot be carried out on a scenario.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum BindError {
-    /// There is no variable.
-    #[error("[sweep] varies nothing: add [[sweep.vary]]")]
-    Nothing,
-    /// A variable is wrong.
-    #[error("sweep.vary {number} ({}): {source}", .what.name())]
-    Variable {
-        /// Which one, counted from 1.
-        number: usize,
-        /// What it varies.
-        what: What,
-        /// What is wrong with it.
-        source: VariableError,
-    },
-    /// The variables do not go together.
-    #[error("{0}")]
-    Plan(#[from] PlanError),
-    /// A result is named twice, or none is.
-    #[error("sweep.results: name each result once, and at least one")]
-    Results,
-}
-
-/// What is wrong with one variable.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum VariableError {
-    /// Its values or its distribution.
-    #[error(transparent)]
-    Spread(#[from] VaryError),
-    /// Another variable has the same column.
-    #[error("{column} is varied twice")]
-    Twice {
-        /// The column.
-        column: String,
-    },
-    /// A speed without its train.
-    #[error("name the train: train = \"…\"")]
-    NoTrain,
-    /// A curve is varied, and its name is missing.
-    #[error("name the curve: curve = \"…\"")]
-    NoCurve,
-    /// A mass without its vehicle.
-    #[error("give vehicle = \"…\", or vehicles = […] or \"all\"")]
-    NoVehicle,
-    /// A gap without its place.
-    #[error("give curve = \"…\" or interface = \"contact\"")]
-    NoGapNamed,
-    /// A name that the scenario does not have.
-    #[error("there is no {what} \"{name}\": the scenario has {known}{}", guess::hint(name, known))]
-    Unknown {
-        /// `train`, `vehicle` or `curve`.
-        what: &'static str,
-        /// The name.
-        name: String,
-        /// The names there are.
-        known: String,
-        /// Whether it stands in a list of names.
-        listed: bool,
-    },
-    /// A key of another kind of variable.
-    #[error("{key} does not go with what = \"{}\"", .what.name())]
-    Key {
-        /// The key.
-        key: &'static str,
-        /// What is varied.
-        what: What,
-    },
-    /// A crush zone is joined to its body without a gap.
-    #[error("curve \"{curve}\" joins a crush zone to its body, where there is no gap")]
-    ZoneGap {
-        /// The curve.
-        curve: String,
-    },
-    /// A factor on nothing.
-    #[error("curve \"{curve}\" has no gap that a factor could change")]
-    NoGap {
-        /// The curve.
-        curve: String,
-    },
-    /// The contact's own gap hides the curve's.
-    #[error(
-        "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
-    )]
-    GapUnused {
-        /// The curve.
-        curve: String,
-    },
-    /// A factor on nothing.
-    #[error("the contact has no gap that a factor could change")]
-    NoContactGap,
-    /// An interface other than the contact.
-    #[error(
-        "interface = \"{found}\": expected \"contact\"; gaps inside a train are those of its curve"
-    )]
-    Interface {
-        /// As written.
-        found: String,
-    },
-    /// A curve without a band.
-    #[error("curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one")]
-    NoBand {
-        /// The curve.
-        curve: String,
-    },
-    /// A word that is not `all`.
-    #[error("vehicles = \"{found}\": expected a list, or \"all\"")]
-    Vehicles {
-        /// As written.
-        found: String,
-    },
-    /// A vehicle that is listed twice.
-    #[error("vehicles names \"{name}\" twice")]
-    VehicleTwice {
-        /// The vehicle.
-        name: String,
-    },
-    /// A curve that stands nowhere.
-    #[error("no interface has curve \"{curve}\", so varying it has no effect")]
-    CurveUnused {
-        /// The curve.
-        curve: String,
-    },
-    /// A name that cannot stand in a column.
-    #[error(
-        "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
-        .name.escape_debug()
-    )]
-    Name {
-        /// The name.
-        name: String,
-    },
-}
-
 /// The variables of a plan, in order of their columns, and its design.
 ///
 /// # Errors
-/// [`BindError`] names the variable and key.
-pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), BindError> {
+/// [`Error`] names the variable and key.
+pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), Error> {
     if plan.vary.is_empty() {
-        return Err(BindError::Nothing);
+        return Err(error!(Sweep, "[sweep] varies nothing: add [[sweep.vary]]"));
     }
     let (mut variables, mut spreads) = (Vec::new(), Vec::new());
     for (k, vary) in plan.vary.iter().enumerate() {
-        let named = |source| BindError::Variable { number: k + 1, what: vary.what, source };
+        let named = |fault: Error| {
+            let name = format!("sweep.vary {} ({})", k + 1, vary.what.name());
+            fault.of(name).inside(KeyPath::of("vary").item(k))
+        };
         let bound = Binder { vary, scenario, plan }.variables().map_err(named)?;
-        let spread = vary.spread().map_err(|e| named(e.into()))?;
+        let spread = vary.spread().map_err(named)?;
         for variable in bound {
             if variables.iter().any(|v: &Variable| v.column == variable.column) {
-                return Err(named(VariableError::Twice { column: variable.column }));
+                return Err(named(error!(Sweep, "{} is varied twice", variable.column)));
             }
             variables.push(variable);
             spreads.push(spread.clone());
@@ -205,16 +74,19 @@ struct Binder<'a> {
 }
 
 impl Binder<'_> {
-    fn variables(&self) -> Result<Vec<Variable>, VariableError> {
+    fn variables(&self) -> Result<Vec<Variable>, Error> {
         let vary = self.vary;
         self.only_own_keys()?;
         match vary.what {
             What::Speed => {
                 let trains = &self.scenario.train;
-                let name = vary.train.as_deref().ok_or(VariableError::NoTrain)?;
+                let name = vary
+                    .train
+                    .as_deref()
+                    .ok_or_else(|| error!(Sweep, "name the train: train = \"…\""))?;
                 let known = trains.iter().map(|t| t.name.as_str());
                 let at = known.clone().position(|t| t == name);
-                let at = at.ok_or_else(|| unknown("train", name, known, false))?;
+                let at = at.ok_or_else(|| unknown("train", "train", name, known))?;
                 self.one("speed_m_per_s", "speed_factor", name, Target::Speed(at))
             }
             What::Mass => self.masses(),
@@ -224,7 +96,10 @@ impl Binder<'_> {
                 let table = &self.scenario.curves[curve];
                 let is_json = |p: &std::path::PathBuf| p.extension().is_some_and(|e| e == "json");
                 if table.model.is_none() && !table.file.as_ref().is_some_and(is_json) {
-                    return Err(VariableError::NoBand { curve: curve.into() });
+                    return Err(
+                        error!(Sweep at "curve", "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
+                        ),
+                    );
                 }
                 self.one("band", "band", curve, Target::Band(curve.into()))
             }
@@ -235,8 +110,8 @@ impl Binder<'_> {
             What::Curve => {
                 let curve = self.curve()?;
                 for value in vary.values.iter().flatten() {
-                    check_name(&value.0)?;
-                    self.known_curve(&value.0, true)?;
+                    check_name("values", &value.0)?;
+                    self.known_curve("values", &value.0)?;
                 }
                 self.one("curve", "curve", curve, Target::Curve(curve.into()))
             }
@@ -244,17 +119,23 @@ impl Binder<'_> {
     }
 
     /// The gap of a curve or of the contact.
-    fn gaps(&self) -> Result<Vec<Variable>, VariableError> {
+    fn gaps(&self) -> Result<Vec<Variable>, Error> {
         let vary = self.vary;
         match (&vary.curve, vary.interface.as_deref()) {
             (Some(curve), None) => {
                 self.check_curve(curve)?;
                 let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
                 if vehicles.any(|v| v.zones().any(|zone| zone.curve == *curve)) {
-                    return Err(VariableError::ZoneGap { curve: curve.clone() });
+                    return Err(
+                        error!(Sweep at "curve", "curve \"{curve}\" joins a crush zone to its body, where there is no gap"
+                        ),
+                    );
                 }
                 if vary.factor && self.scenario.curves[curve].gap.is_none() {
-                    return Err(VariableError::NoGap { curve: curve.clone() });
+                    return Err(
+                        error!(Sweep at "factor", "curve \"{curve}\" has no gap that a factor could change"
+                        ),
+                    );
                 }
                 if self.scenario.contact.gap.is_some()
                     && !self
@@ -265,23 +146,32 @@ impl Binder<'_> {
                         .skip(usize::from(self.scenario.contact.curve.is_some()))
                         .any(|name| name == curve)
                 {
-                    return Err(VariableError::GapUnused { curve: curve.clone() });
+                    return Err(
+                        error!(Sweep at "curve", "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
+                        ),
+                    );
                 }
                 self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
             }
             (None, Some("contact")) => {
                 if vary.factor && self.scenario.contact.gap.is_none() {
-                    return Err(VariableError::NoContactGap);
+                    return Err(
+                        error!(Sweep at "factor", "the contact has no gap that a factor could change"
+                        ),
+                    );
                 }
                 self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
             }
-            (None, Some(other)) => Err(VariableError::Interface { found: other.into() }),
-            _ => Err(VariableError::NoGapNamed),
+            (None, Some(other)) => Err(
+                error!(Sweep at "interface", "interface = \"{other}\": expected \"contact\"; gaps inside a train are those of its curve"
+                ),
+            ),
+            _ => Err(error!(Sweep, "give curve = \"…\" or interface = \"contact\"")),
         }
     }
 
     /// Refuses keys of other kinds of variables.
-    fn only_own_keys(&self) -> Result<(), VariableError> {
+    fn only_own_keys(&self) -> Result<(), Error> {
         let vary = self.vary;
         let keys = [
             ("train", vary.train.is_some(), vary.what == What::Speed),
@@ -293,12 +183,15 @@ impl Binder<'_> {
             ("factor", vary.factor, matches!(vary.what, What::Speed | What::Mass | What::Gap)),
         ];
         match keys.iter().find(|(_, given, own)| *given && !own) {
-            Some((key, ..)) => Err(VariableError::Key { key, what: vary.what }),
+            Some((key, ..)) => {
+                Err(error!(Sweep at key, "{key} does not go with what = \"{}\"", vary.what.name())
+                    .itself())
+            }
             None => Ok(()),
         }
     }
 
-    fn masses(&self) -> Result<Vec<Variable>, VariableError> {
+    fn masses(&self) -> Result<Vec<Variable>, Error> {
         let vehicles = || {
             let trains = self.scenario.train.iter().enumerate();
             trains.flat_map(|(t, train)| {
@@ -308,7 +201,12 @@ impl Binder<'_> {
         let find = |name: &str| {
             let found = vehicles().find(|(_, n)| *n == name).map(|(place, _)| place);
             found.ok_or_else(|| {
-                unknown("vehicle", name, vehicles().map(|(_, n)| n), self.vary.vehicles.is_some())
+                unknown(
+                    if self.vary.vehicles.is_some() { "vehicles" } else { "vehicle" },
+                    "vehicle",
+                    name,
+                    vehicles().map(|(_, n)| n),
+                )
             })
         };
         let named: Vec<(&str, (usize, usize))> = match (&self.vary.vehicle, &self.vary.vehicles) {
@@ -317,23 +215,26 @@ impl Binder<'_> {
                 vehicles().map(|(place, name)| (name, place)).collect()
             }
             (None, Some(Vehicles::Word(word))) => {
-                return Err(VariableError::Vehicles { found: word.clone() });
+                return Err(
+                    error!(Sweep at "vehicles", "vehicles = \"{word}\": expected a list, or \"all\""
+                    ),
+                );
             }
             (None, Some(Vehicles::List(names))) if !names.is_empty() => {
-                let places: Result<Vec<_>, VariableError> =
+                let places: Result<Vec<_>, Error> =
                     names.iter().map(|name| Ok((name.as_str(), find(name)?))).collect();
                 places?
             }
-            _ => return Err(VariableError::NoVehicle),
+            _ => return Err(error!(Sweep, "give vehicle = \"…\", or vehicles = […] or \"all\"")),
         };
         if let Some(k) = (1..named.len()).find(|&k| named[..k].iter().any(|n| n.0 == named[k].0)) {
-            return Err(VariableError::VehicleTwice { name: named[k].0.into() });
+            return Err(error!(Sweep at "vehicles", "vehicles names \"{}\" twice", named[k].0));
         }
         if self.vary.each {
             let each = |(name, place): (&str, (usize, usize))| {
                 self.one("mass_kg", "mass_factor", name, Target::Mass(vec![place]))
             };
-            let variables: Result<Vec<Vec<Variable>>, VariableError> =
+            let variables: Result<Vec<Vec<Variable>>, Error> =
                 named.into_iter().map(each).collect();
             return variables.map(|v| v.into_iter().flatten().collect());
         }
@@ -350,8 +251,13 @@ impl Binder<'_> {
         factor: &str,
         name: &str,
         target: Target,
-    ) -> Result<Vec<Variable>, VariableError> {
-        check_name(name)?;
+    ) -> Result<Vec<Variable>, Error> {
+        let key = match self.vary.what {
+            What::Speed => "train",
+            What::Mass => "",
+            _ => "curve",
+        };
+        check_name(key, name)?;
         let quantity = if self.vary.factor { factor } else { absolute };
         let names = match self.vary.what {
             What::Curve => self.vary.values.iter().flatten().map(|v| v.0.clone()).collect(),
@@ -361,25 +267,29 @@ impl Binder<'_> {
         Ok(vec![Variable { column, target, factor: self.vary.factor, names }])
     }
 
-    fn curve(&self) -> Result<&str, VariableError> {
-        let curve = self.vary.curve.as_deref().ok_or(VariableError::NoCurve)?;
+    fn curve(&self) -> Result<&str, Error> {
+        let curve = self
+            .vary
+            .curve
+            .as_deref()
+            .ok_or_else(|| error!(Sweep, "name the curve: curve = \"…\""))?;
         self.check_curve(curve)?;
         Ok(curve)
     }
 
-    fn known_curve(&self, curve: &str, listed: bool) -> Result<(), VariableError> {
+    fn known_curve(&self, key: &str, curve: &str) -> Result<(), Error> {
         match self.scenario.curves.contains_key(curve) {
             true => Ok(()),
             false => {
                 let known = self.scenario.curves.keys().map(String::as_str);
-                Err(unknown("curve", curve, known, listed))
+                Err(unknown(key, "curve", curve, known))
             }
         }
     }
 
     /// A curve that is there, and that some item uses.
-    fn check_curve(&self, curve: &str) -> Result<(), VariableError> {
-        self.known_curve(curve, false)?;
+    fn check_curve(&self, curve: &str) -> Result<(), Error> {
+        self.known_curve("curve", curve)?;
         let replaces = |v: &Vary| {
             v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
         };
@@ -388,26 +298,27 @@ impl Binder<'_> {
             || self.plan.vary.iter().any(replaces);
         match used {
             true => Ok(()),
-            false => Err(VariableError::CurveUnused { curve: curve.into() }),
+            false => Err(
+                error!(Sweep at "curve", "no interface has curve \"{curve}\", so varying it has no effect"
+                ),
+            ),
         }
     }
 }
 
-fn unknown<'a>(
-    what: &'static str,
-    name: &str,
-    known: impl Iterator<Item = &'a str>,
-    listed: bool,
-) -> VariableError {
-    let known: Vec<&str> = known.collect();
-    VariableError::Unknown { what, name: name.into(), known: known.join(", "), listed }
+fn unknown<'a>(key: &str, what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> Error {
+    error!(Sweep at key, "there is no {what} \"{name}\": the scenario has").names(name, known)
 }
 
 /// Names stand in the columns of the result.
-fn check_name(name: &str) -> Result<(), VariableError> {
+fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     match name.is_empty() || name.contains(breaks) {
-        true => Err(VariableError::Name { name: name.into() }),
+        true => Err(
+            error!(Sweep at key, "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
+                name.escape_debug()
+            ),
+        ),
         false => Ok(()),
     }
 }

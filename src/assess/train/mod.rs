@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::error::{CompareError, TrainError};
 use super::settings::ComparisonSettings;
-use crate::manifest::KeyPath;
+use crate::error::KeyPath;
 use crate::scenario::{CheckedScenario, Scenario, Sources};
 use crate::solver::ReadError;
 use fe::FeTrain;

@@ -40,7 +40,7 @@ impl fmt::Display for Place {
 
 impl Place {
     /// The place of some bytes of a file's text. Of a part over several lines it is the first one.
-    pub(super) fn new(path: &Path, text: &str, span: Range<usize>) -> Self {
+    pub(crate) fn new(path: &Path, text: &str, span: Range<usize>) -> Self {
         // Behind the last line's end there is nothing to show: what is missing is missing there.
         let start = floor(text, span.start.min(text.trim_end().len()));
         let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
@@ -161,6 +161,13 @@ impl KeyPath {
     /// An item of the list at this path, counted from 0.
     pub(crate) fn item(mut self, item: usize) -> Self {
         self.steps.push(Step::Item(item));
+        self
+    }
+
+    /// A path within the value at this one.
+    pub(crate) fn then(mut self, inner: Self) -> Self {
+        self.steps.extend(inner.steps);
+        self.is_key = inner.is_key;
         self
     }
 
