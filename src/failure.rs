@@ -7,10 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::assess::error::{CompareError, TrainError, ValidateError};
-use crate::build::{BuildError, RunFailure};
 use crate::charts::{HistoryError, LeftOutError};
-use crate::curate::CurateError;
-use crate::database::DatabaseError;
 use crate::dataset::DatasetError;
 
 use crate::error::{self, ErrorCode, Place};
@@ -26,7 +23,7 @@ use crate::plot::PngError;
 use crate::rating::SignalError;
 use crate::report::ReportError;
 use crate::solver::ReadError;
-use crate::study::{RunError, StudyError};
+use crate::study::RunError;
 use crate::surrogate::{ModelError, PredictError};
 
 /// What `--json` prints on standard output when a command fails.
@@ -76,9 +73,8 @@ fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
     }
     codes! {
         io::Error => Io;
-        BuildError, StudyError, InitError => Study;
-        RunFailure, RunError => Run;
-        DatabaseError, CurateError => Database;
+        InitError => Study;
+        RunError => Run;
         ReadError, ConvertError => SolverFile;
         ReadCurveError, CurveFileError => CurveFile;
         ImportError => Import;
@@ -110,10 +106,7 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> ErrorCode {
 pub(crate) fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
     chain(error).find_map(|error| {
         (of::<error::Error>(error).and_then(error::Error::place))
-            .or_else(|| of::<StudyError>(error).and_then(StudyError::place))
             .or_else(|| of::<TrainError>(error).and_then(TrainError::place))
-            .or_else(|| of::<BuildError>(error).and_then(BuildError::place))
-            .or_else(|| of::<RunFailure>(error).and_then(|failure| failure.place.as_deref()))
     })
 }
 
@@ -182,7 +175,7 @@ mod tests {
     #[test]
     fn the_innermost_known_kind_gives_the_code() {
         let study = crate::study::parse(Path::new("s.toml"), "[study]\ngrop = 1\n").unwrap_err();
-        let document = ErrorDocument::new(&BuildError::from(study)).error;
+        let document = ErrorDocument::new(&study).error;
         assert_eq!(document.code, ErrorCode::Toml);
         assert_eq!((document.file.as_deref(), document.line), (Some("s.toml"), Some(2)));
         assert_eq!(document.hint.as_deref(), Some("did you mean \"group\"?"));

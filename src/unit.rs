@@ -15,6 +15,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use crate::error::{Error, error};
 use crate::guess;
 use std::fmt;
 
@@ -67,71 +68,6 @@ impl fmt::Display for Speed {
 pub fn km_per_h(m_per_s: f64) -> String {
     let rounded = (m_per_s / M_PER_S_PER_KM_PER_H * 100.0).round() / 100.0;
     format!("{rounded} km/h")
-}
-
-/// Why a number with a unit was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum UnitError {
-    /// The text is a number by itself.
-    #[error("{what} \"{text}\" has no unit: write for example {example}")]
-    NoUnit {
-        /// What kind of quantity was expected, such as "speed".
-        what: &'static str,
-        /// The text as given.
-        text: String,
-        /// The same number with a unit.
-        example: String,
-    },
-    /// The unit does not belong to this kind of quantity.
-    #[error(
-        "{what} \"{text}\" has the unknown unit \"{unit}\": use one of {known}{}",
-        guess::hint(unit, known)
-    )]
-    UnknownUnit {
-        /// What kind of quantity was expected.
-        what: &'static str,
-        /// The text as given.
-        text: String,
-        /// Its unit.
-        unit: String,
-        /// The units that are known, as a list.
-        known: String,
-    },
-    /// The text does not begin with a number.
-    #[error("{what} \"{text}\" is not a number with a unit: write for example {example}")]
-    NotANumber {
-        /// What kind of quantity was expected.
-        what: &'static str,
-        /// The text as given.
-        text: String,
-        /// A text that would be right.
-        example: &'static str,
-    },
-    /// The number makes no sense for this quantity, such as a mass of 0.
-    #[error("{what} \"{text}\" is out of range: it must be {range}")]
-    OutOfRange {
-        /// What kind of quantity was expected.
-        what: &'static str,
-        /// The text as given.
-        text: String,
-        /// The range it must lie in.
-        range: &'static str,
-    },
-    /// The text names no unit system.
-    #[error(
-        "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\"{}",
-        guess::hint(text, "SI, mm-t-s, kg-mm-ms, m-kg-s, mm-kg-ms, mm-g-ms")
-    )]
-    UnknownSystem {
-        /// The text as given.
-        text: String,
-        /// Units of length that are known, as a list.
-        lengths: String,
-        /// Units of mass that are known, as a list.
-        masses: String,
-        /// Units of time that are known, as a list.
-        times: String,
-    },
 }
 
 /// One kind of quantity: its name for messages, its units with their size in SI.
@@ -190,46 +126,39 @@ impl Dimension {
     /// SI value of a number with a unit, such as `"36 km/h"`.
     ///
     /// # Errors
-    /// [`UnitError`] when the number or the unit is missing, unknown or not finite.
-    pub fn parse(&self, text: &str) -> Result<f64, UnitError> {
+    /// When the number or the unit is missing, unknown or not finite.
+    pub fn parse(&self, text: &str) -> Result<f64, Error> {
         let trimmed = text.trim();
         let number_end = trimmed
             .char_indices()
             .find(|&(i, c)| !continues_number(trimmed, i, c))
             .map_or(trimmed.len(), |(i, _)| i);
         let (number, unit) = trimmed.split_at(number_end);
-        let value: f64 = number.trim().parse().map_err(|_| UnitError::NotANumber {
-            what: self.what,
-            text: text.into(),
-            example: self.example(),
+        let what = self.what;
+        let value: f64 = number.trim().parse().map_err(|_| {
+            let example = self.example();
+            error!(
+                Other,
+                "{what} \"{text}\" is not a number with a unit: write for example {example}"
+            )
         })?;
         let unit = unit.trim();
         if unit.is_empty() {
-            return Err(UnitError::NoUnit {
-                what: self.what,
-                text: text.into(),
-                example: self
-                    .units
-                    .iter()
-                    .take(2)
-                    .map(|(u, _)| format!("\"{number}{u}\""))
-                    .collect::<Vec<_>>()
-                    .join(" or "),
-            });
+            let units = self.units.iter().take(2);
+            let examples: Vec<String> = units.map(|(u, _)| format!("\"{number}{u}\"")).collect();
+            let example = examples.join(" or ");
+            return Err(error!(
+                Other,
+                "{what} \"{text}\" has no unit: write for example {example}"
+            ));
         }
-        let size = self.size_of(unit).ok_or_else(|| UnitError::UnknownUnit {
-            what: self.what,
-            text: text.into(),
-            unit: unit.into(),
-            known: self.known_units(),
+        let size = self.size_of(unit).ok_or_else(|| {
+            error!(Other, "{what} \"{text}\" has the unknown unit \"{unit}\": use one of")
+                .names(unit, self.units.iter().map(|(name, _)| *name))
         })?;
         let si = value * size;
         if !si.is_finite() {
-            return Err(UnitError::OutOfRange {
-                what: self.what,
-                text: text.into(),
-                range: "finite",
-            });
+            return Err(self.out_of_range(text, "finite"));
         }
         Ok(si)
     }
@@ -246,27 +175,19 @@ impl Dimension {
     }
 
     /// Like [`Dimension::parse`], but refuses values that are not above zero.
-    pub(crate) fn parse_positive(&self, text: &str) -> Result<f64, UnitError> {
+    pub(crate) fn parse_positive(&self, text: &str) -> Result<f64, Error> {
         let value = self.parse(text)?;
-        if value > 0.0 {
-            Ok(value)
-        } else {
-            Err(UnitError::OutOfRange { what: self.what, text: text.into(), range: "above zero" })
-        }
+        if value > 0.0 { Ok(value) } else { Err(self.out_of_range(text, "above zero")) }
     }
 
     /// Like [`Dimension::parse`], but refuses values below zero.
-    pub(crate) fn parse_not_negative(&self, text: &str) -> Result<f64, UnitError> {
+    pub(crate) fn parse_not_negative(&self, text: &str) -> Result<f64, Error> {
         let value = self.parse(text)?;
-        if value >= 0.0 {
-            Ok(value)
-        } else {
-            Err(UnitError::OutOfRange {
-                what: self.what,
-                text: text.into(),
-                range: "zero or above",
-            })
-        }
+        if value >= 0.0 { Ok(value) } else { Err(self.out_of_range(text, "zero or above")) }
+    }
+
+    fn out_of_range(&self, text: &str, range: &str) -> Error {
+        error!(Other, "{} \"{text}\" is out of range: it must be {range}", self.what)
     }
 
     /// The units of this quantity, for messages: `km/h, m/s, …`.
@@ -320,15 +241,17 @@ impl UnitSystem {
     pub(crate) const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
 
     /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
-    pub fn parse(text: &str) -> Result<Self, UnitError> {
+    pub fn parse(text: &str) -> Result<Self, Error> {
         if text.eq_ignore_ascii_case("si") {
             return Ok(Self::SI);
         }
-        let unknown = || UnitError::UnknownSystem {
-            text: text.into(),
-            lengths: names(LENGTHS),
-            masses: names(MASSES),
-            times: names(TIMES),
+        let unknown = || {
+            let (lengths, masses, times) = (names(LENGTHS), names(MASSES), names(TIMES));
+            error!(
+                Other,
+                "unit system \"{text}\" is not known: write \"SI\" or one unit each of length ({lengths}), mass ({masses}) and time ({times}), joined by \"-\", such as \"mm-t-s\" or \"kg-mm-ms\"{}",
+                guess::hint(text, "SI, mm-t-s, kg-mm-ms, m-kg-s, mm-kg-ms, mm-g-ms")
+            )
         };
         let (mut length, mut mass, mut time) = (None, None, None);
         for part in text.split(['-', ' ', ',', '/']).filter(|p| !p.is_empty()) {
@@ -422,7 +345,7 @@ impl<'de> Deserialize<'de> for UnitSystem {
 
 /// Reads text with a unit; a bare number gets the message of a missing unit, not that of
 /// a wrong type.
-struct TextVisitor(fn(&str) -> Result<f64, UnitError>);
+struct TextVisitor(fn(&str) -> Result<f64, Error>);
 
 impl serde::de::Visitor<'_> for TextVisitor {
     type Value = f64;
@@ -517,7 +440,7 @@ mod tests {
     #[test]
     fn reads_numbers_with_units() {
         fn t(dimension: &Dimension, text: &str, expected: f64) {
-            assert_eq!(dimension.parse(text), Ok(expected), "{text:?}");
+            assert_eq!(dimension.parse(text).unwrap(), expected, "{text:?}");
         }
         t(&SPEED, "36km/h", 36.0 / 3.6);
         t(&SPEED, " 10 m/s", 10.0);

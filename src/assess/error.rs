@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::reference::MotionError;
 use crate::curve::EnvelopeError;
-use crate::database::DatabaseError;
 use crate::dataset::DatasetError;
 use crate::error::Error;
 use crate::error::Place;
@@ -221,9 +220,6 @@ pub enum TrainError {
     /// The scenario cannot be run.
     #[error("{0}")]
     Scenario(#[from] Error),
-    /// The database cannot be read.
-    #[error(transparent)]
-    Database(#[from] DatabaseError),
 }
 
 impl TrainError {

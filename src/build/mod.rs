@@ -2,74 +2,21 @@
 
 mod previous;
 
-use crate::error::Error;
 use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 
 use crate::clock;
 use crate::curve::{Case, Origin};
-use crate::database::{CasePath, Database, DatabaseError};
-use crate::error::Place;
+use crate::database::{CasePath, Database};
+use crate::error::{Error, ErrorCode, error};
 use crate::file::WriterLock;
-use crate::study::{self, LocatedRun, RunError, Study, StudyError};
+use crate::study::{self, LocatedRun, RunError, Study};
 use previous::{Named, Previous};
-
-/// Why nothing could be built.
-#[derive(Debug, thiserror::Error)]
-pub enum BuildError {
-    /// The manifest is wrong.
-    #[error("{0}")]
-    Study(#[from] StudyError),
-    /// The database is not ours, or damaged.
-    #[error("{0}")]
-    Database(#[from] DatabaseError),
-    /// Another process writes the database.
-    #[error("{0}")]
-    Lock(#[from] Error),
-    /// No run is usable.
-    #[error("{path}: no run of the study can be used; the database is not changed:\n{reasons}")]
-    NoRun {
-        /// The manifest.
-        path: PathBuf,
-        /// A line for each run.
-        reasons: String,
-        /// What the first of them is about in the manifest, if the manifest says it.
-        place: Option<Place>,
-    },
-}
-
-impl BuildError {
-    /// Where in the manifest it is wrong.
-    pub(crate) fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Study(error) => error.place(),
-            Self::NoRun { place, .. } => place.as_ref(),
-            Self::Database(_) | Self::Lock(_) => None,
-        }
-    }
-}
-
-/// Why a run could not be used, and what is wrong with its files, which may be the cause.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{reason}{}", shown(.place), listed(.problems))]
-pub struct RunFailure {
-    /// What it is about in the manifest, if the manifest says it.
-    pub place: Option<Box<Place>>,
-    /// Why the run is not usable.
-    #[source]
-    pub reason: RunError,
-    /// As `crumple inspect` finds them.
-    pub problems: Box<[String]>,
-}
 
 /// Problems that a message repeats.
 const LISTED: usize = 3;
-
-fn shown(place: &Option<Box<Place>>) -> String {
-    place.as_ref().map_or(String::new(), |place| format!("{place}: "))
-}
 
 fn listed(problems: &[String]) -> String {
     if problems.is_empty() {
@@ -93,7 +40,7 @@ pub enum RunOutcome {
     /// Not usable, with the reason; an earlier build of it stays in the database.
     Failed {
         /// Why, with the damage of its files.
-        reason: RunFailure,
+        reason: Error,
         /// Whether the database has the run from an earlier build.
         earlier_kept: bool,
     },
@@ -143,13 +90,13 @@ impl BuildReport {
 /// tags and notes. `progress` is called with the name of each run when it is done, from any thread.
 ///
 /// # Errors
-/// [`BuildError`] if the manifest is wrong, the database is not ours, busy or cannot be
+/// If the manifest is wrong, the database is not ours, busy or cannot be
 /// written, or no run is usable. The database is then unchanged.
 pub fn build(
     manifest: &Path,
     path: &Path,
     progress: impl Fn(&str) + Sync,
-) -> Result<BuildReport, BuildError> {
+) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
     let mut database = match path.is_file() {
@@ -163,7 +110,7 @@ pub fn build(
     let unaltered = database.all().filter(|c| !database.is_altered(&c.group, &c.name));
     let fingerprints: HashMap<CasePath, &str> =
         unaltered.map(|case| (CasePath::of(case), &*case.fingerprint)).collect();
-    let results: Vec<(String, Result<Option<Case>, RunFailure>)> = study
+    let results: Vec<(String, Result<Option<Case>, Error>)> = study
         .runs()
         .par_iter()
         .zip(located)
@@ -181,9 +128,13 @@ pub fn build(
             .iter()
             .filter_map(|(name, r)| r.as_ref().err().map(|e| format!("  {name}: {e}")))
             .collect();
-        let place = results.iter().find_map(|(_, r)| r.as_ref().err()?.place.as_deref().cloned());
-        let reasons = reasons.join("\n");
-        return Err(BuildError::NoRun { path: manifest.into(), reasons, place });
+        let place = results.iter().find_map(|(_, r)| r.as_ref().err()?.place().cloned());
+        let (path, reasons) = (manifest.display(), reasons.join("\n"));
+        return Err(error!(
+            Study,
+            "{path}: no run of the study can be used; the database is not changed:\n{reasons}"
+        )
+        .showing(place));
     }
     let moved = move_along(&mut database, &study, &previous)?;
     let runs = put(&mut database, &study, &previous, results)?;
@@ -226,10 +177,14 @@ fn case(
     entry: &study::RunEntry,
     located: Result<LocatedRun<'_>, RunError>,
     before: Option<&str>,
-) -> Result<Option<Case>, RunFailure> {
-    let failure = |reason, problems: Vec<String>| {
-        let place = study.place(entry, &reason).map(Box::new);
-        RunFailure { place, reason, problems: problems.into_boxed_slice() }
+) -> Result<Option<Case>, Error> {
+    let failure = |reason: RunError, problems: Vec<String>| {
+        let (place, damage) = (study.place(entry, &reason), listed(&problems));
+        let error = Error::below(ErrorCode::Run, reason).followed_by(&damage);
+        match place {
+            Some(place) => error.placed(|_| place),
+            None => error,
+        }
     };
     let located = located.map_err(|reason| failure(reason, Vec::new()))?;
     if before == Some(&*located.fingerprint) {
@@ -244,7 +199,7 @@ fn move_along(
     database: &mut Database,
     study: &Study,
     previous: &Previous,
-) -> Result<Vec<(CasePath, CasePath)>, DatabaseError> {
+) -> Result<Vec<(CasePath, CasePath)>, Error> {
     database.remove(&previous.left.iter().cloned().collect());
     let places = previous.of_run.values().filter(|(from, to)| from != to).cloned();
     let moves: BTreeMap<CasePath, CasePath> = places.collect();
@@ -267,8 +222,8 @@ fn put(
     database: &mut Database,
     study: &Study,
     previous: &Previous,
-    results: Vec<(String, Result<Option<Case>, RunFailure>)>,
-) -> Result<Vec<BuiltRun>, DatabaseError> {
+    results: Vec<(String, Result<Option<Case>, Error>)>,
+) -> Result<Vec<BuiltRun>, Error> {
     let now = clock::now_utc();
     // What users said of each.
     let said = database.all().map(|c| (CasePath::of(c), (c.tags.clone(), c.user_notes.clone())));

@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         if let Some(error) = &run.error {
             output::say(&format!("error: run {}: {error}", run.name));
             if let RunOutcome::Failed { reason, .. } = &built.outcome {
-                output::say_excerpt(reason.place.as_deref());
+                output::say_excerpt(reason.place());
             }
             outcome = Outcome::Partly;
         }

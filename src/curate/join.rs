@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::names::check;
-use super::{CurateError, Effect, Selection, write};
+use super::{Effect, Selection, write};
 use crate::curve::Case;
 use crate::database::{self, CasePath, Database};
+use crate::error::{Error, error};
 use crate::file::{WriterLock, is_same};
 
 /// What happens to a case whose name another curve has.
@@ -48,18 +49,22 @@ pub(crate) struct Target {
 /// and then comes first, or is not there yet. Equal curves of a group are taken once, with the tags and notes of both.
 ///
 /// # Errors
-/// [`CurateError`] if different curves have one name and nothing says what to do, if a group would
+/// If different curves have one name and nothing says what to do, if a group would
 /// have two kinds of speed or force, or a file cannot be read or written.
 pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,
     on_conflict: OnConflict,
     effect: Effect,
-) -> Result<Joined, CurateError> {
+) -> Result<Joined, Error> {
     let _lock = WriterLock::take(output)?;
     let is_input = inputs.iter().any(|input| is_same(input, output));
     if output.exists() && !is_input {
-        return Err(CurateError::OutputExists { path: output.into() });
+        return Err(error!(
+            Database,
+            "{} is there already: name it among the databases that are joined, or write to another file",
+            output.display()
+        ));
     }
     let there = if is_input { Database::read(output)? } else { Database::default() };
     let mut join = Join::new(there, on_conflict);
@@ -89,7 +94,7 @@ pub(crate) fn copy(
     target: &Target,
     on_conflict: OnConflict,
     effect: Effect,
-) -> Result<Joined, CurateError> {
+) -> Result<Joined, Error> {
     if let Some(group) = &target.group {
         check("group", group)?;
     }
@@ -114,7 +119,11 @@ pub(crate) fn copy(
             new.case.group.clone_from(group);
             new.case.origin = None;
         } else if is_itself {
-            return Err(CurateError::OwnPlace { case: new.from });
+            let case = new.from;
+            return Err(error!(
+                Database,
+                "the copy of {case} would be {case} itself: choose another group (--to-group) or database (--to)"
+            ));
         }
         incoming.push(new);
     }
@@ -159,17 +168,19 @@ impl Join {
         &mut self,
         path: &Path,
         incoming: impl IntoIterator<Item = Incoming>,
-    ) -> Result<(), CurateError> {
+    ) -> Result<(), Error> {
         // What came with the same database is not its double.
         let records: HashMap<(String, String), CasePath> = self
             .database
             .all()
-            .map(|case| Ok(((case.group.clone(), record(case)?), CasePath::of(case))))
-            .collect::<Result<_, CurateError>>()?;
+            .map(|case| {
+                Ok(((case.group.clone(), database::record_hash(case)?), CasePath::of(case)))
+            })
+            .collect::<Result<_, Error>>()?;
         let mut names: HashSet<CasePath> = self.database.all().map(CasePath::of).collect();
         let (mut conflicts, mut doubles, mut new) = (Vec::new(), HashMap::new(), Vec::new());
         for Incoming { mut case, from, altered } in incoming {
-            if let Some(there) = records.get(&(case.group.clone(), record(&case)?)) {
+            if let Some(there) = records.get(&(case.group.clone(), database::record_hash(&case)?)) {
                 self.joined.equal.push((path.into(), from, there.clone()));
                 doubles.insert(there.clone(), (case.tags, case.user_notes));
                 continue;
@@ -190,8 +201,11 @@ impl Join {
             new.push((case, altered));
         }
         if !conflicts.is_empty() {
-            let (path, names) = (path.into(), conflicts.join(", "));
-            return Err(CurateError::Conflict { path, names });
+            let (path, names) = (path.display(), conflicts.join(", "));
+            return Err(error!(
+                Database,
+                "{path}: other curves have these names already: {names}: rename the new ones with --rename, or take their place with --replace"
+            ));
         }
         self.database.change(|case| {
             if let Some((tags, notes)) = doubles.remove(&CasePath::of(case)) {
@@ -203,7 +217,7 @@ impl Join {
     }
 
     /// Whether a case is of the kinds of its group.
-    fn check_kinds(&self, path: &Path, case: &Case) -> Result<(), CurateError> {
+    fn check_kinds(&self, path: &Path, case: &Case) -> Result<(), Error> {
         let replaces =
             |other: &&Case| other.name == case.name && self.on_conflict == OnConflict::Replace;
         let mut there = self.database.cases(&case.group).iter().filter(|c| !replaces(c));
@@ -214,21 +228,15 @@ impl Join {
         ];
         match kinds.into_iter().find(|(_, found, expected)| found != expected) {
             None => Ok(()),
-            Some((what, found, expected)) => Err(CurateError::Kinds {
-                path: path.into(),
-                case: Box::new(CasePath::of(case)),
-                what,
-                found,
-                there: Box::new(CasePath::of(other)),
-                expected,
-            }),
+            Some((what, found, expected)) => {
+                let (path, case, there) = (path.display(), CasePath::of(case), CasePath::of(other));
+                Err(error!(
+                    Database,
+                    "{path}: {case} has a {found} {what}, {there} a {expected} {what}: no model can be trained on both: use another group"
+                ))
+            }
         }
     }
-}
-
-/// Hash over the curves of a case and what they are of.
-fn record(case: &Case) -> Result<String, CurateError> {
-    Ok(database::record_hash(case)?)
 }
 
 /// A name that no case of the group has.

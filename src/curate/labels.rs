@@ -1,9 +1,10 @@
 //! Tags and notes of cases.
 
+use crate::error::{Error, error};
 use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 
-use super::{CurateError, Effect, Selection, write};
+use super::{Effect, Selection, write};
 use crate::curve::Case;
 use crate::database::{CasePath, Database};
 use crate::file::WriterLock;
@@ -29,8 +30,14 @@ pub(crate) struct Labels {
 const MAX_TAG: usize = 100;
 const MAX_NOTE: usize = 10_000;
 
+/// The error of a text that cannot be a tag or note.
+fn refused(what: &str, text: &str, why: &str) -> Error {
+    let text: String = text.chars().take(MAX_TAG).collect();
+    error!(Database, "\"{}\" is no {what}: {why}", text.escape_debug())
+}
+
 impl Labels {
-    fn check(&self) -> Result<(), CurateError> {
+    fn check(&self) -> Result<(), Error> {
         for tag in &self.add_tags {
             let why = if tag.trim().is_empty() || tag.trim() != tag {
                 "it is blank, or has blanks around it"
@@ -41,8 +48,7 @@ impl Labels {
             } else {
                 continue;
             };
-            let text = tag.chars().take(MAX_TAG).collect();
-            return Err(CurateError::Label { what: "tag", text, why });
+            return Err(refused("tag", tag, why));
         }
         for note in &self.add_notes {
             let why = if note.trim().is_empty() {
@@ -54,14 +60,13 @@ impl Labels {
             } else {
                 continue;
             };
-            let text = note.chars().take(MAX_TAG).collect();
-            return Err(CurateError::Label { what: "note", text, why });
+            return Err(refused("note", note, why));
         }
         Ok(())
     }
 
     /// Whether every tag and note that is to be taken away is that of a case.
-    fn check_removed(&self, path: &Path, cases: &[&Case]) -> Result<(), CurateError> {
+    fn check_removed(&self, path: &Path, cases: &[&Case]) -> Result<(), Error> {
         type Texts = fn(&Case) -> &Vec<String>;
         let of_tags: (&'static str, &[String], Texts) = ("tag", &self.remove_tags, |c| &c.tags);
         let of_notes: (&'static str, &[String], Texts) =
@@ -70,13 +75,12 @@ impl Labels {
             let there: BTreeSet<&String> = cases.iter().flat_map(|case| texts(case)).collect();
             if let Some(text) = removed.iter().find(|text| !there.contains(text)) {
                 let known: Vec<String> = there.iter().map(|text| format!("\"{text}\"")).collect();
-                return Err(CurateError::NoLabel {
-                    path: path.into(),
-                    count: cases.len(),
-                    what,
-                    text: text.clone(),
-                    known: if known.is_empty() { "none".into() } else { known.join(", ") },
-                });
+                let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+                let (path, count, text) = (path.display(), cases.len(), text.escape_debug());
+                return Err(error!(
+                    Database,
+                    "{path}: none of the {count} chosen cases has the {what} \"{text}\": they have {known}"
+                ));
             }
         }
         Ok(())
@@ -100,13 +104,13 @@ impl Labels {
 /// now. Where nothing changes the file is not written.
 ///
 /// # Errors
-/// [`CurateError`] if nothing is chosen, a text is no tag or note, or one that is to be taken away
+/// If nothing is chosen, a text is no tag or note, or one that is to be taken away
 /// is not there.
 pub(crate) fn label(
     path: &Path,
     selection: &Selection,
     labels: &Labels,
-) -> Result<Vec<Case>, CurateError> {
+) -> Result<Vec<Case>, Error> {
     labels.check()?;
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read(path)?;

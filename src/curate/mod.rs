@@ -6,19 +6,18 @@
 //! is told.
 
 mod compare;
-mod error;
 mod join;
 mod labels;
 mod names;
 mod selection;
 mod tables;
 
+use crate::error::Error;
 use std::path::Path;
 
 use crate::database::Database;
 pub(crate) use compare::Difference;
 pub(crate) use compare::compare;
-pub(crate) use error::CurateError;
 pub(crate) use join::Joined;
 pub(crate) use join::OnConflict;
 pub(crate) use join::Target;
@@ -44,7 +43,7 @@ pub(crate) enum Effect {
 }
 
 /// Writes a database, unless it is only to be said.
-fn write(database: &Database, path: &Path, effect: Effect) -> Result<(), CurateError> {
+fn write(database: &Database, path: &Path, effect: Effect) -> Result<(), Error> {
     match effect {
         Effect::Written => Ok(database.write(path)?),
         Effect::OnlySaid => Ok(()),

@@ -1,9 +1,10 @@
 //! Removing cases, and giving cases and groups other names.
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{CurateError, Effect, Selection, write};
+use super::{Effect, Selection, write};
 use crate::curve::Case;
 use crate::database::{CasePath, Database, names};
 use crate::file::WriterLock;
@@ -11,12 +12,12 @@ use crate::file::WriterLock;
 /// Removes the chosen cases from the database at `path`; returns them.
 ///
 /// # Errors
-/// [`CurateError`] if nothing is chosen, or the database cannot be written.
+/// If nothing is chosen, or the database cannot be written.
 pub(crate) fn remove(
     path: &Path,
     selection: &Selection,
     effect: Effect,
-) -> Result<Vec<Case>, CurateError> {
+) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read(path)?;
     let chosen: Vec<Case> = selection.find(path, &database)?.into_iter().cloned().collect();
@@ -28,13 +29,13 @@ pub(crate) fn remove(
 /// Gives the one chosen case another name in its group; returns both.
 ///
 /// # Errors
-/// [`CurateError`] if not just one is chosen, or the name is none or another case's.
+/// If not just one is chosen, or the name is none or another case's.
 pub(crate) fn rename_case(
     path: &Path,
     group: Option<&str>,
     case: &str,
     name: &str,
-) -> Result<(CasePath, CasePath), CurateError> {
+) -> Result<(CasePath, CasePath), Error> {
     check("case", name)?;
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read(path)?;
@@ -52,12 +53,8 @@ pub(crate) fn rename_case(
 /// Gives a group another name; returns its cases as they are called now.
 ///
 /// # Errors
-/// [`CurateError`] if there is no such group, or the name is none or another group's.
-pub(crate) fn rename_group(
-    path: &Path,
-    group: &str,
-    name: &str,
-) -> Result<Vec<CasePath>, CurateError> {
+/// If there is no such group, or the name is none or another group's.
+pub(crate) fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<CasePath>, Error> {
     check("group", name)?;
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read(path)?;
@@ -66,7 +63,11 @@ pub(crate) fn rename_group(
         return Ok(cases);
     }
     if !database.cases(name).is_empty() {
-        return Err(CurateError::GroupTaken { path: path.into(), group: name.into() });
+        return Err(error!(
+            Database,
+            "{}: there is a group \"{name}\" already: choose another name, or join them with crumple db copy --to-group",
+            path.display()
+        ));
     }
     let moved = |case: &CasePath| CasePath { group: name.into(), name: case.name.clone() };
     let moves: BTreeMap<CasePath, CasePath> =
@@ -77,6 +78,9 @@ pub(crate) fn rename_group(
 }
 
 /// Whether a group or case may have this name.
-pub(super) fn check(what: &'static str, name: &str) -> Result<(), CurateError> {
-    names::check(name).map_err(|why| CurateError::Name { what, name: names::shown(name), why })
+pub(super) fn check(what: &'static str, name: &str) -> Result<(), Error> {
+    names::check(name).map_err(|why| {
+        let name = names::shown(name);
+        error!(Database, "\"{}\" is no name of a {what}: {why}", name.escape_debug())
+    })
 }

@@ -1,14 +1,14 @@
 //! Choosing cases of a database: by group, name, speed and tag.
 
+use crate::error::{Error, error};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::CurateError;
 use crate::curve::Case;
 use crate::database::{CasePath, Database};
 use crate::dataset::is_same_speed;
-use crate::unit::{SPEED, UnitError, km_per_h};
+use crate::unit::{SPEED, km_per_h};
 
 /// Which cases; every part that is given narrows the choice, and each value of a part widens it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,31 +32,11 @@ pub(crate) struct SpeedRange {
     pub high_m_per_s: f64,
 }
 
-/// Why a text is no range of speeds.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(crate) enum SpeedRangeError {
-    /// One of its ends is no speed.
-    #[error(transparent)]
-    Unit(#[from] UnitError),
-    /// It has no end.
-    #[error("\"{text}\" is no range of speeds: write 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h")]
-    NoEnd {
-        /// As given.
-        text: String,
-    },
-    /// It ends below its beginning.
-    #[error("\"{text}\" ends below its beginning: write the lower speed first")]
-    Order {
-        /// As given.
-        text: String,
-    },
-}
-
 impl FromStr for SpeedRange {
-    type Err = SpeedRangeError;
+    type Err = Error;
 
     /// Reads `20km/h..40km/h`, an end of which may be left out, or one speed.
-    fn from_str(text: &str) -> Result<Self, SpeedRangeError> {
+    fn from_str(text: &str) -> Result<Self, Error> {
         let Some((low, high)) = text.split_once("..") else {
             let speed = SPEED.parse_positive(text)?;
             return Ok(Self { low_m_per_s: speed, high_m_per_s: speed });
@@ -66,12 +46,18 @@ impl FromStr for SpeedRange {
             end => SPEED.parse_not_negative(end),
         };
         if low.trim().is_empty() && high.trim().is_empty() {
-            return Err(SpeedRangeError::NoEnd { text: text.into() });
+            return Err(error!(
+                Usage,
+                "\"{text}\" is not a range of speeds: write 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h"
+            ));
         }
         let (low_m_per_s, high_m_per_s) = (end(low, 0.0)?, end(high, f64::INFINITY)?);
         match low_m_per_s <= high_m_per_s {
             true => Ok(Self { low_m_per_s, high_m_per_s }),
-            false => Err(SpeedRangeError::Order { text: text.into() }),
+            false => Err(error!(
+                Usage,
+                "\"{text}\" ends below its beginning: write the lower speed first"
+            )),
         }
     }
 }
@@ -109,13 +95,13 @@ impl Selection {
     /// The chosen cases, by group, speed and name; `path` is for messages.
     ///
     /// # Errors
-    /// [`CurateError`] for a group or name that is not there or is in several groups, and if
+    /// For a group or name that is not there or is in several groups, and if
     /// nothing is chosen; it lists what there is.
     pub(crate) fn find<'a>(
         &self,
         path: &Path,
         database: &'a Database,
-    ) -> Result<Vec<&'a Case>, CurateError> {
+    ) -> Result<Vec<&'a Case>, Error> {
         for group in &self.groups {
             database.group(path, group)?;
         }
@@ -133,14 +119,11 @@ impl Selection {
                 && (self.tags.is_empty() || self.tags.iter().any(|tag| case.tags.contains(tag)))
         };
         let chosen: Vec<&Case> = of_groups.iter().copied().filter(is_chosen).collect();
-        match chosen.is_empty() {
-            false => Ok(chosen),
-            true => Err(CurateError::NoMatch {
-                path: path.into(),
-                asked: self.asked(),
-                known: listed(&of_groups),
-            }),
+        if chosen.is_empty() {
+            let (path, asked, known) = (path.display(), self.asked(), listed(&of_groups));
+            return Err(error!(Database, "{path}: no case {asked}: there are {known}"));
         }
+        Ok(chosen)
     }
 
     /// What is asked of a case, in words that follow "no case".
@@ -164,7 +147,7 @@ impl Selection {
 }
 
 /// The case of this name, or of this group and name.
-fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case, CurateError> {
+fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case, Error> {
     let is_named = |case: &&&Case| match name.split_once('/') {
         Some((group, name)) => case.group == group && case.name == name,
         None => case.name == name,
@@ -173,17 +156,17 @@ fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case
     match found[..] {
         [case] => Ok(case),
         [] => {
-            Err(CurateError::NoCase { path: path.into(), name: name.into(), known: listed(cases) })
+            let (path, known) = (path.display(), listed(cases));
+            Err(error!(Database, "{path}: there is no case \"{name}\": there are {known}"))
         }
-        _ => Err(CurateError::WhichCase {
-            path: path.into(),
-            name: name.into(),
-            known: found
-                .iter()
-                .map(|c| CasePath::of(c).to_string())
-                .collect::<Vec<_>>()
-                .join(" or "),
-        }),
+        _ => {
+            let known: Vec<String> = found.iter().map(|c| CasePath::of(c).to_string()).collect();
+            let (path, known) = (path.display(), known.join(" or "));
+            Err(error!(
+                Database,
+                "{path}: several groups have a case \"{name}\": choose one with --group, or write {known}"
+            ))
+        }
     }
 }
 

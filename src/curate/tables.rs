@@ -6,7 +6,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::CurateError;
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Parameter};
 use crate::file::{not_written, write_at};
@@ -30,7 +29,7 @@ pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,
     tables: Tables,
-) -> Result<Vec<PathBuf>, CurateError> {
+) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(path).map_err(|e| not_written(path, e))?;
     let mut written = Vec::new();
     let mut table = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {

@@ -1,13 +1,14 @@
 //! Checking a database file: every dataset is read, and what is stored twice or follows from
 //! the curves is held against each other.
 
+use crate::error::Error;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
-use super::{DatabaseError, group, listed};
+use super::{group, listed};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
 use crate::hdf5::{AttrValue, Group};
@@ -45,8 +46,8 @@ pub(crate) struct Checked {
 /// Checks the database file at `path`; damage of a case is a finding.
 ///
 /// # Errors
-/// [`DatabaseError`] if it cannot be opened, or its groups not be listed.
-pub(crate) fn check(path: &Path) -> Result<Checked, DatabaseError> {
+/// If it cannot be opened, or its groups not be listed.
+pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
     // Each has its own bound of bytes, and every dataset is read twice.
     let (raw, decoded) = (layout::open(path)?, layout::open(path)?);
     let mut checked = Checked::default();
@@ -66,13 +67,14 @@ pub(crate) fn check(path: &Path) -> Result<Checked, DatabaseError> {
                 }
                 // Its datasets have said so already, with their indices.
                 Err(_) if findings.has_damage() => {}
-                Err(DatabaseError::Damaged { place, detail, .. }) => {
-                    let own = format!("{}/{name}", group.name);
-                    let within = place.strip_prefix(&own).unwrap_or(&place).trim_matches('/');
-                    let colon = if within.is_empty() { "" } else { ": " };
-                    findings.add("damaged", None, None, format!("{within}{colon}{detail}"));
+                Err(error) => {
+                    let own = format!("{}: {}/{name}", path.display(), group.name);
+                    let Some(within) = error.message().strip_prefix(&own) else {
+                        return Err(error);
+                    };
+                    let within = within.trim_start_matches(['/', ':', ' ']);
+                    findings.add("damaged", None, None, within.into());
                 }
-                Err(error) => return Err(error),
             }
         }
         super::sort(&mut readable);
@@ -189,7 +191,7 @@ impl Findings<'_> {
     }
 
     /// Holds what is stored against what follows from the curves.
-    fn case(&mut self, found: &FoundCase) -> Result<(), DatabaseError> {
+    fn case(&mut self, found: &FoundCase) -> Result<(), Error> {
         let FoundCase { case, attributes, hashes } = found;
         let content = Content::of(case)?;
         if hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES) {
@@ -401,7 +403,7 @@ fn of_stopped_mass(
     name: &str,
     cases: &[Case],
     list: &mut Vec<Finding>,
-) -> Result<(), DatabaseError> {
+) -> Result<(), Error> {
     let (Some(first), attributes) = (cases.first(), opened.group_attributes(name)?) else {
         return Ok(());
     };

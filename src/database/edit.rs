@@ -2,6 +2,7 @@
 //! edited and, after it was read back and nothing of theirs is missing, renamed into place. So
 //! their links, types and attributes stay as they were encoded.
 
+use crate::error::{Error, error};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::path::Path;
@@ -9,7 +10,7 @@ use std::path::Path;
 use super::foreign::{self, Item, is_of_dimensions, listed};
 use super::group::{self, GROUP_ATTRIBUTES};
 use super::layout::{self, CASE_ATTRIBUTES, Columns, Content, ORIGINAL, VERSION};
-use super::{CasePath, Database, DatabaseError};
+use super::{CasePath, Database};
 use crate::curve::Case;
 use crate::file::{self, write_by_path};
 use crate::hdf5::dimensions::{DimensionError, Dimensions};
@@ -20,19 +21,25 @@ use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Grou
 /// its place.
 ///
 /// # Errors
-/// [`DatabaseError::WouldDrop`] if something would be lost; the file is then unchanged.
+/// If something would be lost; the file is then unchanged.
 pub(super) fn write_keeping(
     database: &Database,
     path: &Path,
     before: &BTreeSet<Item>,
-) -> Result<(), DatabaseError> {
+) -> Result<(), Error> {
     let is_current = layout::open(path)?.version == VERSION;
     let mut old = layout::decode(path)?;
     let moves = Moves::of(&old, database, before);
     let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
-    let would_drop = |what: String| DatabaseError::WouldDrop { path: path.into(), what };
+    let would_drop = |what: String| {
+        error!(
+            Database,
+            "{} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database",
+            path.display()
+        )
+    };
     write_by_path(path, |draft| {
-        fs::copy(path, draft).map_err(|source| DatabaseError::Io { path: path.into(), source })?;
+        fs::copy(path, draft).map_err(|source| Error::io(path, source))?;
         let edited = moves.make(draft, &old, database).and_then(|()| {
             old.remove(&moves.gone);
             old.relocate(&moves.all)?;
@@ -59,7 +66,7 @@ pub(super) fn write_keeping(
 enum EditError {
     Hdf5(hdf5::Error),
     Dimensions(DimensionError),
-    Content(DatabaseError),
+    Content(Error),
 }
 
 impl From<hdf5::Error> for EditError {
@@ -68,8 +75,8 @@ impl From<hdf5::Error> for EditError {
     }
 }
 
-impl From<DatabaseError> for EditError {
-    fn from(error: DatabaseError) -> Self {
+impl From<Error> for EditError {
+    fn from(error: Error) -> Self {
         Self::Content(error)
     }
 }
@@ -210,7 +217,7 @@ impl Edit<'_> {
         drop(root);
         file.commit()?;
         file.close()?;
-        let io = |source| DatabaseError::Io { path: path.into(), source };
+        let io = |source| Error::io(path, source);
         let mut bytes = file::read(path, u64::MAX - 1).map_err(io)?;
         dimensions.finish(&mut bytes).map_err(EditError::Dimensions)?;
         Ok(fs::write(path, bytes).map_err(io)?)

@@ -1,11 +1,12 @@
 //! What others have put into a database file.
 
+use crate::error::Error;
 use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
+use super::CasePath;
 use super::group::GROUP_ATTRIBUTES;
 use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, FoundGroup, ORIGINAL, Opened, ROOT};
-use super::{CasePath, DatabaseError};
 use crate::hdf5::{self, Dataset, Group, dimensions};
 
 /// Something of others: what it is, and its path in the file.
@@ -51,12 +52,8 @@ pub(super) fn listed(items: &BTreeSet<Item>) -> String {
 }
 
 /// Attributes, datasets, groups and types of a file that are not the layout's.
-pub(super) fn found(opened: &Opened<'_>) -> Result<BTreeSet<Item>, DatabaseError> {
-    let damaged = |e: hdf5::Error| DatabaseError::Damaged {
-        path: opened.path.into(),
-        place: "/".into(),
-        detail: e.to_string(),
-    };
+pub(super) fn found(opened: &Opened<'_>) -> Result<BTreeSet<Item>, Error> {
+    let damaged = |e: hdf5::Error| super::damaged(opened.path, "/", e);
     let ours = opened.groups()?;
     let mut foreign = Foreign(BTreeSet::new());
     let mut walk = || -> Result<(), hdf5::Error> {

@@ -1,12 +1,14 @@
 //! Layout of the database file: `/group/case` with attributes and datasets.
 
+use crate::error::{Error, error};
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt::Display;
 use std::path::Path;
 
 use super::group::{self, CASES};
-use super::{CasePath, Database, DatabaseError, damaged_curve};
+use super::{CasePath, Database, damaged_curve};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
 use crate::file;
@@ -76,7 +78,7 @@ pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
 ];
 
 impl<'a> Content<'a> {
-    pub(crate) fn of(case: &'a Case) -> Result<Self, DatabaseError> {
+    pub(crate) fn of(case: &'a Case) -> Result<Self, Error> {
         let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
         content.describe(case)?;
         content.curve("", &case.sampled);
@@ -86,10 +88,10 @@ impl<'a> Content<'a> {
         Ok(content)
     }
 
-    fn describe(&mut self, case: &Case) -> Result<(), DatabaseError> {
+    fn describe(&mut self, case: &Case) -> Result<(), Error> {
         let text = |s: &str| AttrValue::VarLenString(s.into());
         let json = |value: Result<String, serde_json::Error>| {
-            let value = value.map_err(|e| DatabaseError::Encode { detail: e.to_string() });
+            let value = value.map_err(not_encoded);
             value.map(AttrValue::VarLenString)
         };
         self.attr("study", text(&case.study));
@@ -204,15 +206,12 @@ pub(crate) fn hash_of(values: &[f64]) -> String {
 
 /// The attributes of a case as they are written, its hashes among them: those it was read with
 /// if they are not its own, so that damage is not made good by writing it again.
-pub(crate) fn with_hashes<'a>(
-    database: &Database,
-    case: &'a Case,
-) -> Result<Content<'a>, DatabaseError> {
+pub(crate) fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Content<'a>, Error> {
     let mut content = Content::of(case)?;
     let altered = database.altered.get(&CasePath::of(case));
     let hashes = altered.cloned().unwrap_or_else(|| content.hashes());
     let hashes = serde_json::to_string(&hashes);
-    let hashes = hashes.map_err(|e| DatabaseError::Encode { detail: e.to_string() })?;
+    let hashes = hashes.map_err(not_encoded)?;
     content.attr("hashes", AttrValue::VarLenString(hashes));
     Ok(content)
 }
@@ -267,14 +266,14 @@ impl Columns<'_> {
     }
 }
 
-impl From<DimensionError> for DatabaseError {
+impl From<DimensionError> for Error {
     fn from(error: DimensionError) -> Self {
-        Self::Encode { detail: error.to_string() }
+        not_encoded(error)
     }
 }
 
 /// Encodes a database as the bytes of an HDF5 file.
-pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
+pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
     let mut file = FileBuilder::new();
     let mut dimensions = Dimensions::default();
     for (name, value) in root_attributes() {
@@ -306,7 +305,7 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, DatabaseError> {
         file.add_group(group.finish());
     }
     let encoded = file.finish();
-    let mut bytes = encoded.map_err(|e| DatabaseError::Encode { detail: e.to_string() })?;
+    let mut bytes = encoded.map_err(not_encoded)?;
     dimensions.finish(&mut bytes)?;
     Ok(bytes)
 }
@@ -326,14 +325,22 @@ pub(crate) struct Opened<'a> {
 const DECLARED_BYTES: u64 = 64 << 20;
 const DECLARED_PER_BYTE: u64 = 32;
 
+fn not_encoded(detail: impl Display) -> Error {
+    error!(Database, "cannot encode the database: {detail}")
+}
+
+fn not_hdf5(path: &Path, detail: impl Display) -> Error {
+    error!(Database, "{}: {detail}: give a database made by crumple build", path.display())
+}
+
 /// Opens a database file; values are not read yet.
 ///
 /// # Errors
-/// [`DatabaseError`] if it is no file, not HDF5, not a curve database, or of another layout.
-pub(crate) fn open(path: &Path) -> Result<Opened<'_>, DatabaseError> {
+/// If it is no file, not HDF5, not a curve database, or of another layout.
+pub(crate) fn open(path: &Path) -> Result<Opened<'_>, Error> {
     let file = hdf5::open(path).map_err(|e| match e {
-        OpenError::Io(source) => DatabaseError::Io { path: path.into(), source },
-        other => DatabaseError::NotHdf5 { path: path.into(), detail: other.to_string() },
+        OpenError::Io(source) => Error::io(path, source),
+        other => not_hdf5(path, other),
     })?;
     Opened::of(path, file)
 }
@@ -358,32 +365,39 @@ pub(crate) struct FoundCase {
 
 impl<'a> Opened<'a> {
     /// The database in an open file; `path` is for messages.
-    pub(crate) fn of(path: &'a Path, file: File) -> Result<Self, DatabaseError> {
-        let attrs = file.root().attrs().map_err(|e| DatabaseError::NotHdf5 {
-            path: path.into(),
-            detail: format!("this is no HDF5 file ({e})"),
-        })?;
+    pub(crate) fn of(path: &'a Path, file: File) -> Result<Self, Error> {
+        let attrs = file.root().attrs();
+        let attrs =
+            attrs.map_err(|e| not_hdf5(path, format_args!("this is no HDF5 file ({e})")))?;
         if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
-            return Err(DatabaseError::NotOurs { path: path.into() });
+            return Err(error!(
+                Database,
+                "{}: this HDF5 file is no curve database (its root has no attribute format = \"{FORMAT}\"): give one made by crumple build",
+                path.display()
+            ));
         }
         let found = attrs.get("layout_version").and_then(AttrValue::as_i64).unwrap_or(0);
         if !(OLDEST..=VERSION).contains(&found) {
-            return Err(DatabaseError::Version { path: path.into(), found });
+            return Err(error!(
+                Database,
+                "{}: its layout has version {found}, this program reads versions {OLDEST} to {VERSION}: build the database anew with crumple build",
+                path.display()
+            ));
         }
         let left = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(file.file_size());
         Ok(Self { path, file, version: found, left: Cell::new(left) })
     }
 
-    fn damaged(&self, place: &str, detail: String) -> DatabaseError {
-        DatabaseError::Damaged { path: self.path.into(), place: place.into(), detail }
+    fn damaged(&self, place: &str, detail: impl Display) -> Error {
+        super::damaged(self.path, place, detail)
     }
 
-    fn check<T>(&self, place: &str, result: Result<T, hdf5::Error>) -> Result<T, DatabaseError> {
-        result.map_err(|e| self.damaged(place, e.to_string()))
+    fn check<T>(&self, place: &str, result: Result<T, hdf5::Error>) -> Result<T, Error> {
+        result.map_err(|e| self.damaged(place, e))
     }
 
     /// Groups that hold cases, with these. What other programs put beside them is no group of ours.
-    pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, DatabaseError> {
+    pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, Error> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
             let listed = self.listed(&name, &group)?;
@@ -402,23 +416,20 @@ impl<'a> Opened<'a> {
     }
 
     /// Whether this version of the program has written the file.
-    pub(crate) fn is_of_this_program(&self) -> Result<bool, DatabaseError> {
+    pub(crate) fn is_of_this_program(&self) -> Result<bool, Error> {
         let attributes = self.check("/", self.file.root().attrs())?;
         let written_by = attributes.get("written_by").and_then(AttrValue::as_str);
         Ok(written_by == Some(WRITTEN_BY))
     }
 
     /// The attributes of a group.
-    pub(crate) fn group_attributes(
-        &self,
-        name: &str,
-    ) -> Result<HashMap<String, AttrValue>, DatabaseError> {
+    pub(crate) fn group_attributes(&self, name: &str) -> Result<HashMap<String, AttrValue>, Error> {
         let group = self.check(name, self.file.root().group(name))?;
         self.check(name, group.attrs())
     }
 
     /// The names that a group's attribute `cases` lists.
-    fn listed(&self, name: &str, group: &Group) -> Result<Option<Vec<String>>, DatabaseError> {
+    fn listed(&self, name: &str, group: &Group) -> Result<Option<Vec<String>>, Error> {
         let attributes = self.check(name, group.attrs())?;
         Ok(attributes
             .get(CASES)
@@ -427,7 +438,7 @@ impl<'a> Opened<'a> {
     }
 
     /// Whether a group has what every case has; one of it is enough, so that damage shows.
-    fn is_case(&self, group: &str, case: &str, found: &Group) -> Result<bool, DatabaseError> {
+    fn is_case(&self, group: &str, case: &str, found: &Group) -> Result<bool, Error> {
         let attributes = self.check(&format!("{group}/{case}"), found.attr_datatypes())?;
         Ok(["study", "speed_m_per_s", "fingerprint"].iter().any(|n| attributes.contains_key(*n)))
     }
@@ -452,10 +463,7 @@ impl<'a> Opened<'a> {
     /// The values of one dataset of a case; why not, in words.
     pub(crate) fn values(&self, case: &Group, path: &str) -> Result<Vec<f64>, String> {
         let place = Location { opened: self, name: String::new() };
-        numbers(case, path, &place).map_err(|e| match e {
-            DatabaseError::Damaged { detail, .. } => detail,
-            other => other.to_string(),
-        })
+        numbers(case, path, &place)
     }
 
     /// The hashes that are stored with a case, if they are there and can be read.
@@ -474,24 +482,19 @@ impl<'a> Opened<'a> {
     }
 
     /// Reads one case from its group.
-    pub(crate) fn case(
-        &self,
-        group: &str,
-        name: &str,
-        case: &Group,
-    ) -> Result<FoundCase, DatabaseError> {
+    pub(crate) fn case(&self, group: &str, name: &str, case: &Group) -> Result<FoundCase, Error> {
         let place = Location { opened: self, name: format!("{group}/{name}") };
         decode_case(group, name, case, &place)
     }
 }
 
 /// Reads all cases of the file at `path`.
-pub(crate) fn decode(path: &Path) -> Result<Database, DatabaseError> {
+pub(crate) fn decode(path: &Path) -> Result<Database, Error> {
     let opened = open(path)?;
     decode_opened(&opened)
 }
 
-fn decode_opened(opened: &Opened<'_>) -> Result<Database, DatabaseError> {
+fn decode_opened(opened: &Opened<'_>) -> Result<Database, Error> {
     let mut database = Database::default();
     for group in opened.groups()? {
         let mut cases = Vec::with_capacity(group.cases.len());
@@ -517,11 +520,11 @@ struct Location<'a> {
 }
 
 impl Location<'_> {
-    fn damaged(&self, detail: impl Into<String>) -> DatabaseError {
-        self.opened.damaged(&self.name, detail.into())
+    fn damaged(&self, detail: impl Display) -> Error {
+        self.opened.damaged(&self.name, detail)
     }
 
-    fn check<T>(&self, result: Result<T, hdf5::Error>) -> Result<T, DatabaseError> {
+    fn check<T>(&self, result: Result<T, hdf5::Error>) -> Result<T, Error> {
         self.opened.check(&self.name, result)
     }
 }
@@ -533,12 +536,12 @@ struct Attrs<'a> {
 }
 
 impl Attrs<'_> {
-    fn number(&self, name: &str) -> Result<f64, DatabaseError> {
+    fn number(&self, name: &str) -> Result<f64, Error> {
         self.optional_number(name)?
             .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or no number")))
     }
 
-    fn optional_number(&self, name: &str) -> Result<Option<f64>, DatabaseError> {
+    fn optional_number(&self, name: &str) -> Result<Option<f64>, Error> {
         let value = self.map.get(name).and_then(AttrValue::as_f64);
         if value.is_some_and(|v| !v.is_finite()) {
             return Err(self.place.damaged(format!("attribute {name} is not finite")));
@@ -546,7 +549,7 @@ impl Attrs<'_> {
         Ok(value)
     }
 
-    fn positive(&self, name: &str) -> Result<f64, DatabaseError> {
+    fn positive(&self, name: &str) -> Result<f64, Error> {
         let value = self.number(name)?;
         if value > 0.0 {
             Ok(value)
@@ -555,24 +558,24 @@ impl Attrs<'_> {
         }
     }
 
-    fn text(&self, name: &str) -> Result<&str, DatabaseError> {
+    fn text(&self, name: &str) -> Result<&str, Error> {
         self.map
             .get(name)
             .and_then(AttrValue::as_str)
             .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or no text")))
     }
 
-    fn kind<T>(&self, name: &str, parse: fn(&str) -> Option<T>) -> Result<T, DatabaseError> {
+    fn kind<T>(&self, name: &str, parse: fn(&str) -> Option<T>) -> Result<T, Error> {
         let text = self.text(name)?;
         parse(text).ok_or_else(|| self.place.damaged(format!("{name} \"{text}\" is not known")))
     }
 
-    fn json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<T, DatabaseError> {
+    fn json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<T, Error> {
         serde_json::from_str(self.text(name)?)
             .map_err(|e| self.place.damaged(format!("attribute {name}: {e}")))
     }
 
-    fn optional_json<T>(&self, name: &str) -> Result<Option<T>, DatabaseError>
+    fn optional_json<T>(&self, name: &str) -> Result<Option<T>, Error>
     where
         T: serde::de::DeserializeOwned,
     {
@@ -585,7 +588,7 @@ fn decode_case(
     name: &str,
     group: &Group,
     place: &Location<'_>,
-) -> Result<FoundCase, DatabaseError> {
+) -> Result<FoundCase, Error> {
     let attrs = Attrs { map: place.check(group.attrs())?, place };
     let kind = attrs.kind("speed_kind", SpeedKind::parse)?;
     let force_kind = attrs.kind("force_kind", ForceKind::parse)?;
@@ -637,12 +640,8 @@ fn decode_case(
 }
 
 /// The closing speeds of a case, in m/s: a finite one for each of `times` times.
-fn closing_speeds(
-    group: &Group,
-    times: usize,
-    place: &Location<'_>,
-) -> Result<Vec<f64>, DatabaseError> {
-    let speeds = numbers(group, "closing_speed_m_per_s", place)?;
+fn closing_speeds(group: &Group, times: usize, place: &Location<'_>) -> Result<Vec<f64>, Error> {
+    let speeds = numbers(group, "closing_speed_m_per_s", place).map_err(|e| place.damaged(e))?;
     if speeds.len() != times {
         return Err(place.damaged(format!(
             "closing_speed_m_per_s and time_s differ in length: {} and {times}",
@@ -657,30 +656,31 @@ fn closing_speeds(
     }
 }
 
-fn decode_curve(group: &Group, place: &Location<'_>) -> Result<Curve, DatabaseError> {
-    let time = numbers(group, "time_s", place)?;
-    let deflection = numbers(group, "deflection_m", place)?;
-    let force = numbers(group, "force_N", place)?;
+fn decode_curve(group: &Group, place: &Location<'_>) -> Result<Curve, Error> {
+    let numbers = |name| numbers(group, name, place).map_err(|e| place.damaged(e));
+    let (time, deflection, force) =
+        (numbers("time_s")?, numbers("deflection_m")?, numbers("force_N")?);
     Curve::new(time, deflection, force)
         .map_err(|e| damaged_curve(place.opened.path, &place.name, e))
 }
 
-fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, DatabaseError> {
-    let failed = |e: hdf5::Error| place.damaged(format!("{name}: {e}"));
+/// The values of a dataset; why not, in words.
+fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, String> {
+    let failed = |e: hdf5::Error| format!("{name}: {e}");
     let dataset = group.dataset(name).map_err(failed)?;
     let bytes = declared_bytes(&dataset).map_err(failed)?;
     let left = &place.opened.left;
     let Some(rest) = left.get().checked_sub(bytes) else {
-        return Err(place.damaged(format!(
+        return Err(format!(
             "{name}: it declares {} values, more than a file of this size holds: the file is damaged, or was not made by crumple build",
             bytes / 8
-        )));
+        ));
     };
     left.set(rest);
     // A reader that finds no memory ends the process; here it is only asked for.
     let mut memory: Vec<u8> = Vec::new();
     if memory.try_reserve_exact(bytes.saturating_mul(2) as usize).is_err() {
-        return Err(place.damaged(format!("{name}: {}", file::out_of_memory(bytes))));
+        return Err(format!("{name}: {}", file::out_of_memory(bytes)));
     }
     drop(memory);
     dataset.read_f64().map_err(failed)

@@ -29,16 +29,14 @@ mod group;
 mod layout;
 pub(crate) mod names;
 
-use crate::error::Error;
+use crate::error::{Error, error};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CurveError, Origin, StoppedMass};
 use crate::file::write_whole;
-use crate::guess;
 
 /// The cases of one database file.
 ///
@@ -74,136 +72,13 @@ impl fmt::Display for CasePath {
     }
 }
 
-/// Why a database cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum DatabaseError {
-    /// It cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// It is no HDF5 file.
-    #[error("{path}: {detail}: give a database made by crumple build")]
-    NotHdf5 {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, in words.
-        detail: String,
-    },
-    /// It is an HDF5 file of something else.
-    #[error("{path}: this HDF5 file is no curve database (its root has no attribute format = \"{expected}\"): give one made by crumple build", expected = layout::FORMAT)]
-    NotOurs {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It has another layout.
-    #[error(
-        "{path}: its layout has version {found}, this program reads versions {} to {}: build the database anew with crumple build",
-        layout::OLDEST,
-        layout::VERSION
-    )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The version that was found.
-        found: i64,
-    },
-    /// What it holds is not what it should.
-    #[error("{path}: {place}: {detail}")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Group, case and dataset.
-        place: String,
-        /// What is wrong, in the words of the library.
-        detail: String,
-    },
-    /// There is no such group.
-    #[error("{path}: there is no group \"{group}\": it has {known}{}", guess::hint(group, known))]
-    NoGroup {
-        /// The file.
-        path: PathBuf,
-        /// The group.
-        group: String,
-        /// What there is instead.
-        known: String,
-    },
-    /// There is no such case.
-    #[error(
-        "{path}: group \"{group}\" has no case \"{case}\": it has {known}{}",
-        guess::hint(case, known)
-    )]
-    NoCase {
-        /// The file.
-        path: PathBuf,
-        /// The group.
-        group: String,
-        /// The case.
-        case: String,
-        /// What there is instead.
-        known: String,
-    },
-    /// The name is taken by another study.
-    /// Writing would lose what others have put into it.
-    #[error(
-        "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this run or group differently, or remove that case (crumple db rm)"
-    )]
-    OtherStudy {
-        /// The group.
-        group: String,
-        /// Name of the case.
-        name: String,
-        /// The study that has the name.
-        other: String,
-    },
-    /// The name that a case is to have is another's.
-    #[error("group \"{group}\" has a case \"{name}\" already: choose another name", group = .0.group, name = .0.name)]
-    Taken(CasePath),
-    /// A group has to be named.
-    #[error("{path} has several groups: choose one with --group: {known}")]
-    WhichGroup {
-        /// The file.
-        path: PathBuf,
-        /// What there is instead.
-        known: String,
-    },
-    /// There is nothing in it.
-    #[error("{path} has no groups: build a study into it")]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Something of another program would be lost by writing.
-    #[error(
-        "{path} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database"
-    )]
-    WouldDrop {
-        /// The file.
-        path: PathBuf,
-        /// What would be lost, by its name in the file.
-        what: String,
-    },
-    /// HDF5 cannot hold it.
-    #[error("cannot encode the database: {detail}")]
-    Encode {
-        /// What is wrong, in the words of the library.
-        detail: String,
-    },
-    /// A room below says why.
-    #[error(transparent)]
-    Below(#[from] Error),
-}
-
 impl Database {
     /// Reads a database file.
     ///
     /// # Errors
-    /// [`DatabaseError`] if the file is missing, not HDF5, not a curve database, of
+    /// If the file is missing, not HDF5, not a curve database, of
     /// another layout, or damaged; it names the case and dataset.
-    pub fn read(path: &Path) -> Result<Self, DatabaseError> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         layout::decode(path)
     }
 
@@ -211,9 +86,9 @@ impl Database {
     /// is.
     ///
     /// # Errors
-    /// [`DatabaseError`] as of [`Database::read`] and [`Database::group_or_only`], and if the
+    /// As of [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
-    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, DatabaseError> {
+    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             return Ok(opened.case(&group, case, &found)?.case);
@@ -228,16 +103,16 @@ impl Database {
     /// there, attributes, datasets and groups, stays in it.
     ///
     /// # Errors
-    /// If the target cannot be written, and [`DatabaseError::WouldDrop`] if
+    /// If the target cannot be written, and if
     /// something of others would be lost; the old file is unchanged.
-    pub fn write(&self, path: &Path) -> Result<(), DatabaseError> {
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
         if path.is_file() {
             let foreign = foreign::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);
             }
         }
-        Ok(write_whole(path, &layout::encode(self)?)?)
+        write_whole(path, &layout::encode(self)?)
     }
 
     /// Whether a case is not what it was when it was written: its hashes are of something else.
@@ -248,13 +123,13 @@ impl Database {
     /// The group that was asked for, or the only one there is, with its cases in order of speed.
     ///
     /// # Errors
-    /// [`DatabaseError::NoGroup`] or [`DatabaseError::WhichGroup`] lists the groups there are;
+    /// It lists the groups there are;
     /// `path` is for the message.
     pub fn group_or_only<'a>(
         &'a self,
         path: &Path,
         asked: Option<&str>,
-    ) -> Result<(&'a str, &'a [Case]), DatabaseError> {
+    ) -> Result<(&'a str, &'a [Case]), Error> {
         let mut groups = self.groups.iter();
         let (name, cases) = match (asked, groups.next(), groups.next()) {
             (Some(asked), _, _) => {
@@ -264,10 +139,16 @@ impl Database {
             }
             (None, Some(only), None) => only,
             (None, Some(_), Some(_)) => {
-                let known = listed(self.groups());
-                return Err(DatabaseError::WhichGroup { path: path.into(), known });
+                let (path, known) = (path.display(), listed(self.groups()));
+                return Err(error!(
+                    Database,
+                    "{path} has several groups: choose one with --group: {known}"
+                ));
             }
-            (None, None, _) => return Err(DatabaseError::Empty { path: path.into() }),
+            (None, None, _) => {
+                let path = path.display();
+                return Err(error!(Database, "{path} has no groups: build a study into it"));
+            }
         };
         Ok((name, cases))
     }
@@ -285,34 +166,33 @@ impl Database {
     /// Cases of a group in order of speed.
     ///
     /// # Errors
-    /// [`DatabaseError::NoGroup`] lists the groups there are; `path` is for the message.
-    pub fn group(&self, path: &Path, group: &str) -> Result<&[Case], DatabaseError> {
-        self.groups.get(group).map(Vec::as_slice).ok_or_else(|| DatabaseError::NoGroup {
-            path: path.into(),
-            group: group.into(),
-            known: listed(self.groups()),
+    /// It lists the groups there are; `path` is for the message.
+    pub fn group(&self, path: &Path, group: &str) -> Result<&[Case], Error> {
+        self.groups.get(group).map(Vec::as_slice).ok_or_else(|| {
+            let path = path.display();
+            error!(Database at "case", "{path}: there is no group \"{group}\": it has")
+                .names(group, self.groups())
         })
     }
 
     /// One case by group and name.
     ///
     /// # Errors
-    /// [`DatabaseError::NoGroup`] or [`DatabaseError::NoCase`], with the names there are.
-    pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, DatabaseError> {
+    /// If one of them is not there, with the names there are.
+    pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, Error> {
         let cases = self.group(path, group)?;
-        cases.iter().find(|c| c.name == name).ok_or_else(|| DatabaseError::NoCase {
-            path: path.into(),
-            group: group.into(),
-            case: name.into(),
-            known: listed(cases.iter().map(|c| c.name.as_str())),
+        cases.iter().find(|c| c.name == name).ok_or_else(|| {
+            let path = path.display();
+            error!(Database at "case", "{path}: group \"{group}\" has no case \"{name}\": it has")
+                .names(name, cases.iter().map(|c| c.name.as_str()))
         })
     }
 
     /// Adds a case or replaces the one of the same group, name and study.
     ///
     /// # Errors
-    /// [`DatabaseError::OtherStudy`] if the name is taken by another study.
-    pub fn put(&mut self, case: Case) -> Result<(), DatabaseError> {
+    /// If the name is taken by another study.
+    pub fn put(&mut self, case: Case) -> Result<(), Error> {
         self.put_all([case])
     }
 
@@ -320,12 +200,9 @@ impl Database {
     /// work grows with the number of cases, not with its square.
     ///
     /// # Errors
-    /// [`DatabaseError::OtherStudy`] if a name is taken by another study; some cases may have been
+    /// If a name is taken by another study; some cases may have been
     /// put by then.
-    pub(crate) fn put_all(
-        &mut self,
-        cases: impl IntoIterator<Item = Case>,
-    ) -> Result<(), DatabaseError> {
+    pub(crate) fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), Error> {
         let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
         for case in cases {
             let there = self.groups.entry(case.group.clone()).or_default();
@@ -338,12 +215,11 @@ impl Database {
                 continue;
             };
             if there[k].study != case.study {
-                let other = there[k].study.clone();
-                return Err(DatabaseError::OtherStudy {
-                    group: case.group,
-                    name: case.name,
-                    other,
-                });
+                let (Case { group, name, .. }, other) = (&case, &there[k].study);
+                return Err(error!(
+                    Database,
+                    "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this run or group differently, or remove that case (crumple db rm)"
+                ));
             }
             self.altered.remove(&CasePath::of(&case));
             there[k] = case;
@@ -367,18 +243,19 @@ impl Database {
     /// Gives cases other names and groups, all at once.
     ///
     /// # Errors
-    /// [`DatabaseError::Taken`] if a place is that of a case that stays, or meant for two; nothing
+    /// If a place is that of a case that stays, or meant for two; nothing
     /// is changed then.
-    pub(crate) fn relocate(
-        &mut self,
-        moves: &BTreeMap<CasePath, CasePath>,
-    ) -> Result<(), DatabaseError> {
+    pub(crate) fn relocate(&mut self, moves: &BTreeMap<CasePath, CasePath>) -> Result<(), Error> {
         let mut places = HashSet::new();
         for case in self.groups.values().flatten() {
             let path = CasePath::of(case);
             let place = moves.get(&path).unwrap_or(&path);
             if !places.insert(place.clone()) {
-                return Err(DatabaseError::Taken(place.clone()));
+                let CasePath { group, name } = place;
+                return Err(error!(
+                    Database,
+                    "group \"{group}\" has a case \"{name}\" already: choose another name"
+                ));
             }
         }
         let mut cases: Vec<Case> =
@@ -464,12 +341,12 @@ pub(crate) fn remember_origin(case: &mut Case) {
 
 /// BLAKE3 of the curves of a case and of what they are of: speed, masses, parameters and kinds, and
 /// not of names, notes or where it is from.
-pub(crate) fn record_hash(case: &Case) -> Result<String, DatabaseError> {
+pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
     Ok(layout::Content::of(case)?.record_hash())
 }
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
-pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, DatabaseError> {
+pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
     let items = foreign::found(&layout::open(path)?)?;
     Ok((!items.is_empty()).then(|| foreign::listed(&items)))
 }
@@ -486,7 +363,12 @@ fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
 
+/// The error of what a database holds and should not.
+fn damaged(path: &Path, place: &str, detail: impl fmt::Display) -> Error {
+    error!(Database, "{}: {place}: {detail}", path.display())
+}
+
 /// Turns a curve that breaks its invariant into a database error.
-fn damaged_curve(path: &Path, place: &str, error: CurveError) -> DatabaseError {
-    DatabaseError::Damaged { path: path.into(), place: place.into(), detail: error.to_string() }
+fn damaged_curve(path: &Path, place: &str, error: CurveError) -> Error {
+    damaged(path, place, error)
 }

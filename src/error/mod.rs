@@ -23,6 +23,8 @@ struct Inner {
     /// Of a TOML document whose text is not at hand where the fault is found.
     key: KeyPath,
     place: Option<Place>,
+    /// The text says itself where; the place only shows the line.
+    names_place: bool,
     source: Option<Box<dyn StdError + Send + Sync>>,
 }
 
@@ -40,7 +42,8 @@ pub(crate) use error;
 impl Error {
     pub(crate) fn new(code: ErrorCode, message: impl Into<String>) -> Self {
         let message = message.into();
-        Self(Box::new(Inner { code, message, key: KeyPath::default(), place: None, source: None }))
+        let key = KeyPath::default();
+        Self(Box::new(Inner { code, message, key, place: None, names_place: false, source: None }))
     }
 
     /// A file that cannot be opened, read or written.
@@ -102,6 +105,11 @@ impl Error {
         self
     }
 
+    /// About this key if it is about none yet.
+    pub(crate) fn or_at_key(self, keys: &str) -> Self {
+        if self.0.key == KeyPath::default() { self.at_key(keys) } else { self }
+    }
+
     /// The key is wrong, not its value.
     pub(crate) fn itself(mut self) -> Self {
         self.0.key = std::mem::take(&mut self.0.key).itself();
@@ -130,6 +138,19 @@ impl Error {
         self
     }
 
+    /// Says after the text what else may matter.
+    pub(crate) fn followed_by(mut self, text: &str) -> Self {
+        self.0.message += text;
+        self
+    }
+
+    /// Shows a line of a file beside a text that says by itself what it is about.
+    pub(crate) fn showing(mut self, place: Option<Place>) -> Self {
+        self.0.place = place;
+        self.0.names_place = true;
+        self
+    }
+
     /// What an error says that was found without knowing the document: at the place of its key.
     pub(crate) fn placed(mut self, place: impl FnOnce(&KeyPath) -> Place) -> Self {
         if self.0.place.is_none() {
@@ -141,7 +162,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(place) = &self.0.place {
+        if let Some(place) = self.0.place.as_ref().filter(|_| !self.0.names_place) {
             write!(f, "{place}: ")?;
         }
         f.write_str(&self.0.message)

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use crate::curve::ForceKind;
 use crate::curve::from_table::FromTableError;
-use crate::database::DatabaseError;
 use crate::formats::read::ReadCurveError;
 
 /// Why nothing was added.
@@ -122,9 +121,6 @@ pub(crate) enum ImportError {
         /// The study.
         study: String,
     },
-    /// The database is not ours, or damaged.
-    #[error(transparent)]
-    Database(#[from] DatabaseError),
     /// A room below says why.
     #[error(transparent)]
     Below(#[from] Error),

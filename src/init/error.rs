@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use super::LeftOut;
 use crate::error::Error;
-use crate::study::StudyError;
 use crate::surrogate::ModelError;
 
 /// Why nothing can be proposed.
@@ -77,9 +76,6 @@ pub enum InitError {
         /// The file.
         path: PathBuf,
     },
-    /// The proposal itself is no study.
-    #[error(transparent)]
-    Study(#[from] StudyError),
     /// A scenario takes one model or two.
     #[error(
         "a scenario takes one model or two, found {found}: the curve between the noses, or nose and wall, then that between the vehicles of a train"
@@ -99,9 +95,9 @@ pub enum InitError {
     /// A model cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The proposal itself is no scenario.
+    /// The proposal itself is no study or scenario.
     #[error(transparent)]
-    Scenario(#[from] Error),
+    Below(#[from] Error),
 }
 
 fn listed(left_out: &[LeftOut]) -> String {

@@ -1,15 +1,11 @@
 //! Why there is no report.
 
 use crate::assess::error::{CompareError, ValidateError};
-use crate::database::DatabaseError;
 use crate::error::Error;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReportError {
-    /// A group is not there.
-    #[error("{0}")]
-    Database(#[from] DatabaseError),
     /// A group cannot be validated.
     #[error("{0}")]
     Validate(#[from] ValidateError),

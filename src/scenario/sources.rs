@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::place;
 use super::{CheckedScenario, CurveTable, Scenario, StageTable};
 use crate::curve::{Case, DrivingCurve, Envelope};
-use crate::database::{Database, DatabaseError};
+use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::formats::read::{csv, json};
 use crate::surrogate::{Model, PredictedCurve};
@@ -143,15 +143,7 @@ impl CurveSource {
                 })?;
                 let database = folder.join(database);
                 let read = Database::read_case(&database, Some(group), case);
-                let read = read.map_err(|e| {
-                    let is_name =
-                        matches!(e, DatabaseError::NoGroup { .. } | DatabaseError::NoCase { .. });
-                    of_curve(Error::below(ErrorCode::Database, e)).at_key(if is_name {
-                        "case"
-                    } else {
-                        "database"
-                    })
-                })?;
+                let read = read.map_err(|e| of_curve(e).or_at_key("database"))?;
                 Ok(Self::Case(Box::new(read)))
             }
             (None, None, None, Some(stages)) => staged(stages).map(Self::Stages).map_err(of_curve),

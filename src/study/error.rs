@@ -1,39 +1,11 @@
-//! Why a study or one of its runs cannot be used.
+//! Why one of the runs of a study cannot be used.
 
 use std::io;
 use std::path::PathBuf;
 
-use super::check::InvalidStudy;
 use crate::curve::extract::ExtractError;
-use crate::error::{Error, Place};
 use crate::guess;
 use crate::solver::ReadError;
-
-/// Why a study cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The file cannot be read, or is no manifest.
-    #[error("{0}")]
-    Manifest(#[from] Error),
-    /// It contradicts itself.
-    #[error("{place}: {source}")]
-    Invalid {
-        /// Where in the manifest.
-        place: Place,
-        /// What does not fit.
-        source: Box<InvalidStudy>,
-    },
-}
-
-impl StudyError {
-    /// Where in the manifest it is wrong.
-    pub(crate) fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Manifest(error) => error.place(),
-            Self::Invalid { place, .. } => Some(place),
-        }
-    }
-}
 
 /// Why one run gives no case.
 #[derive(Debug, thiserror::Error)]

@@ -17,12 +17,10 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::Masses;
 use crate::curve::extract::{Stated, StatedContact};
-use crate::error::Document;
+use crate::error::{Document, Error};
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
-pub use check::InvalidStudy;
 pub use error::RunError;
-pub use error::StudyError;
 pub(crate) use locate::LocatedRun;
 pub use manifest::Head;
 pub use manifest::Manifest;
@@ -44,22 +42,19 @@ pub struct Study {
 /// Loads and checks a study manifest.
 ///
 /// # Errors
-/// [`StudyError`] with its place in the manifest.
-pub(crate) fn load(path: &Path) -> Result<Study, StudyError> {
+/// With its place in the manifest.
+pub(crate) fn load(path: &Path) -> Result<Study, Error> {
     parse(path, &toml_file::read_text(path)?)
 }
 
 /// Parses and checks the text of a study manifest; `path` is for messages.
 ///
 /// # Errors
-/// [`StudyError`] if the text is no manifest, or what it says makes no sense.
-pub fn parse(path: &Path, text: &str) -> Result<Study, StudyError> {
+/// If the text is no manifest, or what it says makes no sense.
+pub fn parse(path: &Path, text: &str) -> Result<Study, Error> {
     let manifest = toml_file::parse(path, text)?;
     let document = Document::new(path, text);
-    check::check(&manifest).map_err(|(source, key)| {
-        let place = document.place(&key);
-        StudyError::Invalid { place, source: source.into() }
-    })?;
+    check::check(&manifest).map_err(|error| error.placed(|key| document.place(key)))?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok(Study { manifest, path: path.into(), folder, document })
 }

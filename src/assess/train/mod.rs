@@ -145,9 +145,7 @@ fn key(error: &TrainError, scenario: &Scenario) -> Option<KeyPath> {
         TrainError::Read(ReadError::NoSuchEntity { id, .. }) => of_node(id.id)?,
         TrainError::Read(ReadError::NoSuchComponent { .. }) => reference("component"),
         TrainError::Read(_) => reference("file"),
-        TrainError::InScenario { .. } | TrainError::Scenario(_) | TrainError::Database(_) => {
-            return None;
-        }
+        TrainError::InScenario { .. } | TrainError::Scenario(_) => return None,
     })
 }
 
