@@ -6,25 +6,11 @@ use std::io;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::assess::error::{CompareError, TrainError, ValidateError};
-use crate::charts::{HistoryError, LeftOutError};
-use crate::dataset::DatasetError;
-
 use crate::error::{self, ErrorCode, Place};
-use crate::formats::ExportError;
-use crate::formats::read::ReadCurveError;
-use crate::formats::read::json::CurveFileError;
 use crate::history_hdf5::ConvertError;
-use crate::import::ImportError;
-use crate::init::InitError;
 use crate::multibody::SimulationError;
-use crate::nsdm::NsdmError;
-use crate::plot::PngError;
-use crate::rating::SignalError;
-use crate::report::ReportError;
 use crate::solver::ReadError;
 use crate::study::RunError;
-use crate::surrogate::{ModelError, PredictError};
 
 /// What `--json` prints on standard output when a command fails.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -73,21 +59,9 @@ fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
     }
     codes! {
         io::Error => Io;
-        InitError => Study;
         RunError => Run;
         ReadError, ConvertError => SolverFile;
-        ReadCurveError, CurveFileError => CurveFile;
-        ImportError => Import;
-        DatasetError => Dataset;
-        ModelError => Model;
-        PredictError => Prediction;
-        ValidateError => Validation;
-        CompareError, TrainError, NsdmError => Comparison;
         SimulationError => Simulation;
-        ExportError => Export;
-        SignalError, crate::rating::table::TableError => Rating;
-        PngError, HistoryError, LeftOutError, crate::charts::MotionError => Plot;
-        ReportError => Report;
     }
     None
 }
@@ -104,10 +78,7 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> ErrorCode {
 
 /// The place in a TOML file that an error is about.
 pub(crate) fn place<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Place> {
-    chain(error).find_map(|error| {
-        (of::<error::Error>(error).and_then(error::Error::place))
-            .or_else(|| of::<TrainError>(error).and_then(TrainError::place))
-    })
+    chain(error).find_map(|error| of::<error::Error>(error).and_then(error::Error::place))
 }
 
 /// The causes of an error that the messages above them do not contain, the nearest first.
@@ -181,7 +152,7 @@ mod tests {
         assert_eq!(document.hint.as_deref(), Some("did you mean \"group\"?"));
         let missing = crate::scenario::load(Path::new("/none/s.toml")).unwrap_err();
         assert_eq!(code(&missing), ErrorCode::Io);
-        assert_eq!(code(&ReportError::from(missing)), ErrorCode::Io, "also where it is boxed");
+        assert_eq!(code(&Box::new(missing)), ErrorCode::Io, "also where it is boxed");
         assert_eq!(code(&std::fmt::Error), ErrorCode::Other);
     }
 }

@@ -1,10 +1,12 @@
 //! Comparison of the methods at a speed that is left out: the curve of each in one multi-body
 //! model, against FE.
 
+use crate::error::{Error, ErrorCode, error};
+use crate::plural::counted;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::error::{CompareError, NotLeftOut};
+use super::error::NotLeftOut;
 use super::left_out::LeftOutCase;
 use super::methods;
 use super::reference::Reference;
@@ -83,13 +85,13 @@ pub(crate) struct NsdmFit {
 /// The speeds of a group that lie between others, for a comparison at each, in m/s.
 ///
 /// # Errors
-/// [`CompareError`] if the cases are no training set.
-pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, CompareError> {
+/// If the cases are no training set.
+pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     match speeds.len() {
-        0..3 => Err(CompareError::TooFew { cases: speeds.len() }),
+        0..3 => Err(too_few(speeds.len())),
         n => Ok(speeds[1..n - 1].to_vec()),
     }
 }
@@ -101,13 +103,13 @@ pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, Comp
 /// sampled times of both, as FE's contact forces are means over two output intervals.
 ///
 /// # Errors
-/// [`CompareError`] lists the speeds there are if none fits.
+/// It lists the speeds there are if none fits.
 pub(crate) fn compare(
     group: &str,
     cases: &[Case],
     speed_m_per_s: f64,
     settings: &ComparisonSettings,
-) -> Result<Comparison, CompareError> {
+) -> Result<Comparison, Error> {
     let set = TrainingSet::new(group, cases)?;
     let left_out = left_out_at(speed_m_per_s, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
@@ -154,36 +156,42 @@ pub(crate) fn compare(
 }
 
 /// The case at `speed_m_per_s`, left out of the group; at least two others must remain.
-fn left_out_at<'a>(
-    speed_m_per_s: f64,
-    set: &'a TrainingSet,
-) -> Result<LeftOutCase<'a>, CompareError> {
+fn left_out_at<'a>(speed_m_per_s: f64, set: &'a TrainingSet) -> Result<LeftOutCase<'a>, Error> {
     let index = set
         .cases
         .iter()
         .position(|c| is_same_speed(c.speed_m_per_s, speed_m_per_s))
         .ok_or_else(|| no_case(&set.group, speed_m_per_s, set))?;
-    let too_few = CompareError::TooFew { cases: set.cases.len() };
+    let too_few = || too_few(set.cases.len());
     if set.cases.len() < 3 {
-        return Err(too_few);
+        return Err(too_few());
     }
     match LeftOutCase::new(set, index) {
-        Ok(left_out) if left_out.rest.cases.len() < 2 => Err(too_few),
+        Ok(left_out) if left_out.rest.cases.len() < 2 => Err(too_few()),
         Ok(left_out) => Ok(left_out),
-        Err(NotLeftOut::Truncated { case }) => Err(CompareError::Truncated { case }),
-        Err(NotLeftOut::Motion(error)) => Err(error.into()),
-        Err(NotLeftOut::TooFew { .. }) => Err(too_few),
-        Err(error) => Err(error.into()),
+        Err(NotLeftOut::Truncated { case }) => Err(error!(
+            Comparison,
+            "case \"{case}\" ended while loading: it is no reference; compare at another speed"
+        )),
+        Err(NotLeftOut::Motion(error)) => Err(error),
+        Err(NotLeftOut::TooFew { .. }) => Err(too_few()),
+        Err(error) => Err(Error::below(ErrorCode::Comparison, error)),
     }
 }
 
-fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> CompareError {
+fn too_few(cases: usize) -> Error {
+    let cases = counted(cases, "case");
+    error!(Comparison, "leaving out one of {cases} leaves too few: a comparison needs at least 3")
+}
+
+fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> Error {
     let known: Vec<String> = set.speeds_m_per_s().into_iter().map(km_per_h).collect();
-    CompareError::NoCase {
-        group: group.into(),
-        asked: km_per_h(asked_m_per_s),
-        known: known.join(", "),
-    }
+    error!(
+        Comparison,
+        "group \"{group}\" has no case at {asked}: it has {known}",
+        asked = km_per_h(asked_m_per_s),
+        known = known.join(", ")
+    )
 }
 
 /// The one case that FDRM and NSDM use: of the speed that was asked for, else the nearest to
@@ -193,13 +201,17 @@ fn fixed_case<'a>(
     rest: &'a TrainingSet,
     left_out_m_per_s: f64,
     settings: &ComparisonSettings,
-) -> Result<&'a TrainingCase, CompareError> {
+) -> Result<&'a TrainingCase, Error> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
         let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
         return Ok(&rest.cases[nearest(speeds, left_out_m_per_s)]);
     };
     if is_same_speed(asked, left_out_m_per_s) {
-        return Err(CompareError::FixedIsLeftOut { asked: km_per_h(asked) });
+        return Err(error!(
+            Comparison,
+            "the fixed curve is that of {asked}, the speed that is left out: choose another one",
+            asked = km_per_h(asked)
+        ));
     }
     let found = rest.cases.iter().find(|c| is_same_speed(c.speed_m_per_s, asked));
     found.ok_or_else(|| no_case(group, asked, rest))
@@ -211,8 +223,8 @@ fn nsdm_report(
     fixed: &Case,
     reference: &Reference,
     settings: &ComparisonSettings,
-) -> Result<NsdmReport, CompareError> {
-    let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, CompareError> {
+) -> Result<NsdmReport, Error> {
+    let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, Error> {
         let motion = fit.model.run(at.mass_kg(), at.speed_m_per_s(), at.time_s())?;
         Ok(at.errors_of(&motion.v_m_per_s))
     };

@@ -1,9 +1,10 @@
 //! Left-out cases: one speed is dropped, predicted from the rest, run, and measured against FE.
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
-use super::error::{NotLeftOut, ValidateError};
-use super::reference::{MotionError, MotionErrors, Reference};
+use super::error::NotLeftOut;
+use super::reference::{MotionErrors, Reference};
 use crate::curve::driving::DrivingCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
@@ -12,7 +13,7 @@ use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, Residuals};
 use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::predict::{PredictError, Prediction};
+use crate::surrogate::predict::Prediction;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
 
@@ -88,8 +89,8 @@ impl<'a> LeftOutCase<'a> {
     /// and run are consistent; only a contact force's are a floor for predictions of it.
     ///
     /// # Errors
-    /// [`MotionError`] if a curve makes no run.
-    pub(crate) fn floors(&self) -> Result<Vec<Floor>, MotionError> {
+    /// If a curve makes no run.
+    pub(crate) fn floors(&self) -> Result<Vec<Floor>, Error> {
         let floor = |(kind, curve): (ForceKind, DrivingCurve)| {
             let errors = self.reference.errors_with(&curve)?;
             Ok(Floor {
@@ -122,10 +123,10 @@ impl<'a> LeftOutCase<'a> {
 
     /// Predicts the case by one model and every rule for the maximal crush.
     pub(super) fn trial(&self, kind: ModelKind) -> Trial<'_> {
-        let to_text = |error: ValidateError| error.to_string();
-        let answers = || -> Result<Answers, ValidateError> {
+        let to_text = |error: Error| error.to_string();
+        let answers = || -> Result<Answers, Error> {
             let model = Model::fit_curves(&self.rest, kind)
-                .map_err(|error| ValidateError::NotFitted(error.to_string()))?;
+                .map_err(|error| error!(Validation, "without this speed: {}", error))?;
             let query = query_of(self.case, &model);
             // Body force and motion are the same by all rules.
             let prediction = Prediction::new(&model, &query)?;
@@ -139,7 +140,7 @@ impl<'a> LeftOutCase<'a> {
     }
 
     /// A predicted curve with its errors of crush and energy.
-    pub(super) fn answer(&self, curve: PredictedCurve) -> Result<Answer, ValidateError> {
+    pub(super) fn answer(&self, curve: PredictedCurve) -> Result<Answer, Error> {
         let fe = &self.own.envelope;
         let answer = Answer {
             energy_error: curve.energy_j / fe.work() - 1.0,
@@ -148,12 +149,12 @@ impl<'a> LeftOutCase<'a> {
         };
         match answer.energy_error.is_finite() && answer.max_crush_error.is_finite() {
             true => Ok(answer),
-            false => Err(ValidateError::NotFinite),
+            false => Err(error!(Validation, "its errors against FE are no finite numbers")),
         }
     }
 
     /// The row of an answer of `model`, but for the coverage and the other rules.
-    fn judged(&self, model: &str, answer: &Answer) -> Result<Judged, ValidateError> {
+    fn judged(&self, model: &str, answer: &Answer) -> Result<Judged, Error> {
         let Answer { curve, energy_error, max_crush_error } = answer;
         let envelope = curve.envelope()?;
         let along = grid(self.own.envelope.end_m(), STEPS);
@@ -161,10 +162,10 @@ impl<'a> LeftOutCase<'a> {
             (forces_n(&self.own.envelope, &along), forces_n(&envelope, &along));
         let force_l1 = l1_ratio(&reference, &predicted);
         if !force_l1.is_finite() {
-            return Err(ValidateError::NotFinite);
+            return Err(error!(Validation, "its errors against FE are no finite numbers"));
         }
-        let driven_by = |force| -> Result<MotionErrors, ValidateError> {
-            Ok(self.reference.errors_with(&curve.driving(force)?)?)
+        let driven_by = |force| -> Result<MotionErrors, Error> {
+            self.reference.errors_with(&curve.driving(force)?)
         };
         let body = driven_by(ForceKind::Body)?;
         let contact = match curve.body_force_n {
@@ -196,7 +197,7 @@ impl<'a> LeftOutCase<'a> {
         &self,
         curve: &PredictedCurve,
         along: &[f64],
-    ) -> Result<BTreeMap<ForceKind, Residuals>, PredictError> {
+    ) -> Result<BTreeMap<ForceKind, Residuals>, Error> {
         // Up to its first point a prediction rises from 0, which FE does not.
         let first = curve.deflection_m[1];
         let from = along.iter().position(|&d| d >= first).unwrap_or(0);

@@ -1,20 +1,19 @@
 //! The methods that are compared: FE's own curves, FDRM, NSDM, DDTCM and the best model.
 
-use crate::plural::counted;
-use std::time::Instant;
-
-use super::error::CompareError;
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
 use super::settings::ComparisonSettings;
 use super::validate::choose_and_fit;
 use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
-use crate::nsdm::{self, NsdmError, Target};
+use crate::error::Error;
+use crate::nsdm::{self, Target};
+use crate::plural::counted;
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{Model, ModelError, ModelKind, PredictedCurve, Query, predict};
+use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
+use std::time::Instant;
 
 /// A method's curve at a left-out speed.
 pub(super) struct Method {
@@ -103,10 +102,7 @@ impl FittedNsdm {
 }
 
 /// Fits the spring and damper with every seed of the settings.
-pub(super) fn fit_nsdm(
-    fixed: &Case,
-    settings: &ComparisonSettings,
-) -> Result<FittedNsdm, CompareError> {
+pub(super) fn fit_nsdm(fixed: &Case, settings: &ComparisonSettings) -> Result<FittedNsdm, Error> {
     let reference = Reference::of(fixed)?;
     let target = nsdm_target(&reference)?;
     let choices = nsdm::FitSettings { start: settings.nsdm_start, ..nsdm::FitSettings::default() };
@@ -122,7 +118,7 @@ pub(super) fn fit_nsdm(
 
 /// The motion of a case that a spring and damper are fitted to: to 30 ms after its largest
 /// deflection.
-pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, NsdmError> {
+pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, Error> {
     let until = reference.inside();
     Target::new(
         reference.mass_kg(),
@@ -135,7 +131,7 @@ pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, NsdmError> {
 
 /// The reference method's model: its forest, and its spline for the maximal crush where speed
 /// alone differs.
-pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, ModelError> {
+pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, Error> {
     let options = ForestOptions { seed, ..ForestOptions::paper() };
     let mut model = Model::fit_curves(set, ModelKind::forest(options))?;
     model.max_crush_rule = match model.features.is_empty() {
@@ -146,7 +142,7 @@ pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, ModelEr
 }
 
 /// The reference method: the recipe's force drives, as in the paper.
-pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, CompareError> {
+pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, Error> {
     let start = Instant::now();
     let model = ddtcm_model(&left_out.rest, seed)?;
     let fit_s = start.elapsed().as_secs_f64();
@@ -163,7 +159,7 @@ pub(super) fn best(
     group: &str,
     others: &[Case],
     seed: u64,
-) -> Result<Method, CompareError> {
+) -> Result<Method, Error> {
     let start = Instant::now();
     let model = choose_and_fit(group, others, seed)?;
     let fit_s = start.elapsed().as_secs_f64();
@@ -178,7 +174,7 @@ fn predicted(
     left_out: &LeftOutCase<'_>,
     model: &Model,
     rule: Option<MaxCrushRule>,
-) -> Result<(PredictedCurve, f64), CompareError> {
+) -> Result<(PredictedCurve, f64), Error> {
     let query = Query { rule, ..query_of(left_out.case, model) };
     let start = Instant::now();
     let curve = predict(model, &query)?;
@@ -192,7 +188,7 @@ fn method(
     curve: &PredictedCurve,
     driving: DrivingCurve,
     (fit_s, predict_s): (f64, f64),
-) -> Result<Method, CompareError> {
+) -> Result<Method, Error> {
     let forces = (left_out.own.envelope.clone(), curve.envelope()?);
     let times = Times { fit_s, predict_s, ..Times::default() };
     Ok(Method { name, made_from, curve: driving, forces, times })

@@ -7,9 +7,9 @@
 
 use crate::curve::body::filtered;
 use crate::curve::{Case, DrivingCurve};
+use crate::error::{Error, error};
 use crate::multibody::{
-    Body, Chain, ChainError, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, SimulationError,
-    UnloadingChoice, simulate,
+    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, UnloadingChoice, simulate,
 };
 use crate::signal::resample::interpolate;
 use crate::signal::{derivative, l1_ratio};
@@ -34,34 +34,6 @@ pub struct Reference {
     acceleration_filtered: Vec<f64>,
 }
 
-/// Why a motion cannot be compared.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MotionError {
-    /// Too few states lie in the window of the comparison.
-    #[error("case \"{case}\": only {} in the window: at least 3 are needed", crate::plural::counted(*states, "state"))]
-    TooShort {
-        /// Name of the case.
-        case: String,
-        /// How many do.
-        states: usize,
-    },
-    /// An error against FE is no finite number.
-    #[error("its errors against FE are no finite numbers")]
-    NotFinite,
-    /// The multi-body run ends within the window.
-    #[error("case \"{case}\": the multi-body run is shorter than the window")]
-    RunTooShort {
-        /// Name of the case.
-        case: String,
-    },
-    /// The one-mass model is no chain.
-    #[error(transparent)]
-    Chain(#[from] ChainError),
-    /// The run of the one-mass model failed.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-}
-
 /// Errors of a multi-body run against FE, from contact to 30 ms after FE's largest
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,13 +48,18 @@ pub struct MotionErrors {
 
 impl Reference {
     /// # Errors
-    /// [`MotionError::TooShort`] for a record of fewer than three states.
-    pub fn of(case: &Case) -> Result<Self, MotionError> {
+    /// For a record of fewer than three states.
+    pub fn of(case: &Case) -> Result<Self, Error> {
         let end_s = case.original.time_s()[case.loading_end()] + AFTER_MAX_CRUSH_S;
         let upto = |end_s: f64| case.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
         let (inside, all) = (upto(end_s), upto(end_s + FOR_FILTER_S));
         if inside < 3 {
-            return Err(MotionError::TooShort { case: case.name.clone(), states: inside });
+            return Err(error!(
+                Comparison,
+                "case \"{case}\": only {} in the window: at least 3 are needed",
+                crate::plural::counted(inside, "state"),
+                case = case.name
+            ));
         }
         let time_s = case.sampled.time_s()[..all].to_vec();
         let velocity = case.closing_speed_m_per_s[..all].to_vec();
@@ -107,8 +84,8 @@ impl Reference {
     /// Runs one body of the case's effective mass against a wall with a driving curve.
     ///
     /// # Errors
-    /// [`MotionError`] if the curve makes no run.
-    pub fn run(&self, curve: &DrivingCurve) -> Result<Run, MotionError> {
+    /// If the curve makes no run.
+    pub fn run(&self, curve: &DrivingCurve) -> Result<Run, Error> {
         let body = Body::new("body", self.mass_kg, self.speed_m_per_s);
         let law = ForceLaw::of_curve(curve, UnloadingChoice::Own, EnvelopeEnd::Hold);
         let interface = Interface::new("body|wall", law, 0.0);
@@ -122,14 +99,14 @@ impl Reference {
     /// Errors of the one-mass run that a driving curve gives.
     ///
     /// # Errors
-    /// [`MotionError`] if the curve makes no run, or one whose errors are no finite numbers.
-    pub(crate) fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, MotionError> {
+    /// If the curve makes no run, or one whose errors are no finite numbers.
+    pub(crate) fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, Error> {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
         let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];
         match all.iter().all(|e| e.is_finite()) {
             true => Ok(errors),
-            false => Err(MotionError::NotFinite),
+            false => Err(error!(Comparison, "its errors against FE are no finite numbers")),
         }
     }
 
@@ -172,17 +149,22 @@ impl Reference {
     /// A run's first body's speeds at [`time_s`](Self::time_s).
     ///
     /// # Errors
-    /// [`MotionError::RunTooShort`] if the run ends before the window.
-    pub(crate) fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, MotionError> {
-        interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s)
-            .map_err(|_| MotionError::RunTooShort { case: self.case.clone() })
+    /// If the run ends before the window.
+    pub(crate) fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, Error> {
+        interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s).map_err(|_| {
+            error!(
+                Comparison,
+                "case \"{case}\": the multi-body run is shorter than the window",
+                case = self.case
+            )
+        })
     }
 
     /// Errors of a run's first body.
     ///
     /// # Errors
-    /// [`MotionError::RunTooShort`] if the run ends before the window.
-    pub fn errors(&self, run: &Run) -> Result<MotionErrors, MotionError> {
+    /// If the run ends before the window.
+    pub fn errors(&self, run: &Run) -> Result<MotionErrors, Error> {
         Ok(self.errors_of(&self.velocity_of(run)?))
     }
 

@@ -1,13 +1,12 @@
 //! Rows: the motion that a method gives, rated against FE's.
 
-use std::time::Instant;
-
-use super::error::CompareError;
 use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
 use crate::curve::ForceKind;
+use crate::error::Error;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::time::Instant;
 
 use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
@@ -73,7 +72,7 @@ struct Motion<'a> {
 
 impl RowBuilder<'_> {
     /// The row of a method with a curve.
-    pub(crate) fn row(&self, method: Method) -> Result<Row, CompareError> {
+    pub(crate) fn row(&self, method: Method) -> Result<Row, Error> {
         let Method { name, made_from, curve, forces: (truth, ours), times } = method;
         let start = Instant::now();
         let run = self.reference.run(&curve)?;
@@ -92,7 +91,7 @@ impl RowBuilder<'_> {
     }
 
     /// The row of a spring and damper.
-    pub(crate) fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, CompareError> {
+    pub(crate) fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, Error> {
         let reference = self.reference;
         let start = Instant::now();
         let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
@@ -119,17 +118,17 @@ impl RowBuilder<'_> {
         driven_by: Option<ForceKind>,
         motion: Motion<'_>,
         times: Times,
-    ) -> Result<Row, CompareError> {
+    ) -> Result<Row, Error> {
         let Motion { velocity, peak_force_n, max_crush_m, simulation_s } = motion;
         let reference = self.reference;
         let inside = reference.inside();
         let errors = reference.errors_of(velocity);
         let (fe_a, ours_a) = reference.filtered_accelerations(velocity);
-        let rated = |fe: &[f64], ours: &[f64], quantity| -> Result<Rating, CompareError> {
+        let rated = |fe: &[f64], ours: &[f64], quantity| -> Result<Rating, Error> {
             let time_s = &reference.time_s()[..inside];
             let signal = |name, values: &[f64]| Signal::new(name, time_s.to_vec(), values.to_vec());
             let settings = RatingSettings { quantity, ..RatingSettings::default() };
-            Ok(rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)?)
+            rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)
         };
         let own_s = times.predict_s + simulation_s;
         let over = |all_s: f64| self.fe_time_s.filter(|_| times.training).map(|fe| fe / all_s);

@@ -5,6 +5,7 @@
 //! comparing structures of vehicles, and unfiltered beside it: above 100 Hz FE's body oscillates on its crush zone, which
 //! no curve over deflection can hold. FE's own curves in the same model stand beside them.
 
+use crate::error::Error;
 use crate::plural::counted;
 use std::collections::BTreeMap;
 
@@ -13,7 +14,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{NextRun, Purpose, Selection, choose};
-use super::error::ValidateError;
 use super::left_out::{Answers, Judged, LeftOutCase, Trial, query_of};
 use super::scatter::scatter;
 use crate::curve::{Case, ForceKind};
@@ -73,8 +73,8 @@ pub enum Choice {
 /// Fits the chosen model to a group, with its validation.
 ///
 /// # Errors
-/// [`ValidateError`] if the cases are no training set, or too few for the model.
-pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, ValidateError> {
+/// If the cases are no training set, or too few for the model.
+pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error> {
     match choice {
         Choice::Auto { purpose, seed, trees } => {
             let asked = |kind: ModelKind| {
@@ -105,11 +105,7 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Valid
 ///
 /// # Errors
 /// As [`train`].
-pub(super) fn choose_and_fit(
-    group: &str,
-    cases: &[Case],
-    seed: u64,
-) -> Result<Model, ValidateError> {
+pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, _) = those_that_fit(&set, &ModelKind::candidates(seed));
     let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
@@ -136,7 +132,7 @@ pub(crate) fn train_chosen(
     cases: &[Case],
     kept: &[ModelKind],
     validation: Validation,
-) -> Result<Model, ValidateError> {
+) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
     let chosen = kept.iter().find(|kind| kind.name() == validation.chosen);
     // Only the model that is kept needs the members of its leaves.
@@ -159,13 +155,13 @@ pub(crate) fn train_chosen(
 /// train one without an answer at an end.
 ///
 /// # Errors
-/// [`ValidateError`] if the cases are no training set.
+/// If the cases are no training set.
 pub fn validate(
     group: &str,
     cases: &[Case],
     candidates: &[ModelKind],
     selection: Selection<'_>,
-) -> Result<Validation, ValidateError> {
+) -> Result<Validation, Error> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, unsuited) = those_that_fit(&set, candidates);
     let (left_out, mut notes) =
@@ -382,7 +378,7 @@ pub(crate) fn add_nested(
     validation: &mut Validation,
     cases: &[Case],
     seed: u64,
-) -> Result<(), ValidateError> {
+) -> Result<(), Error> {
     let group = validation.group.clone();
     let set = TrainingSet::new(&group, cases)?;
     let mut speeds = set.speeds_m_per_s();

@@ -1,8 +1,9 @@
 //! Histories of a solver's file over time, in its own units; raw, and filtered beside it.
 
+use crate::error::{Error, error};
 use crate::history::History;
 use crate::plot::{Axis, Chart, Panel, Series, Shown};
-use crate::signal::{CfcError, cfc};
+use crate::signal::cfc;
 use crate::unit::UnitSystem;
 
 /// How histories are shown.
@@ -14,55 +15,31 @@ pub struct HistoryOptions {
     pub filter_class: Option<u32>,
 }
 
-/// Why histories make no chart.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HistoryError {
-    /// There is nothing to draw.
-    #[error("there is no history: give other ids or components")]
-    None,
-    /// Too many lines to tell apart.
-    #[error(
-        "{found} histories are too many for one picture, {most} at most: choose with --id and --component"
-    )]
-    TooMany {
-        /// How many there are.
-        found: usize,
-        /// How many are drawn at most.
-        most: usize,
-    },
-    /// A filter's class is a frequency.
-    #[error("a CFC filter needs the unit of time: give the file's units")]
-    NoUnits,
-    /// The filter does not take the samples.
-    #[error("{history}: {source}")]
-    Filter {
-        /// Which history.
-        history: String,
-        /// Why.
-        source: CfcError,
-    },
-}
-
 /// Most lines of a chart.
 const MOST: usize = 24;
 
 /// Histories over time; quantities of different components stand in panels side by side.
 ///
 /// # Errors
-/// [`HistoryError`] for none or more than 24 histories, or samples that the filter does not take.
+/// For none or more than 24 histories, or samples that the filter does not take.
 pub fn histories(
     title: &str,
     histories: &[&History],
     options: HistoryOptions,
-) -> Result<Chart, HistoryError> {
+) -> Result<Chart, Error> {
     if histories.is_empty() {
-        return Err(HistoryError::None);
+        return Err(error!(Plot, "there is no history: give other ids or components"));
     }
     if histories.len() > MOST {
-        return Err(HistoryError::TooMany { found: histories.len(), most: MOST });
+        return Err(error!(
+            Plot,
+            "{found} histories are too many for one picture, {most} at most: choose with --id and --component",
+            found = histories.len(),
+            most = MOST
+        ));
     }
     if options.filter_class.is_some() && options.units.is_none() {
-        return Err(HistoryError::NoUnits);
+        return Err(error!(Plot, "a CFC filter needs the unit of time: give the file's units"));
     }
     let mut components: Vec<&str> = Vec::new();
     for history in histories {
@@ -123,15 +100,16 @@ fn axes<'a>(
     (time, Axis { scale: value.scale * si, ..value })
 }
 
-fn add(panel: &mut Panel, history: &History, options: HistoryOptions) -> Result<(), HistoryError> {
+fn add(panel: &mut Panel, history: &History, options: HistoryOptions) -> Result<(), Error> {
     let entity = history.entity.map_or_else(|| "whole model".to_string(), |e| e.to_string());
     let time = history.time.to_vec();
     let look = panel.series.len();
     panel.series.push(Series::line(&entity, look, time.clone(), history.values.clone()));
     let (Some(class), Some(units)) = (options.filter_class, options.units) else { return Ok(()) };
     let time_s: Vec<f64> = time.iter().map(|t| t * units.time_s).collect();
-    let filtered = cfc::filter(class, &time_s, &history.values)
-        .map_err(|source| HistoryError::Filter { history: entity.clone(), source })?;
+    let filtered = cfc::filter(class, &time_s, &history.values).map_err(|source| {
+        error!(Plot, "{history}: {source}", history = entity).caused_by(source)
+    })?;
     let name = format!("{entity}, CFC {class}");
     let line = Series::line(&name, look + 1, time, filtered.values);
     panel.series.push(line.shown(Shown::Emphasis));
@@ -151,9 +129,17 @@ mod tests {
             values: vec![0.0, 1.0],
         };
         let all: Vec<&History> = std::iter::repeat_n(&history, MOST + 1).collect();
-        let most = HistoryError::TooMany { found: MOST + 1, most: MOST };
+        let most = error!(
+            Plot,
+            "{found} histories are too many for one picture, {most} at most: choose with --id and --component",
+            found = MOST + 1,
+            most = MOST
+        );
         assert_eq!(histories("", &all, HistoryOptions::default()), Err(most));
         assert!(histories("", &all[1..], HistoryOptions::default()).is_ok());
-        assert_eq!(histories("", &[], HistoryOptions::default()), Err(HistoryError::None));
+        assert_eq!(
+            histories("", &[], HistoryOptions::default()),
+            Err(error!(Plot, "there is no history: give other ids or components"))
+        );
     }
 }

@@ -1,58 +1,38 @@
 //! A run that is left out, predicted from the others, and drawn beside what FE has.
 
 use super::curves::{LeftOutPrediction, left_out};
-use crate::assess::error::ValidateError;
-use crate::assess::reference::{MotionError, Reference};
+use crate::assess::reference::Reference;
 use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
+use crate::error::{Error, error};
 use crate::plot::Chart;
-use crate::surrogate::{PredictError, PredictedCurve, Query, predict};
+use crate::surrogate::{PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
-
-/// Why a speed that is left out makes no chart.
-#[derive(Debug, thiserror::Error)]
-pub enum LeftOutError {
-    /// The group has no run there.
-    #[error("{group} has no run at {}: its speeds are {known}", km_per_h(*.speed_m_per_s))]
-    NoSuchSpeed {
-        /// Name of the group.
-        group: String,
-        /// Speed that was asked for, in m/s.
-        speed_m_per_s: f64,
-        /// The speeds there are, as a list.
-        known: String,
-    },
-    /// The other runs make no model.
-    #[error(transparent)]
-    Validate(#[from] ValidateError),
-    /// The model of the others has no answer.
-    #[error(transparent)]
-    Predict(#[from] PredictError),
-    /// The predicted curve does not stop one mass.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-}
 
 /// Trains the model of `choice` on the runs at other speeds, predicts the curve at `speed_m_per_s`, lets its body force (or its
 /// only force) stop one mass, and draws both beside the run.
 ///
 /// # Errors
-/// [`LeftOutError`] if there is no such run, or the others are too few.
+/// If there is no such run, or the others are too few.
 pub fn left_out_at(
     group: &str,
     cases: &[Case],
     speed_m_per_s: f64,
     choice: Choice,
-) -> Result<Chart, LeftOutError> {
+) -> Result<Chart, Error> {
     let is_that = |case: &&Case| is_same_speed(case.speed.m_per_s, speed_m_per_s);
-    let set = TrainingSet::new(group, cases).map_err(ValidateError::from)?;
+    let set = TrainingSet::new(group, cases)?;
     // Several runs of that speed are one case, their mean.
     let mut own = set.cases.iter().map(|own| &*own.case);
     let Some(case) = own.find(is_that) else {
         let speeds: Vec<String> = cases.iter().map(|c| km_per_h(c.speed.m_per_s)).collect();
         let known = speeds.join(", ");
-        return Err(LeftOutError::NoSuchSpeed { group: group.into(), speed_m_per_s, known });
+        return Err(error!(
+            Plot,
+            "{group} has no run at {}: its speeds are {known}",
+            km_per_h(speed_m_per_s)
+        ));
     };
     let others: Vec<Case> = cases.iter().filter(|c| !is_that(c)).cloned().collect();
     let model = train(group, &others, choice)?;

@@ -26,13 +26,10 @@ mod train;
 
 pub use curves::group_curves;
 pub use curves::prediction;
-pub use histories::HistoryError;
 pub use histories::HistoryOptions;
 pub use histories::histories;
-pub use left_out::LeftOutError;
 pub use left_out::left_out_at;
 pub use motion::Motion;
-pub use motion::MotionError;
 pub use motion::Quantity;
 pub use train::train_speeds;
 

@@ -1,5 +1,6 @@
 //! A multi-body run over time: speeds, accelerations, forces, energies; and force over deflection.
 
+use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{Chain, Run};
 use crate::plot::{Axis, Chart, Panel, Series};
 use crate::table::{CsvTable, NoNumber};
@@ -65,64 +66,39 @@ pub struct Motion {
     pub energies: Option<Energies>,
 }
 
-/// Why a table is no result of a run. Lines and columns count from 1.
-#[derive(Debug, thiserror::Error)]
-pub enum MotionError {
-    /// The text is no table.
-    #[error(transparent)]
-    Csv(#[from] csv::Error),
-    /// It has other columns.
-    #[error(
-        "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\""
-    )]
-    Columns {
-        /// Line of the header.
-        line: u64,
-        /// The header.
-        found: String,
-    },
-    /// A field is no finite number.
-    #[error("line {line}, column {column}: expected a number, found \"{found}\"")]
-    NotANumber {
-        /// Line in the file.
-        line: u64,
-        /// Column in that line.
-        column: usize,
-        /// The field's text.
-        found: String,
-    },
-    /// There are no rows.
-    #[error("there are no rows below the header: was the run stopped?")]
-    Empty,
+fn not_a_number(NoNumber { line, column, found, .. }: NoNumber) -> Error {
+    error!(Plot, "line {line}, column {column}: expected a number, found \"{found}\"")
 }
 
-impl From<NoNumber> for MotionError {
-    fn from(NoNumber { line, column, found, .. }: NoNumber) -> Self {
-        Self::NotANumber { line, column, found }
-    }
+fn not_csv(error: csv::Error) -> Error {
+    Error::below(ErrorCode::Plot, error)
 }
 
 impl Motion {
     /// Of the CSV file of a result, as `crumple simulate -o` writes it.
     ///
     /// # Errors
-    /// [`MotionError`] if it has other columns, or fields that are no finite numbers.
-    pub fn of_csv(text: &[u8]) -> Result<Self, MotionError> {
-        let mut table = CsvTable::open(text, 0)?;
+    /// If it has other columns, or fields that are no finite numbers.
+    pub fn of_csv(text: &[u8]) -> Result<Self, Error> {
+        let mut table = CsvTable::open(text, 0).map_err(not_csv)?;
         let header: Vec<String> = table.header().iter().map(String::from).collect();
         let line = table.header_line();
         if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
-            return Err(MotionError::Columns { line, found: header.join(",") });
+            return Err(error!(
+                Plot,
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                found = header.join(",")
+            ));
         }
         let mut columns = vec![Vec::new(); header.len()];
         for row in table.rows() {
-            let row = row?;
+            let row = row.map_err(not_csv)?;
             for (k, column) in columns.iter_mut().enumerate() {
-                column.push(row.number(k)?);
+                column.push(row.number(k).map_err(not_a_number)?);
             }
         }
         if columns[0].is_empty() {
-            return Err(MotionError::Empty);
+            return Err(error!(Plot, "there are no rows below the header: was the run stopped?"));
         }
         let of = |quantity: &str, name: &str| {
             let wanted = format!("{quantity}[{name}]");
@@ -151,7 +127,11 @@ impl Motion {
             })
             .collect();
         if bodies.is_empty() && interfaces.is_empty() {
-            return Err(MotionError::Columns { line, found: header.join(",") });
+            return Err(error!(
+                Plot,
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                found = header.join(",")
+            ));
         }
         Ok(Self { time_s: columns.swap_remove(0), bodies, interfaces, energies: None })
     }

@@ -1,10 +1,9 @@
 //! What a measured or legacy curve's file does not say of itself, as several commands take it.
 
 use crate::formats::read::{ColumnNames, ReadOptions};
-use crate::import::{ImportError, Settings};
+use crate::import::Settings;
 use crate::unit::{STIFFNESS, SpeedKind};
 
-use super::Failure;
 use super::arguments::{mass, one_of};
 
 /// How a file is read, and the impact that its curve belongs to.
@@ -82,15 +81,5 @@ impl CurveFile {
             accept_energy: self.accept_energy,
             ..Settings::default()
         }
-    }
-}
-
-/// Wrong usage where the command line lacks something, or says what cannot be.
-pub(super) fn failure(error: ImportError) -> Failure {
-    match error {
-        ImportError::Missing { .. }
-        | ImportError::MassOfWall { .. }
-        | ImportError::OtherForce { .. } => Failure::Usage(error.to_string()),
-        other => other.into(),
     }
 }

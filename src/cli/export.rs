@@ -1,12 +1,12 @@
 //! `crumple export`: curves, models and recorded cases as files for other tools.
 
+use crate::error::Error;
 use std::path::{Path, PathBuf};
 
 use crate::curve::{ForceKind, Parameter};
-use crate::formats::{self, ExportError, Exported, FORMATS, Format, Material, Options, Tail};
+use crate::formats::{self, Exported, FORMATS, Format, Material, Options, Tail};
 use crate::surrogate::Query;
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::predict::PredictError;
 use crate::unit::UnitSystem;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
@@ -156,7 +156,7 @@ impl Target {
                 )));
             }
         };
-        found.map_err(|e: ExportError| Failure::Usage(e.to_string()))
+        found.map_err(|e: Error| Failure::Usage(e.to_string()))
     }
 
     /// The options for a file at `path`.
@@ -197,16 +197,15 @@ impl Target {
             let one = |input: &formats::ExportInput| {
                 Ok(formats::ExportInput { curve: input.curve.of_force(force)?, beyond: None })
             };
-            alone = curves.iter().map(one).collect::<Result<Vec<_>, PredictError>>()?;
+            alone = curves.iter().map(one).collect::<Result<Vec<_>, Error>>()?;
             curves = &alone;
         }
-        format.export(curves, &self.options(path)).map_err(|error| match error {
-            ExportError::Predict(error)
-                if self.force.is_none() && matches!(*error, PredictError::NoBodyForce) =>
-            {
+        format.export(curves, &self.options(path)).map_err(|error| {
+            if self.force.is_none() && error.is_about("force") {
                 Failure::Usage("the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into())
+            } else {
+                error.into()
             }
-            error => error.into(),
         })
     }
 

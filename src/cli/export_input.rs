@@ -1,5 +1,6 @@
 //! What `crumple export` is given: a predicted curve, a model, a database or another curve's file, told apart by content.
 
+use crate::error::error;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -9,14 +10,14 @@ use crate::dataset::is_same_speed;
 use crate::file;
 use crate::formats::ExportInput;
 use crate::formats::read::is_folder_of_tests;
-use crate::formats::read::json::{self, CurveFileError};
+use crate::formats::read::json;
 use crate::import::{self, Item, Settings};
 use crate::surrogate::predict::predict_beyond;
 use crate::surrogate::{Model, PredictedCurve, Query};
 use crate::unit::{UnitSystem, km_per_h};
 
 use super::Failure;
-use super::curve_file::{self, CurveFile};
+use super::curve_file::CurveFile;
 
 /// The input of an export.
 pub(super) enum Input {
@@ -58,7 +59,8 @@ impl Input {
             return Ok(Self::File(path.into()));
         }
         let mut head = Vec::new();
-        let named = |source| CurveFileError::Io { path: path.into(), source };
+        let named =
+            |source| error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source);
         file::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head)).map_err(named)?;
         if head.starts_with(HDF5) {
             return Ok(Self::Database(path.into(), Database::read(path)?));
@@ -210,7 +212,7 @@ impl Chosen<'_> {
             ..self.file.settings()
         };
         settings.read.units = self.input_units;
-        import::case_of_file(&item, &settings).map_err(curve_file::failure)
+        Ok(import::case_of_file(&item, &settings)?)
     }
 
     fn of_database(&self, path: &Path, database: &Database) -> Result<Vec<Case>, Failure> {

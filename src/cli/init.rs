@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::file::write_whole;
 use crate::init::{
-    self, Given, GivenForce, InitError, Proposal, Proposed, ProposedRun, Request, ScenarioProposal,
+    self, Given, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal,
 };
 use crate::study::StudyKind;
 use crate::unit::{UnitSystem, km_per_h};
@@ -116,10 +116,7 @@ struct ScenarioDocument<'a> {
 
 fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let place = if is_stdout(output) { Path::new("scenario.toml") } else { output };
-    let proposal = init::propose_scenario(&args.inputs, place).map_err(|error| match error {
-        InitError::Models { .. } => Failure::Usage(error.to_string()),
-        error => error.into(),
-    })?;
+    let proposal = init::propose_scenario(&args.inputs, place)?;
     let text = proposal.to_toml();
     for what in &proposal.missing {
         options.warn(&format!("fill in {what}"));

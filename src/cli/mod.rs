@@ -38,6 +38,7 @@ use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
+use crate::error::ErrorCode;
 use crate::failure::{self, ErrorDocument};
 use crate::file::is_same;
 use clap::{FromArgMatches, Parser, Subcommand};
@@ -119,7 +120,11 @@ pub enum Failure {
 
 impl<E: Error + 'static> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self::Failed(Box::new(error))
+        let error: Box<dyn Error> = Box::new(error);
+        if failure::code(&*error) == ErrorCode::Usage {
+            return Self::Usage(error.to_string());
+        }
+        Self::Failed(error)
     }
 }
 

@@ -331,11 +331,10 @@ impl Wanted<'_> {
         let text = file::read(self.path, MAX_TABLE_BYTES);
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
         let columns = table::read(&mut &*text, self.column).map_err(|error| {
-            let how = match error {
-                table::TableError::NoColumn { .. } | table::TableError::SeveralColumns { .. } => {
-                    format!(" behind the file's name: {path}:COLUMN")
-                }
-                _ => String::new(),
+            let how = if error.is_about("column") {
+                format!(" behind the file's name: {path}:COLUMN")
+            } else {
+                String::new()
             };
             failed(format!("{path}: {error}{how}"))
         })?;

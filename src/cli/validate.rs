@@ -1,11 +1,11 @@
 //! `crumple validate`: every model at every speed that is left out.
 
+use crate::error::Error;
 use crate::plural::counted;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
-use crate::assess::error::ValidateError;
 use crate::assess::validate::{GroupReport, Report, add_nested, validate};
 use crate::curve::Case;
 use crate::database::Database;
@@ -129,7 +129,7 @@ fn validated(
     args: &Args,
     group: &str,
     cases: &[Case],
-) -> Result<(Validation, Option<NextRun>), ValidateError> {
+) -> Result<(Validation, Option<NextRun>), Error> {
     let mut validation = validate(
         group,
         cases,

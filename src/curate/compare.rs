@@ -1,8 +1,9 @@
 //! Cases beside each other: what differs from the first of them.
 
+use crate::error::Error;
 use serde::Serialize;
 
-use crate::curve::{Case, Envelope, EnvelopeError, ForceKind};
+use crate::curve::{Case, Envelope, ForceKind};
 use crate::dataset::grid;
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
@@ -62,11 +63,11 @@ const STEPS: usize = 400;
 /// Holds cases against the first of them.
 ///
 /// # Errors
-/// [`EnvelopeError`] if a case has no loading branch.
-pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, EnvelopeError> {
+/// If a case has no loading branch.
+pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;
-    let differences: Result<Vec<Difference>, EnvelopeError> = cases
+    let differences: Result<Vec<Difference>, Error> = cases
         .iter()
         .map(|case| Ok(difference(first, &reference, case, case.loading()?.envelope)))
         .collect();

@@ -2,7 +2,8 @@
 //! exports and comparisons take.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
-use super::{Case, Envelope, EnvelopeError, ForceKind};
+use super::{Case, Envelope, ForceKind};
+use crate::error::Error;
 use crate::unit::SpeedKind;
 
 /// A force–deflection curve that can drive an interface, with what its source knows of it.
@@ -46,7 +47,7 @@ pub enum CurveUnloading {
 pub(crate) enum NoDrivingCurve {
     /// Its loading branch is no envelope.
     #[error("{0}")]
-    Envelope(#[from] EnvelopeError),
+    Envelope(#[from] Error),
     /// Its body force cannot be told from its speeds.
     #[error("its sampled states make no loading branch")]
     NoMotion,
@@ -134,8 +135,8 @@ impl DrivingCurve {
     /// branch ends with.
     ///
     /// # Errors
-    /// [`EnvelopeError`] if the two make no envelope.
-    pub(crate) fn continued(mut self) -> Result<Self, EnvelopeError> {
+    /// If the two make no envelope.
+    pub(crate) fn continued(mut self) -> Result<Self, Error> {
         let Some(beyond) = self.beyond.take() else { return Ok(self) };
         let end = self.loading.end_m();
         let share = match beyond.force_at(end) {
@@ -157,8 +158,8 @@ impl DrivingCurve {
     /// The same with all forces, and the stiffness with them, times `factor` (above 0).
     ///
     /// # Errors
-    /// [`EnvelopeError`] if the products are no finite numbers.
-    pub(crate) fn scaled(mut self, factor: f64) -> Result<Self, EnvelopeError> {
+    /// If the products are no finite numbers.
+    pub(crate) fn scaled(mut self, factor: f64) -> Result<Self, Error> {
         let times = |e: &Envelope| {
             let force_n = e.force_n().iter().map(|f| f * factor).collect();
             Envelope::new(e.deflection_m().to_vec(), force_n)

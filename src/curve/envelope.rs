@@ -1,5 +1,6 @@
 //! Envelope: the loading branch as a function, force over increasing deflection.
 
+use crate::error::{Error, error};
 use crate::piecewise;
 
 /// A piecewise linear force over deflection.
@@ -13,77 +14,46 @@ pub struct Envelope {
     work_j: Vec<f64>,
 }
 
-/// Why two columns are no envelope.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EnvelopeError {
-    /// Fewer than two points.
-    #[error("an envelope needs at least 2 points, found {points}")]
-    TooShort {
-        /// Number of points.
-        points: usize,
-    },
-    /// The columns differ in length.
-    #[error("{deflections} deflections but {forces} forces")]
-    Lengths {
-        /// Number of deflections.
-        deflections: usize,
-        /// Number of forces.
-        forces: usize,
-    },
-    /// A value is infinite or no number.
-    #[error("point {point} is ({deflection_m} m, {force_n} N): expected finite numbers")]
-    NotFinite {
-        /// The point, counted from 1.
-        point: usize,
-        /// Its deflection, in m.
-        deflection_m: f64,
-        /// Its force, in N.
-        force_n: f64,
-    },
-    /// The first deflection is not 0.
-    #[error("the deflection must begin at 0, found {first_m} m")]
-    NotFromZero {
-        /// The first deflection, in m.
-        first_m: f64,
-    },
-    /// A deflection is not larger than the one before it.
-    #[error(
-        "the deflection must increase, found {deflection_m} m after {before_m} m at point {point}"
-    )]
-    Order {
-        /// The later point, counted from 1.
-        point: usize,
-        /// Its deflection, in m.
-        deflection_m: f64,
-        /// The deflection before it, in m.
-        before_m: f64,
-    },
-}
-
 impl Envelope {
     /// Checks the invariant once.
     ///
     /// # Errors
-    /// [`EnvelopeError`] names the first point that breaks it, counted from 1.
-    pub fn new(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, EnvelopeError> {
+    /// It names the first point that breaks it, counted from 1.
+    pub fn new(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, Error> {
         let (deflections, forces) = (deflection_m.len(), force_n.len());
         if deflections != forces {
-            return Err(EnvelopeError::Lengths { deflections, forces });
+            return Err(error!(Other, "{deflections} deflections but {forces} forces"));
         }
         if deflections < 2 {
-            return Err(EnvelopeError::TooShort { points: deflections });
+            return Err(error!(
+                Other,
+                "an envelope needs at least 2 points, found {points}",
+                points = deflections
+            ));
         }
         for (i, (&deflection_m, &force_n)) in deflection_m.iter().zip(&force_n).enumerate() {
             if !(deflection_m.is_finite() && force_n.is_finite()) {
-                return Err(EnvelopeError::NotFinite { point: i + 1, deflection_m, force_n });
+                return Err(error!(
+                    Other,
+                    "point {point} is ({deflection_m} m, {force_n} N): expected finite numbers",
+                    point = i + 1
+                ));
             }
         }
         if deflection_m[0] != 0.0 {
-            return Err(EnvelopeError::NotFromZero { first_m: deflection_m[0] });
+            return Err(error!(
+                Other,
+                "the deflection must begin at 0, found {first_m} m",
+                first_m = deflection_m[0]
+            ));
         }
         if let Some(i) = deflection_m.windows(2).position(|w| w[1] <= w[0]) {
             let (before_m, deflection_m) = (deflection_m[i], deflection_m[i + 1]);
-            return Err(EnvelopeError::Order { point: i + 2, deflection_m, before_m });
+            return Err(error!(
+                Other,
+                "the deflection must increase, found {deflection_m} m after {before_m} m at point {point}",
+                point = i + 2
+            ));
         }
         let mut envelope = Self { deflection_m, force_n, work_j: Vec::new() };
         envelope.integrate();

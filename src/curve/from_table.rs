@@ -8,6 +8,7 @@
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
 
+use crate::error::{Error, ErrorCode, error};
 use crate::plural::counted;
 use std::sync::Arc;
 
@@ -18,8 +19,8 @@ use super::extract::{
 use super::recipe::{
     DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
 };
-use super::retrace::{MotionError, retrace};
-use super::{Curve, CurveError, EnergyAudit, Masses, energy, loading};
+use super::retrace::retrace;
+use super::{Curve, EnergyAudit, Masses, energy, loading};
 use crate::history::{EntityId, History};
 use crate::signal::resample::interpolate;
 use crate::unit::{Speed, UnitSystem};
@@ -78,74 +79,53 @@ pub struct FromTable {
     pub warnings: Vec<String>,
 }
 
-/// Why a table is no curve of that impact.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FromTableError {
-    /// Its energy is not that of the impact.
-    #[error(
+fn impossible_table(impossible: energy::Impossible) -> Error {
+    let (found, cause) = (impossible.found(), impossible.cause_in_file());
+    error!(
+        Other,
         "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
-    )]
-    Impossible {
-        /// What was found.
-        found: String,
-        /// What it likely comes from.
-        cause: String,
-    },
-    /// Its motion cannot be told.
-    #[error("{0}")]
-    Motion(#[from] MotionError),
-    /// The force of its record is next to nothing.
-    #[error(
-        "the largest force of the record is {largest_n} N, which is no contact: look at the column and the unit of the force"
-    )]
-    NoContact {
-        /// Largest force, in N.
-        largest_n: f64,
-    },
-    /// The deflection of its record does not grow.
-    #[error(
-        "the deflection does not grow after contact: look at its column, and whether it is compression"
-    )]
-    NoDeflection,
-    /// Its record cannot be used.
-    #[error("{0}")]
-    Extract(ExtractError),
-    /// Its states are none of a curve.
-    #[error("{0}")]
-    Curve(#[from] CurveError),
+    )
 }
 
-impl From<energy::Impossible> for FromTableError {
-    fn from(impossible: energy::Impossible) -> Self {
-        Self::Impossible { found: impossible.found().into(), cause: impossible.cause_in_file() }
-    }
-}
-
-impl From<ExtractError> for FromTableError {
-    fn from(error: ExtractError) -> Self {
-        match error {
-            ExtractError::Impossible(impossible) => impossible.into(),
-            ExtractError::NoContact { largest_n, .. } => Self::NoContact { largest_n },
-            ExtractError::NoDeflection => Self::NoDeflection,
-            other => Self::Extract(other),
-        }
+/// What an error of the extraction says of a table, which has no recipe.
+fn of_table(error: ExtractError) -> Error {
+    match error {
+        ExtractError::Impossible(found) => impossible_table(found),
+        ExtractError::NoContact { largest_n, .. } => error!(
+            Other,
+            "the largest force of the record is {largest_n} N, which is no contact: look at the column and the unit of the force"
+        ),
+        ExtractError::NoDeflection => error!(
+            Other,
+            "the deflection does not grow after contact: look at its column, and whether it is compression"
+        ),
+        ExtractError::Curve(error) => error,
+        other => Error::below(ErrorCode::Other, other),
     }
 }
 
 /// The curve of a table under an impact.
 ///
 /// # Errors
-/// [`FromTableError`] says what cannot be, and what to change.
-pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableError> {
+/// It says what cannot be, and what to change.
+pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error> {
     // As many of everything as there are deflections, so that no index is out of bounds.
     let deflection = table.deflection_m.len();
     let (force, time) = (table.force_n.len(), table.time_s.map_or(deflection, <[f64]>::len));
     let body = table.body_force_n.map_or(force, <[f64]>::len);
     if force != deflection || time != deflection || body != force {
-        return Err(CurveError::Lengths { time, deflection, force: force.min(body) }.into());
+        return Err(error!(
+            Other,
+            "columns differ in length: {time} times, {deflection} deflections, {force} forces",
+            force = force.min(body)
+        ));
     }
     if deflection < 2 {
-        return Err(CurveError::TooShort { states: deflection }.into());
+        return Err(error!(
+            Other,
+            "a curve needs at least 2 states, found {states}",
+            states = deflection
+        ));
     }
     match table.time_s {
         Some(time_s) => recorded(table, time_s, impact),
@@ -157,7 +137,7 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromT
 const MOST_STATES: usize = 20_000;
 
 /// The motion that the table asks for.
-fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableError> {
+fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error> {
     let interval_s = Sampling::default().interval_s;
     let motion = retrace(table, impact, interval_s)?;
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
@@ -177,7 +157,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableEr
         Err(impossible) if impact.accept_energy => {
             warnings.push(format!("accept_energy: {}", impossible.found()));
         }
-        Err(impossible) => return Err(impossible.into()),
+        Err(impossible) => return Err(impossible_table(impossible)),
     }
     let audit = energy::audit(&original, impact.masses, impact.speed);
     if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
@@ -195,7 +175,8 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableEr
             "short: the motion takes {last_s:.1} s, of which the first {MOST_STATES} states are sampled"
         ));
     }
-    let of = |values: &[f64]| interpolate(at, values, &times).map_err(|_| MotionError::Endless);
+    let of =
+        |values: &[f64]| interpolate(at, values, &times).map_err(|_| super::retrace::endless());
     let sampled = (of(original.deflection_m())?, of(original.force_n())?);
     let closing_speed_m_per_s = of(&motion.closing_m_per_s)?;
     if let Ok(branch) = loading::loading_branch(&original)
@@ -219,11 +200,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, FromTableEr
 }
 
 /// A record over time is extracted as that of an FE run, without a filter.
-fn recorded(
-    table: &Table<'_>,
-    time_s: &[f64],
-    impact: &Impact,
-) -> Result<FromTable, FromTableError> {
+fn recorded(table: &Table<'_>, time_s: &[f64], impact: &Impact) -> Result<FromTable, Error> {
     let recipe = recipe();
     let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
     // In the units that were given, so that a mistaken unit is found as in a build.
@@ -259,7 +236,7 @@ fn recorded(
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
         others: &[],
     };
-    let extracted = extract::extract(&measured, &setup)?;
+    let extracted = extract::extract(&measured, &setup).map_err(of_table)?;
     let (of_unloading, warnings) = remarks(&extracted, impact)?;
     notes.extend(of_unloading);
     notes.extend(extracted.notes);
@@ -276,15 +253,15 @@ fn recorded(
 }
 
 /// What is said of a record under an impact: notes and warnings.
-fn remarks(
-    extracted: &Extracted,
-    impact: &Impact,
-) -> Result<(Vec<String>, Vec<String>), FromTableError> {
+fn remarks(extracted: &Extracted, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
     let (mut notes, mut warnings) = (Vec::new(), extracted.warnings.clone());
     if let Some(found) = other_speed(&extracted.closing_speed_m_per_s, impact.speed.m_per_s) {
         if !impact.accept_energy {
-            let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)".into();
-            return Err(FromTableError::Impossible { found, cause });
+            let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
+            return Err(error!(
+                Other,
+                "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+            ));
         }
         warnings.push(format!("accept_energy: {found}"));
     }

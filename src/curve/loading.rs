@@ -1,6 +1,7 @@
 //! Loading and unloading branches of a curve.
 
-use super::{Curve, Envelope, EnvelopeError};
+use super::{Curve, Envelope};
+use crate::error::Error;
 
 /// A sample joins the loading branch if its deflection exceeds the running maximum by
 /// this share of the largest deflection.
@@ -25,8 +26,8 @@ pub(crate) fn loading_end(curve: &Curve) -> usize {
 /// that begins with a deflection (an offset) rises to it in a straight line.
 ///
 /// # Errors
-/// [`EnvelopeError`] if fewer than two samples remain.
-pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, EnvelopeError> {
+/// If fewer than two samples remain.
+pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     let end = loading_end(curve);
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let advance = MIN_ADVANCE * d[end];

@@ -16,6 +16,7 @@ pub(crate) mod replicates;
 pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -28,12 +29,10 @@ pub use driving::DrivingCurve;
 pub use energy::Impossible;
 pub use energy::audit;
 pub use envelope::Envelope;
-pub use envelope::EnvelopeError;
 pub use extract::input::DeckSpeed;
 pub use extract::input::StatedContact;
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
 pub use from_table::FromTable;
-pub use from_table::FromTableError;
 pub use from_table::{Impact, Table, from_table};
 pub use loading::Loading;
 pub use loading::unloading_stiffness;
@@ -43,7 +42,6 @@ pub use recipe::Filter;
 pub use recipe::ForceSource;
 pub use recipe::Sampling;
 pub use recipe::{Recipe, RecordedMotion};
-pub use retrace::MotionError;
 pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
@@ -56,73 +54,44 @@ pub struct Curve {
     force_n: Vec<f64>,
 }
 
-/// Why three columns are no curve.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CurveError {
-    /// Fewer than two states.
-    #[error("a curve needs at least 2 states, found {states}")]
-    TooShort {
-        /// Number of states.
-        states: usize,
-    },
-    /// The columns differ in length.
-    #[error("columns differ in length: {time} times, {deflection} deflections, {force} forces")]
-    Lengths {
-        /// Number of times.
-        time: usize,
-        /// Number of deflections.
-        deflection: usize,
-        /// Number of forces.
-        force: usize,
-    },
-    /// A value is infinite or no number.
-    #[error("the {column} of state {state} is {value}: expected a finite number")]
-    NotFinite {
-        /// The column: time, deflection or force.
-        column: &'static str,
-        /// Its state, counted from 1.
-        state: usize,
-        /// The value.
-        value: f64,
-    },
-    /// A time is not later than the one before it.
-    #[error("time does not increase at state {state}: {time_s} s follows {before_s} s")]
-    TimeOrder {
-        /// State of the later row, counted from 1.
-        state: usize,
-        /// Its time, in s.
-        time_s: f64,
-        /// The time before it, in s.
-        before_s: f64,
-    },
-}
-
 impl Curve {
     /// Checks the invariant once.
     ///
     /// # Errors
-    /// [`CurveError`] names the first state that breaks it, counted from 1.
-    pub fn new(
-        time_s: Vec<f64>,
-        deflection_m: Vec<f64>,
-        force_n: Vec<f64>,
-    ) -> Result<Self, CurveError> {
+    /// It names the first state that breaks it, counted from 1.
+    pub fn new(time_s: Vec<f64>, deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, Error> {
         let (time, deflection, force) = (time_s.len(), deflection_m.len(), force_n.len());
         if time != deflection || time != force {
-            return Err(CurveError::Lengths { time, deflection, force });
+            return Err(error!(
+                Other,
+                "columns differ in length: {time} times, {deflection} deflections, {force} forces"
+            ));
         }
         if time < 2 {
-            return Err(CurveError::TooShort { states: time });
+            return Err(error!(
+                Other,
+                "a curve needs at least 2 states, found {states}",
+                states = time
+            ));
         }
         let columns = [("time", &time_s), ("deflection", &deflection_m), ("force", &force_n)];
         for (column, values) in columns {
             if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-                return Err(CurveError::NotFinite { column, state: i + 1, value: values[i] });
+                return Err(error!(
+                    Other,
+                    "the {column} of state {state} is {value}: expected a finite number",
+                    state = i + 1,
+                    value = values[i]
+                ));
             }
         }
         if let Some(i) = time_s.windows(2).position(|w| w[1] <= w[0]) {
             let (before_s, time_s) = (time_s[i], time_s[i + 1]);
-            return Err(CurveError::TimeOrder { state: i + 2, time_s, before_s });
+            return Err(error!(
+                Other,
+                "time does not increase at state {state}: {time_s} s follows {before_s} s",
+                state = i + 2
+            ));
         }
         Ok(Self { time_s, deflection_m, force_n })
     }
@@ -327,7 +296,7 @@ pub struct Case {
 
 impl Case {
     /// The loading branch at the solver's rate, with its share of dropped samples.
-    pub fn loading(&self) -> Result<loading::Loading, EnvelopeError> {
+    pub fn loading(&self) -> Result<loading::Loading, Error> {
         loading::loading_branch(&self.original)
     }
 

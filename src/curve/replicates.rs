@@ -4,7 +4,8 @@
 //! force, largest crush, rebound) are those of one motion and fit together. A mean of forces over deflection would not:
 //! each run ends at a crush of its own.
 
-use super::{Case, Curve, CurveError, EnergyAudit};
+use super::{Case, Curve, EnergyAudit};
+use crate::error::Error;
 use crate::piecewise;
 use crate::plural::counted;
 
@@ -30,8 +31,8 @@ fn measured(recipe: &str) -> serde_json::Value {
 /// It reaches as far as the shortest of them.
 ///
 /// # Errors
-/// [`CurveError`] if the shortest ends before the first one's second state.
-pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, CurveError> {
+/// If the shortest ends before the first one's second state.
+pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, Error> {
     if others.is_empty() {
         return Ok(first.clone());
     }
@@ -69,7 +70,7 @@ pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, CurveError
     Ok(of)
 }
 
-fn mean_curve(runs: &[&Case], of: fn(&Case) -> &Curve) -> Result<Curve, CurveError> {
+fn mean_curve(runs: &[&Case], of: fn(&Case) -> &Curve) -> Result<Curve, Error> {
     let curves: Vec<&Curve> = runs.iter().map(|run| of(run)).collect();
     let last_s = |curve: &Curve| curve.time_s[curve.time_s.len() - 1];
     let end_s = curves.iter().map(|curve| last_s(curve)).fold(f64::INFINITY, f64::min);

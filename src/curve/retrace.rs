@@ -5,36 +5,14 @@
 //! stands still.
 
 use super::from_table::{Impact, Table};
+use crate::error::{Error, error};
 
-/// Why a table tells no motion.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MotionError {
-    /// The body would stop before.
-    #[error(
-        "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points behind the end of the force, or give the record with its times"
-    )]
-    NoForceAtEnd {
-        /// Where the force ends.
-        from_m: f64,
-    },
-    /// Nothing tells how the body leaves.
-    #[error("the curve never rises, so its unloading stiffness must be given: --unloading 80MN/m")]
-    NeverRises,
-    /// The body would leave beyond zero deflection.
-    #[error(
-        "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which no crash is: give a stiffer one with --unloading"
-    )]
-    TooSoft {
-        /// As stated.
-        stiffness_n_per_m: f64,
-        /// Of that line.
-        least_n_per_m: f64,
-    },
-    /// The force is so small somewhere that the body hardly moves.
-    #[error(
+/// The error of a force so small somewhere that the body hardly moves.
+pub(super) fn endless() -> Error {
+    error!(
+        Other,
         "along this curve a body hardly moves any more before it has stopped: remove the points whose force is next to nothing, or give the record with its times"
-    )]
-    Endless,
+    )
 }
 
 /// States of a motion.
@@ -67,12 +45,12 @@ const FINEST: f64 = 5e-6;
 /// The motion of a table under an impact.
 ///
 /// # Errors
-/// [`MotionError`] says what of the table tells none.
+/// It says what of the table tells none.
 pub(super) fn retrace(
     table: &Table<'_>,
     impact: &Impact,
     interval_s: f64,
-) -> Result<Motion, MotionError> {
+) -> Result<Motion, Error> {
     let (d, f) = (table.deflection_m, table.force_n);
     let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
     let moving = table.body_force_n.unwrap_or(f);
@@ -80,7 +58,11 @@ pub(super) fn retrace(
     let work = loading.work();
     if moving[end] <= 0.0 || f[end] <= 0.0 {
         let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
-        return Err(MotionError::NoForceAtEnd { from_m: d[last.map_or(0, |i| i + 1)] });
+        return Err(error!(
+            Other,
+            "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points behind the end of the force, or give the record with its times",
+            from_m = d[last.map_or(0, |i| i + 1)]
+        ));
     }
     let v0 = impact.speed.m_per_s;
     let step_s = (interval_s / FINER).max(2.0 * d[end] / v0 / STEPS);
@@ -157,14 +139,14 @@ impl March {
     }
 
     /// Adds a state behind the last; an error if the body does not get there.
-    fn push(&mut self, d: f64, f: f64, v: f64) -> Result<(), MotionError> {
+    fn push(&mut self, d: f64, f: f64, v: f64) -> Result<(), Error> {
         let last = self.motion.time_s.len() - 1;
         let way = (d - self.motion.deflection_m[last]).abs();
         let sum = (v + self.motion.closing_m_per_s[last]).abs();
         let time_s = self.motion.time_s[last] + 2.0 * way / sum;
         // A step of no time would be no state, and one of endless time none either.
         if !(time_s.is_finite() && time_s > self.motion.time_s[last]) {
-            return Err(MotionError::Endless);
+            return Err(endless());
         }
         self.motion.time_s.push(time_s);
         self.push_columns(d, f, v);
@@ -173,12 +155,7 @@ impl March {
 
     /// Follows a path whose points are passed at `speeds`; `direction` is 1 where the deflection
     /// grows.
-    fn along(
-        &mut self,
-        path: &Path<'_>,
-        speeds: &[f64],
-        direction: f64,
-    ) -> Result<(), MotionError> {
+    fn along(&mut self, path: &Path<'_>, speeds: &[f64], direction: f64) -> Result<(), Error> {
         let most = self.motion.time_s.len() + path.d.len() + MOST_STATES;
         for i in 1..path.d.len() {
             let length = (path.d[i] - path.d[i - 1]).abs();
@@ -200,7 +177,7 @@ impl March {
                 let d = path.d[i - 1] + direction * s;
                 self.push(d, between(path.f, s), direction * square.max(0.0).sqrt())?;
                 if self.motion.time_s.len() > most {
-                    return Err(MotionError::Endless);
+                    return Err(endless());
                 }
             }
             self.push(path.d[i], path.f[i], speeds[i])?;
@@ -214,7 +191,7 @@ impl March {
         table: &Table<'_>,
         impact: &Impact,
         end: usize,
-    ) -> Result<Branch, MotionError> {
+    ) -> Result<Branch, Error> {
         let (d, f) = (table.deflection_m, table.force_n);
         let stated = impact.unloading_stiffness_n_per_m;
         if end + 1 < d.len() {
@@ -234,7 +211,10 @@ impl March {
             None => {
                 let steepest = steepest_rise(d, f);
                 if steepest <= 0.0 {
-                    return Err(MotionError::NeverRises);
+                    return Err(error!(
+                        Other,
+                        "the curve never rises, so its unloading stiffness must be given: --unloading 80MN/m"
+                    ));
                 }
                 self.motion.warnings.push(format!(
                     "unloading: neither file nor --unloading tell it; the steepest rise stands for it, {:.4} MN/m: say --unloading …MN/m",
@@ -250,7 +230,10 @@ impl March {
         let (ends, moving_ends) = (f / stiffness, moving / body);
         if ends.max(moving_ends) > d * (1.0 + 1e-9) {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
-            return Err(MotionError::TooSoft { stiffness_n_per_m, least_n_per_m });
+            return Err(error!(
+                Other,
+                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which no crash is: give a stiffer one with --unloading"
+            ));
         }
         let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];
         // Two ends a rounding error apart are one.
@@ -271,7 +254,7 @@ impl March {
     }
 
     /// Free motion at the last speed.
-    fn free(&mut self) -> Result<(), MotionError> {
+    fn free(&mut self) -> Result<(), Error> {
         let last = self.motion.time_s.len() - 1;
         let (d, v) = (self.motion.deflection_m[last], self.motion.closing_m_per_s[last]);
         let begin_s = self.motion.time_s[last];

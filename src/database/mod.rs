@@ -35,7 +35,7 @@ use std::fmt;
 use std::path::Path;
 
 use crate::curve::from_table::IMPORTED;
-use crate::curve::{Case, CurveError, Origin, StoppedMass};
+use crate::curve::{Case, Origin, StoppedMass};
 use crate::file::write_whole;
 
 /// The cases of one database file.
@@ -369,6 +369,6 @@ fn damaged(path: &Path, place: &str, detail: impl fmt::Display) -> Error {
 }
 
 /// Turns a curve that breaks its invariant into a database error.
-fn damaged_curve(path: &Path, place: &str, error: CurveError) -> Error {
+fn damaged_curve(path: &Path, place: &str, error: Error) -> Error {
     damaged(path, place, error)
 }

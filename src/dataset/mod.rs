@@ -2,6 +2,7 @@
 
 mod stopped;
 
+use crate::error::{Error, error};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::curve::body::{BodyMotion, body_motion};
 use crate::curve::loading::loading_branch;
 use crate::curve::replicates::mean_of;
-use crate::curve::{Case, Envelope, EnvelopeError, ForceKind, Masses, Parameter};
+use crate::curve::{Case, Envelope, ForceKind, Masses, Parameter};
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
 pub(crate) use stopped::STEPS;
@@ -83,88 +84,6 @@ pub struct TrainingSet {
     pub cases: Vec<TrainingCase>,
 }
 
-/// Why cases are no training set.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DatasetError {
-    /// There is no case.
-    #[error("the group is empty: build it first")]
-    Empty,
-    /// Two cases of one speed and parameters were measured differently.
-    #[error(
-        "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}"
-    )]
-    EqualSpeeds {
-        /// Name of the one case.
-        first: String,
-        /// Name of the other case.
-        second: String,
-        /// Their speed, as text with its unit.
-        speed: String,
-        /// Words that add the parameters, if there are any.
-        parameters: &'static str,
-        /// Words that add a remedy, if there is one.
-        hint: &'static str,
-    },
-    /// Two cases differ in what a group must share.
-    #[error("cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group")]
-    Mixed {
-        /// Name of the one case.
-        first: String,
-        /// Name of the other case.
-        second: String,
-        /// What they differ in, such as kinds of speed.
-        what: &'static str,
-    },
-    /// A case lacks a parameter that another has.
-    #[error(
-        "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group"
-    )]
-    NoParameter {
-        /// Name of the parameter.
-        parameter: String,
-        /// Name of the case that has it.
-        with: String,
-        /// Name of the case that lacks it.
-        without: String,
-    },
-    /// A parameter is a number in one case and a category in another.
-    #[error(
-        "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
-    )]
-    MixedParameter {
-        /// Name of the parameter.
-        parameter: String,
-        /// Name of the case where it is a number.
-        number: String,
-        /// Name of the case where it is a category.
-        category: String,
-    },
-    /// The loading branch of a case is no envelope.
-    #[error("case \"{name}\": {source}")]
-    Envelope {
-        /// Name of the case.
-        name: String,
-        /// Why.
-        source: EnvelopeError,
-    },
-    /// Its states at the common interval are too few to load along.
-    #[error(
-        "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval"
-    )]
-    NoMotion {
-        /// Name of the case.
-        name: String,
-    },
-    /// The query does not give a parameter that the model has, or not so that it makes sense.
-    #[error("the model needs {parameter}{among}: give it with the query")]
-    Asked {
-        /// What must be given.
-        parameter: String,
-        /// The categories there are, or that a number is expected, in words.
-        among: String,
-    },
-}
-
 impl Feature {
     fn value(&self, parameter: &Parameter) -> Option<f64> {
         match (parameter, &self.category) {
@@ -188,11 +107,11 @@ impl Feature {
 /// The values of `features` for the parameters of a query.
 ///
 /// # Errors
-/// [`DatasetError::Asked`] names what is missing, or the categories there are.
+/// It names what is missing, or the categories there are.
 pub(crate) fn feature_values(
     features: &[Feature],
     parameters: &BTreeMap<String, Parameter>,
-) -> Result<Vec<f64>, DatasetError> {
+) -> Result<Vec<f64>, Error> {
     let asked = |feature: &Feature| {
         let known: Vec<&str> = features
             .iter()
@@ -203,7 +122,11 @@ pub(crate) fn feature_values(
             true => " as a finite number".into(),
             false => format!(", one of {}", known.join(", ")),
         };
-        DatasetError::Asked { parameter: feature.parameter.clone(), among }
+        error!(
+            Dataset,
+            "the model needs {parameter}{among}: give it with the query",
+            parameter = feature.parameter
+        )
     };
     let is_known = |feature: &Feature, parameter: &Parameter| match parameter {
         Parameter::Number(v) => feature.category.is_none() && v.is_finite(),
@@ -234,7 +157,7 @@ fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
 }
 
 /// The columns that tell the cases apart: parameters that all share are left out.
-fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
+fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
     let of: Vec<(&str, BTreeMap<String, Parameter>)> =
         cases.iter().map(|c| (c.name.as_str(), parameters(c))).collect();
     let names: BTreeSet<&String> = of.iter().flat_map(|(_, p)| p.keys()).collect();
@@ -244,7 +167,11 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
         let with = of.iter().find(|(_, p)| has(p)).map_or("", |(case, _)| *case);
         if let Some((without, _)) = of.iter().find(|(_, p)| !has(p)) {
             let (with, without) = (with.to_string(), without.to_string());
-            return Err(DatasetError::NoParameter { parameter: name.clone(), with, without });
+            return Err(error!(
+                Dataset,
+                "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group",
+                parameter = name
+            ));
         }
         let (mut number, mut category) = (None, None);
         let (mut values, mut categories) = (Vec::new(), BTreeSet::new());
@@ -261,11 +188,11 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, DatasetError> {
             }
         }
         if let (Some(number), Some(category)) = (number, category) {
-            return Err(DatasetError::MixedParameter {
-                parameter: name.clone(),
-                number: number.into(),
-                category: category.into(),
-            });
+            return Err(error!(
+                Dataset,
+                "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind",
+                parameter = name
+            ));
         }
         let parameter = name.clone();
         if values.windows(2).any(|w| w[0] != w[1]) {
@@ -286,7 +213,7 @@ type Runs<'a> = (Vec<f64>, Vec<&'a Case>);
 
 /// The cases, with those together that differ in nothing that a model could see: their speeds are
 /// within 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
-fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, DatasetError> {
+fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, Error> {
     let mut cases = cases.to_vec();
     cases.sort_by(|a, b| a.speed.m_per_s.total_cmp(&b.speed.m_per_s));
     let mut found: Vec<Runs<'a>> = Vec::new();
@@ -302,13 +229,13 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
                 let hint = ", or tell them apart by parameters = { … } in the manifest";
                 let alone = features.is_empty();
                 let (parameters, hint) = if alone { ("", hint) } else { (" and parameters", "") };
-                return Err(DatasetError::EqualSpeeds {
-                    first: runs[0].name.clone(),
-                    second: case.name.clone(),
-                    speed: km_per_h(case.speed.m_per_s),
-                    parameters,
-                    hint,
-                });
+                return Err(error!(
+                    Dataset,
+                    "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}",
+                    first = runs[0].name,
+                    second = case.name,
+                    speed = km_per_h(case.speed.m_per_s)
+                ));
             }
         }
     }
@@ -360,10 +287,8 @@ pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usiz
 /// Whether all cases have one kind of speed and of force.
 ///
 /// # Errors
-/// [`DatasetError::Mixed`] names two that differ.
-pub(crate) fn of_one_kind<'a>(
-    cases: impl IntoIterator<Item = &'a Case>,
-) -> Result<(), DatasetError> {
+/// It names two that differ.
+pub(crate) fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Result<(), Error> {
     let mut cases = cases.into_iter();
     let Some(first) = cases.next() else { return Ok(()) };
     for other in cases {
@@ -375,7 +300,10 @@ pub(crate) fn of_one_kind<'a>(
             continue;
         };
         let (first, second) = (first.name.clone(), other.name.clone());
-        return Err(DatasetError::Mixed { first, second, what });
+        return Err(error!(
+            Dataset,
+            "cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group"
+        ));
     }
     Ok(())
 }
@@ -384,13 +312,10 @@ impl TrainingSet {
     /// Checks the cases of a group.
     ///
     /// # Errors
-    /// [`DatasetError`] names the cases that do not fit together.
-    pub fn new<'a>(
-        group: &str,
-        cases: impl IntoIterator<Item = &'a Case>,
-    ) -> Result<Self, DatasetError> {
+    /// It names the cases that do not fit together.
+    pub fn new<'a>(group: &str, cases: impl IntoIterator<Item = &'a Case>) -> Result<Self, Error> {
         let mut cases: Vec<&Case> = cases.into_iter().collect();
-        let first = *cases.first().ok_or(DatasetError::Empty)?;
+        let first = *cases.first().ok_or(error!(Dataset, "the group is empty: build it first"))?;
         of_one_kind(cases.iter().copied())?;
         cases.sort_by(|a, b| a.name.cmp(&b.name));
         let features = features(&cases)?;
@@ -458,10 +383,18 @@ impl TrainingSet {
 
 impl TrainingCase {
     /// The mean of `runs`, of which there is one at least.
-    fn new(runs: &[&Case], features: Vec<f64>) -> Result<Self, DatasetError> {
-        let no_motion = || DatasetError::NoMotion { name: runs[0].name.clone() };
+    fn new(runs: &[&Case], features: Vec<f64>) -> Result<Self, Error> {
+        let no_motion = || {
+            error!(
+                Dataset,
+                "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval",
+                name = runs[0].name
+            )
+        };
         let case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
-        let named = |source| DatasetError::Envelope { name: case.name.clone(), source };
+        let named = |source| {
+            error!(Dataset, "case \"{name}\": {source}", name = case.name).caused_by(source)
+        };
         let motion = body_motion(&case).ok_or_else(no_motion)?;
         Ok(Self {
             name: case.name.clone(),

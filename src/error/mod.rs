@@ -6,6 +6,7 @@ use std::error::Error as StdError;
 use std::fmt;
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,8 +16,10 @@ pub use place::Place;
 pub(crate) use place::{Document, KeyPath};
 
 /// Why something could not be done: its text names what is wrong, where, and what to do.
+#[derive(Clone)]
 pub struct Error(Box<Inner>);
 
+#[derive(Clone)]
 struct Inner {
     code: ErrorCode,
     message: String,
@@ -25,7 +28,7 @@ struct Inner {
     place: Option<Place>,
     /// The text says itself where; the place only shows the line.
     names_place: bool,
-    source: Option<Box<dyn StdError + Send + Sync>>,
+    source: Option<Arc<dyn StdError + Send + Sync>>,
 }
 
 /// Makes an [`Error`] of a code and a formatted text; with `at KEY` it is about that key of a document.
@@ -56,7 +59,7 @@ impl Error {
         let (mut code, mut cause) = (code, Some(&source as &(dyn StdError + 'static)));
         while let Some(error) = cause {
             if let Some(error) = error.downcast_ref::<Self>() {
-                code = error.code();
+                code = if error.code() == ErrorCode::Other { code } else { error.code() };
             } else if error.is::<io::Error>() {
                 code = ErrorCode::Io;
             }
@@ -75,6 +78,11 @@ impl Error {
         self.0.place.as_ref()
     }
 
+    /// Whether it is about this key.
+    pub(crate) fn is_about(&self, keys: &str) -> bool {
+        self.0.key == KeyPath::of(keys)
+    }
+
     /// What is wrong, without the place.
     pub(crate) fn message(&self) -> &str {
         &self.0.message
@@ -82,7 +90,15 @@ impl Error {
 
     /// The causes, as the sources of this error.
     pub(crate) fn caused_by(mut self, source: impl StdError + Send + Sync + 'static) -> Self {
-        self.0.source = Some(Box::new(source));
+        self.0.source = Some(Arc::new(source));
+        self
+    }
+
+    /// Of this kind, whatever the room that found it took it for, unless a file cannot be read.
+    pub(crate) fn coded_as(mut self, code: ErrorCode) -> Self {
+        if self.0.code != ErrorCode::Io {
+            self.0.code = code;
+        }
         self
     }
 
@@ -151,6 +167,11 @@ impl Error {
         self
     }
 
+    /// As [`Error::placed`], for an error that is about a key.
+    pub(crate) fn placed_if_keyed(self, place: impl FnOnce(&KeyPath) -> Place) -> Self {
+        if self.0.key == KeyPath::default() { self } else { self.placed(place) }
+    }
+
     /// What an error says that was found without knowing the document: at the place of its key.
     pub(crate) fn placed(mut self, place: impl FnOnce(&KeyPath) -> Place) -> Self {
         if self.0.place.is_none() {
@@ -169,11 +190,31 @@ impl fmt::Display for Error {
     }
 }
 
+impl PartialEq for Error {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.code == other.0.code && self.to_string() == other.to_string()
+    }
+}
+
 impl fmt::Debug for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?}: {self}", self.0.code)
     }
 }
+
+/// Lets `?` pass errors of a room below on, with a code of their own.
+macro_rules! passes_on {
+    ($($error:ty => $code:ident),+ $(,)?) => {$(
+        impl From<$error> for $crate::error::Error {
+            fn from(error: $error) -> Self {
+                Self::below($crate::error::ErrorCode::$code, error)
+            }
+        }
+    )+};
+}
+pub(crate) use passes_on;
+
+passes_on!(io::Error => Io);
 
 impl StdError for Error {
     fn source(&self) -> Option<&(dyn StdError + 'static)> {

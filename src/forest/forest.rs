@@ -1,5 +1,6 @@
 //! The forest: trees grown in parallel, predictions as their mean.
 
+use crate::error::{Error, error};
 use std::cmp::Ordering;
 
 use linfa::Float;
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::grow::{Table, grow};
 use super::members::Members;
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
-use super::tree::{Tree, TreeError};
+use super::tree::Tree;
 use super::walk::{BATCH, Rows, Walk, groups};
 use crate::stream::Stream;
 
@@ -72,14 +73,14 @@ impl<F: Float> RegressionForest<F> {
     /// Checks a forest that was read from a file.
     ///
     /// # Errors
-    /// [`TreeError`] if a tree's arrays do not fit together.
-    pub fn check(&self) -> Result<(), TreeError> {
+    /// If a tree's arrays do not fit together.
+    pub fn check(&self) -> Result<(), Error> {
         if self.trees.is_empty() || self.features == 0 {
-            return Err(TreeError::Lengths);
+            return Err(error!(Other, "the node arrays differ in length or are empty"));
         }
         self.trees.iter().try_for_each(|tree| tree.check(self.features))?;
         if !self.importance.is_empty() && self.importance.len() != self.features {
-            return Err(TreeError::Importance);
+            return Err(error!(Other, "the shares of the features do not fit their number"));
         }
         self.members.as_ref().map_or(Ok(()), |members| members.check(&self.trees))
     }

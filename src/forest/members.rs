@@ -1,11 +1,12 @@
 //! The training samples of every leaf, and the weighted quantiles of their targets
 //! (Meinshausen, "Quantile Regression Forests", JMLR 7, 2006).
 
+use crate::error::{Error, error};
 use linfa::Float;
 use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
 
-use super::tree::{Tree, TreeError};
+use super::tree::Tree;
 
 /// The training samples of every leaf.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,7 +62,7 @@ impl<F: Float> Members<F> {
     }
 
     /// Checks members that were read from a file against the trees.
-    pub(crate) fn check(&self, trees: &[Tree<F>]) -> Result<(), TreeError> {
+    pub(crate) fn check(&self, trees: &[Tree<F>]) -> Result<(), Error> {
         let fits = |(leaves, tree): (&Leaves, &Tree<F>)| {
             leaves.first.len() == tree.nodes() + 1
                 && leaves.first[0] == 0
@@ -73,7 +74,11 @@ impl<F: Float> Members<F> {
         let whole = self.trees.len() == trees.len()
             && self.targets.iter().all(|t| t.is_finite())
             && self.trees.iter().zip(trees).all(fits);
-        if whole { Ok(()) } else { Err(TreeError::Members) }
+        if whole {
+            Ok(())
+        } else {
+            Err(error!(Other, "the samples of the leaves do not fit the trees"))
+        }
     }
 
     /// One quantile per level for one record.

@@ -1,5 +1,6 @@
 //! A forest as an ONNX model: one `TreeEnsembleRegressor` of `ai.onnx.ml`, opset 3.
 
+use crate::error::{Error, error};
 use std::iter::repeat_n;
 
 use super::forest::RegressionForest;
@@ -18,25 +19,6 @@ pub(crate) struct OnnxDescription<'a> {
     pub target: &'a str,
 }
 
-/// Why a forest cannot be an ONNX model.
-#[derive(Debug, thiserror::Error)]
-pub enum OnnxError {
-    /// There are not as many names as features.
-    #[error("{named} features are named, the forest was fitted to {fitted}")]
-    Names {
-        /// Number of names.
-        named: usize,
-        /// Number of features that the forest was fitted with.
-        fitted: usize,
-    },
-    /// The file would be larger than protobuf allows.
-    #[error("an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes")]
-    TooLarge {
-        /// Its size, in bytes.
-        bytes: usize,
-    },
-}
-
 /// Name of the model's input.
 const INPUT: &str = "records";
 
@@ -49,12 +31,16 @@ impl RegressionForest<f64> {
     /// other. NaN goes right, as here. Metadata `features` and `target` hold the names.
     ///
     /// # Errors
-    /// [`OnnxError`] if the names do not fit the features or the file would be too large.
-    pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, OnnxError> {
+    /// If the names do not fit the features or the file would be too large.
+    pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, Error> {
         let features = self.features();
         if description.features.len() != features {
             let named = description.features.len();
-            return Err(OnnxError::Names { named, fitted: features });
+            return Err(error!(
+                Export,
+                "{named} features are named, the forest was fitted to {fitted}",
+                fitted = features
+            ));
         }
         let columns = description.features.join(",");
         let rows = Message::default().text(2, "N");
@@ -85,7 +71,10 @@ impl RegressionForest<f64> {
             .message(14, &entry("target", description.target));
         let bytes = model.0.len();
         if bytes > i32::MAX as usize {
-            return Err(OnnxError::TooLarge { bytes });
+            return Err(error!(
+                Export,
+                "an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes"
+            ));
         }
         Ok(model.0)
     }

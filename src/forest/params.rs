@@ -49,6 +49,8 @@ pub enum FeaturesPerSplit {
     Count(usize),
 }
 
+crate::error::passes_on!(ForestError => Model);
+
 /// Why a forest cannot be fitted, or asked for quantiles.
 #[derive(Debug, thiserror::Error)]
 pub enum ForestError {

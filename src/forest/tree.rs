@@ -1,5 +1,6 @@
 //! One tree as flat node arrays.
 
+use crate::error::{Error, error};
 use linfa::Float;
 use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
@@ -20,42 +21,6 @@ pub struct Tree<F> {
     pub(super) right: Vec<u32>,
     /// Mean target of the node's training samples.
     pub(super) value: Vec<F>,
-}
-
-/// Why stored node arrays are no tree.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TreeError {
-    /// The node arrays differ in length, or are empty.
-    #[error("the node arrays differ in length or are empty")]
-    Lengths,
-    /// A node splits on a feature that is not there.
-    #[error("node {node} splits on feature {feature} of {features}")]
-    Feature {
-        /// The node, counted from 0.
-        node: usize,
-        /// The feature, counted from 0.
-        feature: i32,
-        /// Number of features.
-        features: usize,
-    },
-    /// The children of a node do not stand side by side after it.
-    #[error("node {node} has children that do not stand side by side after it")]
-    Child {
-        /// The node, counted from 0.
-        node: usize,
-    },
-    /// A threshold or value is infinite or no number.
-    #[error("node {node} holds a value that is not finite")]
-    NotFinite {
-        /// The node, counted from 0.
-        node: usize,
-    },
-    /// The members of the leaves do not fit the leaves.
-    #[error("the samples of the leaves do not fit the trees")]
-    Members,
-    /// The features' shares do not fit their number.
-    #[error("the shares of the features do not fit their number")]
-    Importance,
 }
 
 impl<F: Float> Tree<F> {
@@ -119,27 +84,30 @@ impl<F: Float> Tree<F> {
     /// Checks the invariant of stored arrays against the number of features.
     ///
     /// # Errors
-    /// [`TreeError`] names the first node that breaks it.
-    pub(crate) fn check(&self, features: usize) -> Result<(), TreeError> {
+    /// It names the first node that breaks it.
+    pub(crate) fn check(&self, features: usize) -> Result<(), Error> {
         let nodes = self.nodes();
         let lengths = [self.feature.len(), self.threshold.len(), self.left.len(), self.right.len()];
         if nodes == 0 || lengths.iter().any(|&l| l != nodes) {
-            return Err(TreeError::Lengths);
+            return Err(error!(Other, "the node arrays differ in length or are empty"));
         }
         for node in 0..nodes {
             if !(self.value[node].is_finite() && self.threshold[node].is_finite()) {
-                return Err(TreeError::NotFinite { node });
+                return Err(error!(Other, "node {node} holds a value that is not finite"));
             }
             let feature = self.feature[node];
             if feature == LEAF {
                 continue;
             }
             if feature < 0 || feature as usize >= features {
-                return Err(TreeError::Feature { node, feature, features });
+                return Err(error!(Other, "node {node} splits on feature {feature} of {features}"));
             }
             let (left, right) = (self.left[node] as usize, self.right[node] as usize);
             if left <= node || right != left + 1 || right >= nodes {
-                return Err(TreeError::Child { node });
+                return Err(error!(
+                    Other,
+                    "node {node} has children that do not stand side by side after it"
+                ));
             }
         }
         Ok(())

@@ -5,7 +5,8 @@
 
 use super::text::{Lines, nine_digits, title};
 use super::thin::for_splines;
-use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
+use super::{ExportCurve, Exported, Options, TargetUnloading};
+use crate::error::{Error, error};
 use crate::unit::{FORCE, LENGTH, UnitSystem};
 
 /// Numbers per line of a statement.
@@ -13,7 +14,7 @@ const PER_LINE: usize = 4;
 /// Columns of a comment.
 const COMMENT_WIDTH: usize = 200;
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     // mm and N, as of Adams' own default units (MMKS).
     let usual = UnitSystem { length_m: 1e-3, mass_kg: 1e3, time_s: 1.0 };
     let units = options.units.unwrap_or(usual);
@@ -48,7 +49,7 @@ struct Spline<'a> {
 }
 
 impl<'a> Spline<'a> {
-    fn of(curve: &'a ExportCurve, units: UnitSystem, id: u32) -> Result<Self, ExportError> {
+    fn of(curve: &'a ExportCurve, units: UnitSystem, id: u32) -> Result<Self, Error> {
         let loading = for_splines(&curve.loading)?;
         let guard = |share: f64| (-share * loading.end_m(), 0.0);
         let force = std::iter::once(0.0).chain(loading.force_n().iter().copied().skip(1));
@@ -110,7 +111,7 @@ impl<'a> Spline<'a> {
     }
 
     /// The units stand in it, with names of their own.
-    fn property_file(&self) -> Result<Vec<u8>, ExportError> {
+    fn property_file(&self) -> Result<Vec<u8>, Error> {
         let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
         let words = |(length, force): (&str, &str)| {
             let length = match length {
@@ -124,10 +125,7 @@ impl<'a> Spline<'a> {
             };
             Some((length.to_string(), force))
         };
-        let (length, force) = names.and_then(words).ok_or_else(|| ExportError::NoUnitNames {
-            lengths: LENGTH.known_units(),
-            forces: "N, kN".into(),
-        })?;
+        let (length, force) = names.and_then(words).ok_or_else(|| error!(Export, "columns need units with names of their own: lengths in {lengths}, forces in {forces}", forces = "N, kN", lengths = LENGTH.known_units()))?;
         let mut lines = Lines::default();
         self.comments(&mut lines, "$");
         lines.add(format_args!("[MDI_HEADER]"));

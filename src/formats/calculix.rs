@@ -5,9 +5,8 @@
 use super::lsdyna::InUnits;
 use super::text::{Lines, nine_digits};
 use super::thin::thinned;
-use super::{
-    ExportCurve, ExportError, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s,
-};
+use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s};
+use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
 /// Rows that CalculiX takes; one of them is that of tension.
@@ -15,10 +14,10 @@ const MOST_ROWS: usize = 200;
 /// Time steps of the deck per state.
 const STEPS: f64 = 10.0;
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
-        return Err(ExportError::Unfit { format: "calculix --deck", needs });
+        return Err(error!(Export, "{format} takes {needs}", format = "calculix --deck"));
     }
     let units = InUnits(options.units.unwrap_or(UnitSystem::SI));
     let mut lines = Lines::default();

@@ -1,14 +1,15 @@
 //! Curve as CSV: deflection and force under `#` header lines.
 
 use super::text::{Lines, nine_digits};
-use super::{ExportCurve, ExportError, Exported, Options};
+use super::{ExportCurve, Exported, Options};
+use crate::error::{Error, error};
 use crate::unit::{FORCE, LENGTH, UnitSystem};
 
-pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
     let units = options.units.unwrap_or(UnitSystem::SI);
     let (length, force) =
         LENGTH.name_of(units.length_m).zip(FORCE.name_of(units.force())).ok_or_else(|| {
-            ExportError::NoUnitNames { lengths: LENGTH.known_units(), forces: FORCE.known_units() }
+            error!(Export, "columns need units with names of their own: lengths in {lengths}, forces in {forces}", forces = FORCE.known_units(), lengths = LENGTH.known_units())
         })?;
     let mut lines = Lines::default();
     for (key, value) in curve.facts() {

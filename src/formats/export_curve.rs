@@ -1,13 +1,14 @@
 //! A curve made ready for another tool's file: one force, its unloading, its tail, what must be said of it.
 
+use super::Options;
 use super::tail::{Tail, with_tail};
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use super::{ExportError, Options};
 use crate::curve::{DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
+use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
-use crate::surrogate::predict::{Beyond, PredictError};
+use crate::surrogate::predict::Beyond;
 use crate::surrogate::{PredictedCurve, Warning};
 use crate::unit::{SpeedKind, km_per_h};
 
@@ -55,14 +56,14 @@ impl ExportCurve {
     /// Makes the curve of one force ready for a target.
     ///
     /// # Errors
-    /// [`ExportError::Predict`] if the curve does not have that force or is damaged,
-    /// [`ExportError::Curve`] if its tail makes no curve.
+    /// If the curve does not have that force or is damaged,
+    /// If its tail makes no curve.
     pub fn new(
         input: &ExportInput,
         force: ForceKind,
         tail: Tail,
         soften: bool,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, Error> {
         let predicted = input.curve.of_force(force)?;
         let mut loading = predicted.envelope()?;
         let end = loading.deflection_m().len() - 1;
@@ -76,7 +77,13 @@ impl ExportCurve {
                     softening = Some((own_peak_n, soft.peak_force_n()));
                     loading = soft;
                 }
-                Softened::Impossible => return Err(ExportError::NotSoftened { stiffness }),
+                Softened::Impossible => {
+                    return Err(error!(
+                        Export,
+                        "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
+                        stiffness / 1e6
+                    ));
+                }
             }
         }
         let beyond = input.beyond.as_ref().map(|beyond| match force {
@@ -124,8 +131,8 @@ impl ExportCurve {
     /// thousandth of the maximal crush, with the same energy.
     ///
     /// # Errors
-    /// [`ExportError::Curve`] if that makes no curve.
-    pub fn begun_at_origin(&self) -> Result<Self, ExportError> {
+    /// If that makes no curve.
+    pub fn begun_at_origin(&self) -> Result<Self, Error> {
         Ok(match from_origin(&self.loading, self.end)? {
             Some((loading, end)) => self.clone().through(loading, end),
             None => self.clone(),
@@ -372,19 +379,13 @@ pub(super) fn plain(c: char) -> char {
     if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }
 }
 
-impl From<PredictError> for ExportError {
-    fn from(error: PredictError) -> Self {
-        Self::Predict(Box::new(error))
-    }
-}
-
 impl Options {
     /// The curves made ready for a target whose own tail is `usual`.
     pub(super) fn ready(
         &self,
         inputs: &[ExportInput],
         usual: Tail,
-    ) -> Result<Vec<ExportCurve>, ExportError> {
+    ) -> Result<Vec<ExportCurve>, Error> {
         let tail = self.tail.unwrap_or(usual);
         let mut curves: Vec<ExportCurve> = Vec::new();
         for input in inputs {

@@ -2,16 +2,17 @@
 
 use super::fmu::{FmiVersion, Spring, archive, binaries};
 use super::thin::thinned;
-use super::{ExportCurve, ExportError, Exported, Options};
+use super::{ExportCurve, Exported, Options};
+use crate::error::{Error, error};
 
 /// Points that an FMU's binary has room for.
 const MOST_POINTS: usize = 4096;
 
-pub(crate) fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
     write(curve, options, FmiVersion::Fmi2, "fmi2")
 }
 
-pub(crate) fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
     write(curve, options, FmiVersion::Fmi3, "fmi3")
 }
 
@@ -20,9 +21,12 @@ fn write(
     options: &Options,
     version: FmiVersion,
     format: &'static str,
-) -> Result<Exported, ExportError> {
+) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)"
+        ));
     }
     let mut notes = Vec::new();
     let points = curve.deflection_m().len();

@@ -4,8 +4,9 @@
 //! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value a line.
 
 use super::text::nine_digits;
-use super::{ExportError, Exported, Options};
+use super::{Exported, Options};
 use crate::curve::{Case, ForceKind};
+use crate::error::{Error, error};
 use crate::unit::km_per_h;
 
 /// One quantity over time.
@@ -49,9 +50,13 @@ pub(crate) fn object(k: usize) -> Option<char> {
 }
 
 /// The channels of a case: deflection, closing speed, force.
-pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, ExportError> {
+pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format: "iso-mme" });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
+            format = "iso-mme"
+        ));
     }
     let sampled = &case.sampled;
     let channel = |code: &str, name: &str, unit, values: &[f64]| Channel {
@@ -92,18 +97,20 @@ pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Exp
 /// The interval of even times.
 ///
 /// # Errors
-/// [`ExportError::Unfit`] if the times are not even.
-pub(crate) fn interval_s(times: &[f64]) -> Result<f64, ExportError> {
+/// If the times are not even.
+pub(crate) fn interval_s(times: &[f64]) -> Result<f64, Error> {
     let steps = times.len().saturating_sub(1).max(1) as f64;
     let interval = (times[times.len() - 1] - times[0]) / steps;
     let uneven = |(i, t): (usize, &f64)| {
         (t - times[0] - i as f64 * interval).abs() > EVEN * interval.abs().max(f64::MIN_POSITIVE)
     };
     match times.iter().enumerate().find(|&(i, t)| uneven((i, t))) {
-        Some((i, t)) => Err(ExportError::Unfit {
-            format: "iso-mme",
-            needs: format!("histories at even times, sample {} is at {t} s", i + 1),
-        }),
+        Some((i, t)) => Err(error!(
+            Export,
+            "{format} takes {needs}",
+            format = "iso-mme",
+            needs = format!("histories at even times, sample {} is at {t} s", i + 1)
+        )),
         None => Ok(interval),
     }
 }
@@ -111,11 +118,11 @@ pub(crate) fn interval_s(times: &[f64]) -> Result<f64, ExportError> {
 /// The files of a test.
 ///
 /// # Errors
-/// [`ExportError::Unfit`] if there are more than 999 channels.
-pub(crate) fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, ExportError> {
+/// If there are more than 999 channels.
+pub(crate) fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, Error> {
     if channels.len() > 999 {
         let needs = format!("999 channels or fewer, found {}", channels.len());
-        return Err(ExportError::Unfit { format: "iso-mme", needs });
+        return Err(error!(Export, "{format} takes {needs}", format = "iso-mme"));
     }
     let name = test.name;
     let mut files = vec![

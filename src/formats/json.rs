@@ -1,13 +1,19 @@
 //! Predicted curve as JSON: the master format of exports.
 
 use super::export_curve::file_stem;
-use super::{ExportError, ExportInput, Exported, Options};
+use super::{ExportInput, Exported, Options};
+use crate::error::{Error, error};
 
-pub(crate) fn write(input: &ExportInput, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(input: &ExportInput, options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format: "json" });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
+            format = "json"
+        ));
     }
-    let mut bytes = serde_json::to_vec_pretty(&input.curve)?;
+    let mut bytes = serde_json::to_vec_pretty(&input.curve)
+        .map_err(|e| error!(Export, "cannot encode the curve: {e}").caused_by(e))?;
     bytes.push(b'\n');
     Ok(Exported::file(format!("{}.json", file_stem(&input.curve)), bytes))
 }

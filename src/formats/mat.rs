@@ -4,11 +4,16 @@
 //! little-endian doubles, rows, columns, 0 for no imaginary part, length of the name with its NUL), the
 //! name, the doubles column by column.
 
-use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
+use super::{ExportCurve, Exported, Options, TargetUnloading};
+use crate::error::{Error, error};
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format: "mat" });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
+            format = "mat"
+        ));
     }
     let mut bytes = Vec::new();
     let mut notes = Vec::new();

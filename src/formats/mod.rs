@@ -23,28 +23,23 @@ mod tail;
 mod text;
 mod thin;
 
+use crate::error::{Error, error};
 use crate::guess;
 use std::path::Path;
 
-use crate::curve::{Case, EnvelopeError, ForceKind};
-use crate::forest::OnnxError;
-use crate::surrogate::predict::PredictError;
+use crate::curve::{Case, ForceKind};
 use crate::surrogate::{Model, Query};
 use crate::unit::UnitSystem;
 
 pub use export_curve::ExportCurve;
 pub use export_curve::ExportInput;
 pub use export_curve::TargetUnloading;
-pub use fmu::FmuError;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::Reader;
 pub use read::curve::Facts;
 pub use read::curve::ReadFile;
-pub use read::error::ContentError;
 pub use read::error::Place;
-pub use read::error::ReadCurveError;
-pub use read::json::CurveFileError;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};
 pub use tail::Tail;
 
@@ -64,15 +59,15 @@ pub struct Format {
 /// What a target is made of.
 enum Writer {
     /// Curves, each with a file of its own.
-    Each(fn(&ExportCurve, &Options) -> Result<Exported, ExportError>),
+    Each(fn(&ExportCurve, &Options) -> Result<Exported, Error>),
     /// Any number of curves in one file.
-    Together(fn(&[ExportCurve], &Options) -> Result<Exported, ExportError>),
+    Together(fn(&[ExportCurve], &Options) -> Result<Exported, Error>),
     /// A predicted or recorded curve with both forces.
-    Whole(fn(&ExportInput, &Options) -> Result<Exported, ExportError>),
+    Whole(fn(&ExportInput, &Options) -> Result<Exported, Error>),
     /// A model.
-    Model(fn(&Model, &Options) -> Result<Exported, ExportError>),
+    Model(fn(&Model, &Options) -> Result<Exported, Error>),
     /// A recorded case with its histories.
-    Case(fn(&Case, &Options) -> Result<Exported, ExportError>),
+    Case(fn(&Case, &Options) -> Result<Exported, Error>),
 }
 
 /// Every format we write. To add one: write its module, add its line here.
@@ -234,82 +229,6 @@ impl Exported {
     }
 }
 
-/// Why a curve or a model cannot be exported.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// No format has that name.
-    #[error("there is no export format \"{name}\": use one of {known}{}", guess::hint(name, known))]
-    NoSuchFormat {
-        /// What was asked for.
-        name: String,
-        /// What there is.
-        known: String,
-    },
-    /// No format has that extension.
-    #[error(
-        "{path}: the extension does not name an export format: use one of {known}, or name the format"
-    )]
-    NoSuchExtension {
-        /// The file.
-        path: String,
-        /// What there is.
-        known: String,
-    },
-    /// The target takes something else.
-    #[error("{format} takes {needs}")]
-    Unfit {
-        /// The target.
-        format: &'static str,
-        /// What it takes.
-        needs: String,
-    },
-    /// The column names of a CSV file name their units.
-    #[error("columns need units with names of their own: lengths in {lengths}, forces in {forces}")]
-    NoUnitNames {
-        /// Lengths that have names.
-        lengths: String,
-        /// Forces that have names.
-        forces: String,
-    },
-    /// The target has no units.
-    #[error(
-        "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)"
-    )]
-    SiOnly {
-        /// The target.
-        format: &'static str,
-    },
-    /// The curve lacks the force, or is damaged.
-    #[error(transparent)]
-    Predict(Box<PredictError>),
-    /// Softening would change more than the flanks.
-    #[error(
-        "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften", stiffness / 1e6
-    )]
-    NotSoftened {
-        /// The unloading stiffness, in N/m.
-        stiffness: f64,
-    },
-    /// What was made of the curve is none.
-    #[error("the curve cannot be prepared: {0}")]
-    Curve(#[from] EnvelopeError),
-    /// The FMU cannot be made.
-    #[error(transparent)]
-    Fmu(#[from] fmu::FmuError),
-    /// The forest has no ONNX form.
-    #[error(transparent)]
-    Onnx(#[from] OnnxError),
-    /// HDF5 cannot hold it.
-    #[error("cannot encode the table: {detail}")]
-    Hdf5 {
-        /// What is wrong, in the words of the library.
-        detail: String,
-    },
-    /// JSON cannot hold it.
-    #[error("cannot encode the curve: {0}")]
-    Encode(#[from] serde_json::Error),
-}
-
 /// Most bytes of a file that holds a curve: a predicted one has some ten thousand.
 pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 
@@ -364,8 +283,8 @@ impl Format {
     /// The files of a model.
     ///
     /// # Errors
-    /// [`ExportError::Unfit`] if the target cannot take the model.
-    pub fn export_model(&self, model: &Model, options: &Options) -> Result<Exported, ExportError> {
+    /// If the target cannot take the model.
+    pub fn export_model(&self, model: &Model, options: &Options) -> Result<Exported, Error> {
         match self.writer {
             Writer::Model(write) => write(model, options),
             _ => Err(self.unfit("a curve: name its speed with --speed")),
@@ -375,12 +294,12 @@ impl Format {
     /// The files of recorded cases, one set for each.
     ///
     /// # Errors
-    /// [`ExportError::Unfit`] if the target does not take cases.
+    /// If the target does not take cases.
     pub(crate) fn export_cases(
         &self,
         cases: &[Case],
         options: &Options,
-    ) -> Result<Exported, ExportError> {
+    ) -> Result<Exported, Error> {
         let Writer::Case(write) = self.writer else {
             return Err(self.unfit("curves: it has no histories"));
         };
@@ -399,12 +318,8 @@ impl Format {
     /// The files of curves: of the force that the options name, or of both where one file holds both.
     ///
     /// # Errors
-    /// [`ExportError`] if the target cannot take them.
-    pub fn export(
-        &self,
-        inputs: &[ExportInput],
-        options: &Options,
-    ) -> Result<Exported, ExportError> {
+    /// If the target cannot take them.
+    pub fn export(&self, inputs: &[ExportInput], options: &Options) -> Result<Exported, Error> {
         for input in inputs {
             let points = input.curve.deflection_m.len();
             if points < MIN_POINTS {
@@ -450,8 +365,8 @@ impl Format {
         exported
     }
 
-    fn unfit(&self, needs: impl Into<String>) -> ExportError {
-        ExportError::Unfit { format: self.name, needs: needs.into() }
+    fn unfit(&self, needs: impl std::fmt::Display) -> Error {
+        error!(Export, "{format} takes {needs}", format = self.name)
     }
 }
 
@@ -491,15 +406,18 @@ fn with_names_of_their_own(mut exported: Exported) -> Exported {
 /// The format of that name.
 ///
 /// # Errors
-/// [`ExportError::NoSuchFormat`] lists the names there are.
-pub fn by_name(name: &str) -> Result<&'static Format, ExportError> {
+/// It lists the names there are.
+pub fn by_name(name: &str) -> Result<&'static Format, Error> {
     // "--to spr" names one of the kinds of file of a format.
     let by_kind = || FORMATS.iter().find(|f| f.extensions.contains(&name));
-    FORMATS
-        .iter()
-        .find(|f| f.name == name)
-        .or_else(by_kind)
-        .ok_or_else(|| ExportError::NoSuchFormat { name: name.into(), known: names() })
+    FORMATS.iter().find(|f| f.name == name).or_else(by_kind).ok_or_else(|| {
+        let known = names();
+        error!(
+            Export,
+            "there is no export format \"{name}\": use one of {known}{}",
+            guess::hint(name, &known)
+        )
+    })
 }
 
 /// The names of all formats, for messages.
@@ -510,8 +428,8 @@ pub(crate) fn names() -> String {
 /// The format that the file's extension names.
 ///
 /// # Errors
-/// [`ExportError::NoSuchExtension`] lists the extensions there are.
-pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, ExportError> {
+/// It lists the extensions there are.
+pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let known = || {
         let all: Vec<String> =
@@ -519,6 +437,6 @@ pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, ExportError> 
         all.join(", ")
     };
     FORMATS.iter().find(|f| f.extensions.contains(&extension)).ok_or_else(|| {
-        ExportError::NoSuchExtension { path: path.display().to_string(), known: known() }
+        error!(Export, "{path}: the extension does not name an export format: use one of {known}, or name the format", known = known(), path = path.display())
     })
 }

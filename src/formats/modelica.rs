@@ -4,12 +4,13 @@
 //! line, its tables are constants of the package. Memory: the largest deflection is a discrete variable that moves while
 //! the deflection falls (`when v < 0`); on the way up the force is that of the loading branch.
 
+use crate::error::{Error, error};
 use std::fmt::Write;
 
 use super::export_curve::identifier;
 use super::text::{Lines, nine_digits, title};
 use super::thin::thinned;
-use super::{ExportCurve, ExportError, Exported, Options, Tail, TargetUnloading};
+use super::{ExportCurve, Exported, Options, Tail, TargetUnloading};
 
 /// Columns of a comment.
 const COMMENT_WIDTH: usize = 200;
@@ -22,9 +23,13 @@ const KEYWORDS: &str = "algorithm and block class connect connector constant dis
 /// Numbers per line of an array.
 const PER_LINE: usize = 6;
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format: "modelica" });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
+            format = "modelica"
+        ));
     }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
     if options.extension.as_deref() == Some("txt") {

@@ -1,15 +1,16 @@
 //! ONNX: a forest model for other programs' runtimes.
 
-use super::{ExportError, Exported, Options};
+use super::{Exported, Options};
+use crate::error::{Error, error};
 use crate::forest::OnnxDescription;
 use crate::surrogate::Model;
 
 /// The model's forest: speed and deflection to force, in SI.
-pub(crate) fn write(model: &Model, _options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(model: &Model, _options: &Options) -> Result<Exported, Error> {
     let Some(forest) = model.forest() else {
         let needs =
             format!("models of --model forest or extra, this is of --model {}", model.name());
-        return Err(ExportError::Unfit { format: "onnx", needs });
+        return Err(error!(Export, "{format} takes {needs}", format = "onnx"));
     };
     let (low, high) = model.range_m_per_s();
     let text = format!(

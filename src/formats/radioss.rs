@@ -7,7 +7,8 @@
 
 use super::lsdyna::InUnits;
 use super::text::{Lines, nine_digits, title};
-use super::{ExportCurve, ExportError, Exported, NUMBER_OF_STATES, Options, run_time_s};
+use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, run_time_s};
+use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
 /// Columns of a title.
@@ -15,10 +16,10 @@ const TITLE_WIDTH: usize = 100;
 /// Uncoupled hardening.
 const HARDENING: u32 = 2;
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
-        return Err(ExportError::Unfit { format: "radioss --deck", needs });
+        return Err(error!(Export, "{format} takes {needs}", format = "radioss --deck"));
     }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
     // It names the run, too.

@@ -4,8 +4,9 @@
 
 use super::tail::Tail;
 use super::text::{Lines, nine_digits};
-use super::{ExportCurve, ExportError, ExportInput, Exported, Options};
+use super::{ExportCurve, ExportInput, Exported, Options};
 use crate::curve::{Envelope, ForceKind};
+use crate::error::{Error, error};
 use crate::hdf5::{AttrValue, FileBuilder};
 use crate::surrogate::predict::predict_beyond;
 use crate::surrogate::{Model, Query};
@@ -37,9 +38,13 @@ struct Table {
     notes: Vec<String>,
 }
 
-pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
-        return Err(ExportError::SiOnly { format: "table" });
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
+            format = "table"
+        ));
     }
     let table = Table::of(model, options)?;
     let is_csv = options.extension.as_deref() == Some("csv");
@@ -53,7 +58,7 @@ pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, Export
 }
 
 impl Table {
-    fn of(model: &Model, options: &Options) -> Result<Self, ExportError> {
+    fn of(model: &Model, options: &Options) -> Result<Self, Error> {
         let (low, high) = model.range_m_per_s();
         let even = |k: usize| low + (high - low) * k as f64 / (SPEEDS - 1) as f64;
         let mut speed_m_per_s = options.speeds_m_per_s.clone();
@@ -67,7 +72,7 @@ impl Table {
         let tail = match options.tail {
             Some(Tail::None) => {
                 let needs = "a tail: its curves end at different crushes (--tail hold or bottom)";
-                return Err(ExportError::Unfit { format: "table", needs: needs.into() });
+                return Err(error!(Export, "{format} takes {needs}", format = "table"));
             }
             asked => asked.unwrap_or(Tail::Hold),
         };
@@ -141,7 +146,7 @@ impl Table {
         lines.into_bytes()
     }
 
-    fn to_hdf5(&self, model: &Model, force: ForceKind) -> Result<Vec<u8>, ExportError> {
+    fn to_hdf5(&self, model: &Model, force: ForceKind) -> Result<Vec<u8>, Error> {
         let mut out = FileBuilder::new();
         out.set_attr("format", AttrValue::VarLenString(FORMAT.into()));
         for (key, value) in self.facts(model, force) {
@@ -160,16 +165,13 @@ impl Table {
         ] {
             out.create_dataset(name).with_f64_data(values);
         }
-        out.finish().map_err(|e| ExportError::Hdf5 { detail: e.to_string() })
+        out.finish().map_err(|e| error!(Export, "cannot encode the table: {detail}", detail = e))
     }
 }
 
 /// The forces of a curve at these deflections, with its own energy to its maximal crush, and the edges of its
 /// band, which go with them.
-fn rows(
-    curve: &ExportCurve,
-    deflection_m: &[f64],
-) -> Result<(Vec<f64>, [Vec<f64>; 2]), ExportError> {
+fn rows(curve: &ExportCurve, deflection_m: &[f64]) -> Result<(Vec<f64>, [Vec<f64>; 2]), Error> {
     let at = |curve: &Envelope| deflection_m.iter().map(|&d| curve.force_at(d)).collect::<Vec<_>>();
     let (end_m, force_n) = (curve.max_crush_m(), at(&curve.loading));
     let sampled = Envelope::new(deflection_m.to_vec(), force_n.clone())?;
@@ -183,7 +185,7 @@ fn rows(
     };
     let edge = |edge_n: &[f64]| {
         let edge = Envelope::new(curve.deflection_m().to_vec(), edge_n.to_vec())?;
-        Ok::<_, ExportError>(scaled(at(&edge)))
+        Ok::<_, Error>(scaled(at(&edge)))
     };
     let edges = match &curve.band {
         Some((low_n, high_n)) => [edge(low_n)?, edge(high_n)?],

@@ -10,7 +10,8 @@
 //! 3. From there the force rises with the unloading stiffness (a steeper rise would change how tools unload that take the
 //!    steepest rise for it) to three times the curve's largest force.
 
-use crate::curve::{Envelope, EnvelopeError};
+use crate::curve::Envelope;
+use crate::error::Error;
 
 /// How a curve goes on beyond its maximal crush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,13 +40,13 @@ const LAST: f64 = 0.1;
 /// stays one.
 ///
 /// # Errors
-/// [`EnvelopeError`] if forces or deflections are beyond a double.
+/// If forces or deflections are beyond a double.
 pub(crate) fn with_tail(
     curve: &Envelope,
     beyond: Option<&Envelope>,
     stiffness_n_per_m: f64,
     tail: Tail,
-) -> Result<Envelope, EnvelopeError> {
+) -> Result<Envelope, Error> {
     if tail == Tail::None {
         return Ok(curve.clone());
     }

@@ -1,9 +1,10 @@
 //! Fewer points for tools with small tables, more for tools that interpolate by splines.
 
+use crate::error::Error;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::curve::{Envelope, EnvelopeError};
+use crate::curve::Envelope;
 
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
 /// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
@@ -12,12 +13,8 @@ use crate::curve::{Envelope, EnvelopeError};
 /// to it are scaled so that the energy to it is the same. A curve of so few points stays as it is.
 ///
 /// # Errors
-/// [`EnvelopeError`] if the result is no envelope.
-pub(crate) fn thinned(
-    curve: &Envelope,
-    most: usize,
-    kept: usize,
-) -> Result<Envelope, EnvelopeError> {
+/// If the result is no envelope.
+pub(crate) fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     if d.len() <= most.max(3) {
         return Ok(curve.clone());
@@ -120,8 +117,8 @@ const KINK: f64 = 0.02;
 /// energy: at least 200, and one close to each side of a kink, where a spline would overshoot.
 ///
 /// # Errors
-/// [`EnvelopeError`] if the result is no envelope.
-pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, EnvelopeError> {
+/// If the result is no envelope.
+pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let widest_m = curve.end_m() / FEWEST as f64;
     let slope = |i: usize| (f[i + 1] - f[i]) / (d[i + 1] - d[i]);
@@ -226,11 +223,11 @@ const MOST_RAISED: f64 = 1.25;
 /// curve that begins at the origin already.
 ///
 /// # Errors
-/// [`EnvelopeError`] if the result is no envelope.
+/// If the result is no envelope.
 pub(crate) fn from_origin(
     curve: &Envelope,
     end: usize,
-) -> Result<Option<(Envelope, usize)>, EnvelopeError> {
+) -> Result<Option<(Envelope, usize)>, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     if f[0] <= 0.0 {
         return Ok(None);

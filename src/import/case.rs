@@ -1,11 +1,12 @@
 //! From a file to its case: read, said, made, and traced.
 
+use crate::error::{Error, ErrorCode, error};
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::said::Said;
-use super::{ImportError, Item, Settings};
+use super::{Item, Settings};
 use crate::curve::from_table::{FromTable, IMPORTED, Impact, Table, from_table};
 use crate::curve::recipe::{Filter, Sampling};
 use crate::curve::{Case, ForceKind, Parameter, SourceFile};
@@ -14,11 +15,7 @@ use crate::formats::read::{self, ReadCurve};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// The case of one file.
-pub(super) fn of(
-    item: &Item,
-    settings: &Settings,
-    group: Option<&Case>,
-) -> Result<Case, ImportError> {
+pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Error> {
     check_name(item, "group", &settings.group)?;
     let (curve, reader) = read::read(&item.path, &settings.read)?;
     let name = case_name(item)?;
@@ -44,7 +41,7 @@ pub(super) fn of(
         body_force_n: curve.body_force_n.as_deref(),
     };
     let made = from_table(&table, &impact)
-        .map_err(|source| ImportError::Table { path: item.path.clone(), source })?;
+        .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
     let recipe = recipe(item, settings, &curve, reader.name, &said);
     Ok(assembled(name, settings, &curve, reader.name, said, made, recipe))
 }
@@ -172,7 +169,7 @@ fn recipe(
 }
 
 /// The name that was given, else the file's without its extension.
-fn case_name(item: &Item) -> Result<String, ImportError> {
+fn case_name(item: &Item) -> Result<String, Error> {
     if let Some(name) = &item.case {
         return Ok(name.clone());
     }
@@ -181,19 +178,22 @@ fn case_name(item: &Item) -> Result<String, ImportError> {
         false => item.path.file_stem(),
     };
     let name = stem.map(|stem| stem.to_string_lossy().into_owned());
-    name.ok_or_else(|| ImportError::Name {
-        path: item.path.clone(),
-        what: "case",
-        name: String::new(),
-        why: "give one with --case",
+    name.ok_or_else(|| {
+        error!(
+            Import,
+            "{}: \"\" cannot be the name of a case: give one with --case",
+            item.path.display()
+        )
     })
 }
 
-fn check_name(item: &Item, what: &'static str, name: &str) -> Result<(), ImportError> {
-    names::check(name).map_err(|why| ImportError::Name {
-        path: item.path.clone(),
-        what,
-        name: names::shown(name),
-        why,
+fn check_name(item: &Item, what: &'static str, name: &str) -> Result<(), Error> {
+    names::check(name).map_err(|why| {
+        error!(
+            Import,
+            "{path}: \"{name}\" cannot be the name of a {what}: {why}",
+            name = name.escape_debug(),
+            path = item.path.display()
+        )
     })
 }

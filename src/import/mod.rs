@@ -4,9 +4,9 @@
 //! meanwhile, and written whole.
 
 mod case;
-mod error;
 mod said;
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,6 @@ use crate::database::Database;
 use crate::file::WriterLock;
 use crate::formats::read::ReadOptions;
 use crate::unit::SpeedKind;
-pub(crate) use error::ImportError;
 
 /// One file that is to become a case, and what is said of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,12 +56,8 @@ pub(crate) struct Settings {
 /// their cases in the order of the items.
 ///
 /// # Errors
-/// [`ImportError`] names the file and what to do; the database is then unchanged.
-pub(crate) fn add(
-    path: &Path,
-    items: &[Item],
-    settings: &Settings,
-) -> Result<Vec<Case>, ImportError> {
+/// It names the file and what to do; the database is then unchanged.
+pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
     let mut database = match path.try_exists().unwrap_or(true) {
         true => Database::read(path)?,
@@ -75,7 +70,13 @@ pub(crate) fn add(
         case.built_utc = Some(now.clone());
         if let Some(k) = cases.iter().position(|c| c.name == case.name) {
             let (first, second) = (items[k].path.clone(), item.path.clone());
-            return Err(ImportError::SameName { first, second, name: case.name });
+            return Err(error!(
+                Import,
+                "{first} and {second} would both be case \"{name}\": name them with --case",
+                first = first.display(),
+                name = case.name,
+                second = second.display()
+            ));
         }
         check_place(&database, item, &case, settings.replace)?;
         if let Some(first) = cases.first() {
@@ -95,8 +96,8 @@ pub(crate) fn add(
 /// The case that the curve of one file makes, without a database.
 ///
 /// # Errors
-/// [`ImportError`] names the file and what to do.
-pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, ImportError> {
+/// It names the file and what to do.
+pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Error> {
     case::of(item, settings, None)
 }
 
@@ -106,18 +107,24 @@ fn there<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
 }
 
 /// Whether the case may take its place in the database.
-fn check_place(
-    database: &Database,
-    item: &Item,
-    case: &Case,
-    replace: bool,
-) -> Result<(), ImportError> {
+fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> Result<(), Error> {
     let (path, group, name) = (item.path.clone(), case.group.clone(), case.name.clone());
     match there(database, case) {
         Some(other) if other.study != IMPORTED => {
-            return Err(ImportError::OfStudy { path, group, name, study: other.study.clone() });
+            return Err(error!(
+                Import,
+                "{path}: case \"{name}\" of group \"{group}\" is of the study \"{study}\", which builds it: give another name with --case",
+                path = path.display(),
+                study = other.study
+            ));
         }
-        Some(_) if !replace => return Err(ImportError::Taken { path, group, name }),
+        Some(_) if !replace => {
+            return Err(error!(
+                Import,
+                "{path}: group \"{group}\" has a case \"{name}\" already: replace it with --replace, or give another name with --case",
+                path = path.display()
+            ));
+        }
         _ => {}
     }
     // A case that is replaced binds nobody.
@@ -128,19 +135,18 @@ fn check_place(
 }
 
 /// Whether two cases of a group are of one kind.
-fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), ImportError> {
+fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), Error> {
     let kinds = [
         ("speed", case.speed.kind.name(), other.speed.kind.name()),
         ("force", case.force_kind.name(), other.force_kind.name()),
     ];
     match kinds.into_iter().find(|(_, found, there)| found != there) {
         None => Ok(()),
-        Some((what, found, there)) => Err(ImportError::OtherKind {
-            path: item.path.clone(),
-            what,
-            found,
-            there,
-            group: case.group.clone(),
-        }),
+        Some((what, found, there)) => Err(error!(
+            Import,
+            "{path}: this curve has a {found} {what}, the cases of group \"{group}\" have a {there} one: no model can be trained on both; give another --group",
+            group = case.group,
+            path = item.path.display()
+        )),
     }
 }

@@ -1,7 +1,8 @@
 //! What is said beside a file and what the file says, put together.
 
-use super::{ImportError, Item, Settings};
+use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
+use crate::error::{Error, error};
 use crate::formats::read::{Facts, ReadCurve};
 use crate::unit::{Speed, SpeedKind, km_per_h};
 
@@ -22,7 +23,7 @@ impl Said {
         settings: &Settings,
         curve: &ReadCurve,
         group: Option<&Case>,
-    ) -> Result<Self, ImportError> {
+    ) -> Result<Self, Error> {
         let mut both =
             Both { item, settings, facts: &curve.facts, notes: Vec::new(), warnings: Vec::new() };
         let kind = both.kind(group)?;
@@ -48,8 +49,12 @@ struct Both<'a> {
 }
 
 impl Both<'_> {
-    fn missing(&self, what: &'static str, option: &'static str) -> ImportError {
-        ImportError::Missing { path: self.item.path.clone(), what, option }
+    fn missing(&self, what: &'static str, option: &'static str) -> Error {
+        error!(
+            Usage,
+            "{path}: the file does not say {what}: give {option}",
+            path = self.item.path.display()
+        )
     }
 
     /// The stated value, else the file's, above 0.
@@ -58,7 +63,7 @@ impl Both<'_> {
         what: &'static str,
         (stated, found): (Option<f64>, Option<f64>),
         shown: fn(f64) -> String,
-    ) -> Result<Option<f64>, ImportError> {
+    ) -> Result<Option<f64>, Error> {
         if let (Some(stated), Some(found)) = (stated, found)
             && (stated / found - 1.0).abs() > SAME
         {
@@ -67,14 +72,16 @@ impl Both<'_> {
         }
         let value = stated.or(found);
         match value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-            Some(value) => {
-                Err(ImportError::NotPositive { path: self.item.path.clone(), what, value })
-            }
+            Some(value) => Err(error!(
+                Import,
+                "{path}: its {what} is {value}: expected more than 0",
+                path = self.item.path.display()
+            )),
             None => Ok(value),
         }
     }
 
-    fn kind(&mut self, group: Option<&Case>) -> Result<SpeedKind, ImportError> {
+    fn kind(&mut self, group: Option<&Case>) -> Result<SpeedKind, Error> {
         if let (Some(stated), Some(found)) = (self.settings.kind, self.facts.speed_kind)
             && stated != found
         {
@@ -94,13 +101,13 @@ impl Both<'_> {
         }
     }
 
-    fn speed(&mut self) -> Result<f64, ImportError> {
+    fn speed(&mut self) -> Result<f64, Error> {
         let both = (self.item.speed_m_per_s, self.facts.speed_m_per_s);
         let speed = self.either("speed", both, km_per_h)?;
         speed.ok_or_else(|| self.missing("its speed", "--speed, such as --speed 36km/h"))
     }
 
-    fn masses(&mut self, kind: SpeedKind) -> Result<Masses, ImportError> {
+    fn masses(&mut self, kind: SpeedKind) -> Result<Masses, Error> {
         let tonnes = |kg: f64| format!("{} t", kg / 1e3);
         let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), tonnes)?;
         let others = (self.settings.other_mass_kg, self.facts.other_mass_kg);
@@ -109,7 +116,11 @@ impl Both<'_> {
             mass.ok_or_else(|| self.missing("the mass of the body", "--mass, such as --mass 24t"))?;
         let other_kg = match (kind, other) {
             (SpeedKind::Wall, _) if self.settings.other_mass_kg.is_some() => {
-                return Err(ImportError::MassOfWall { path: self.item.path.clone() });
+                return Err(error!(
+                    Usage,
+                    "{path}: a wall has no mass: remove --other-mass, or say --kind closing",
+                    path = self.item.path.display()
+                ));
             }
             (SpeedKind::Wall, _) => None,
             (SpeedKind::Closing, Some(other)) => Some(other),
@@ -122,18 +133,22 @@ impl Both<'_> {
     }
 
     /// Says where the stated unloading stiffness is not the file's; which is used is decided elsewhere.
-    fn unloading(&mut self) -> Result<(), ImportError> {
+    fn unloading(&mut self) -> Result<(), Error> {
         let stated = self.settings.unloading_stiffness_n_per_m;
         let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
         let shown = |k: f64| format!("{:.4} MN/m", k / 1e6);
         self.either("unloading stiffness", both, shown).map(|_| ())
     }
 
-    fn force(&mut self) -> Result<ForceKind, ImportError> {
+    fn force(&mut self) -> Result<ForceKind, Error> {
         match (self.facts.force, self.settings.read.force) {
-            (Some(found), Some(asked)) if found != asked => {
-                Err(ImportError::OtherForce { path: self.item.path.clone(), found, asked })
-            }
+            (Some(found), Some(asked)) if found != asked => Err(error!(
+                Usage,
+                "{path}: the file holds the {} force, not the {}: remove --force",
+                found.name(),
+                asked.name(),
+                path = self.item.path.display()
+            )),
             (Some(force), _) | (None, Some(force)) => Ok(force),
             (None, None) => {
                 self.notes

@@ -1,16 +1,16 @@
 //! The folders of a proposal: which hold runs, how they are called, where they are seen from the
 //! study.
 
-use std::collections::{BTreeMap, HashSet};
-use std::fs;
-use std::path::{Component, Path, PathBuf};
-
-use super::error::InitError;
+use super::error::listed;
 use super::left_out::{LeftOut, Reason};
+use crate::error::{Error, error};
 use crate::guess;
 use crate::solver::decks::{self, Search};
 use crate::solver::runs::{renamed_file, run_folders};
 use crate::study::files::shown_name;
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
 
 /// Folders of runs, and those that are none.
 pub(super) struct Folders {
@@ -20,14 +20,23 @@ pub(super) struct Folders {
 
 impl Folders {
     /// All at or below the given ones, each once.
-    pub(super) fn find(given: &[PathBuf]) -> Result<Self, InitError> {
+    pub(super) fn find(given: &[PathBuf]) -> Result<Self, Error> {
         let mut found = Self { runs: Vec::new(), left_out: Vec::new() };
         let mut seen = HashSet::new();
         let mut is_new = |path: &PathBuf| seen.insert(real(path));
         for root in given {
             let below = run_folders(root).map_err(|source| {
                 let guess = is_there_instead(root).filter(|_| !root.exists());
-                InitError::Folder { path: root.clone(), source, guess }
+                error!(
+                    Study,
+                    "{path}: {source}{}",
+                    guess.as_ref().map_or(String::new(), |guess| format!(
+                        "; did you mean {}?",
+                        guess.display()
+                    )),
+                    path = root.display()
+                )
+                .caused_by(source)
             })?;
             let shown = |path: PathBuf| match path.strip_prefix(".") {
                 Ok(below) if !below.as_os_str().is_empty() => below.to_path_buf(),
@@ -47,13 +56,21 @@ impl Folders {
         if found.runs.is_empty() {
             let searched: Vec<String> = given.iter().map(|p| p.display().to_string()).collect();
             let searched = searched.join(", ");
-            return Err(InitError::NoRuns { searched, left_out: found.left_out });
+            return Err(error!(
+                Study,
+                "no folder in {searched} holds solver files (nodout, rwforc, rcforc, binout, …T01): give the runs' folders, or one above them{}",
+                if found.left_out.is_empty() {
+                    String::new()
+                } else {
+                    format!("\n{}", listed(&found.left_out))
+                }
+            ));
         }
         Ok(found)
     }
 
     /// Refuses folders that hold several runs each: they are groups of their own.
-    pub(super) fn refuse_groups(&self) -> Result<(), InitError> {
+    pub(super) fn refuse_groups(&self) -> Result<(), Error> {
         let mut groups: BTreeMap<PathBuf, usize> = BTreeMap::new();
         for run in &self.runs {
             let parent = run.parent().filter(|p| !p.as_os_str().is_empty());
@@ -62,7 +79,17 @@ impl Folders {
         groups.retain(|_, runs| *runs > 1);
         match groups.len() {
             0 | 1 => Ok(()),
-            _ => Err(InitError::SeveralGroups { folders: groups.into_iter().collect() }),
+            _ => Err(error!(
+                Study,
+                "the runs stand in {} folders of several runs, which look like different groups: {listed}. Give one of them (crumple init {}), or say with --group NAME that all are one group",
+                groups.len(),
+                groups.keys().next().map_or(String::new(), |path| path.display().to_string()),
+                listed = groups
+                    .iter()
+                    .map(|(path, runs)| format!("{} ({runs} runs)", path.display()))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            )),
         }
     }
 

@@ -29,10 +29,10 @@ mod trial;
 mod units;
 mod write;
 
+use crate::error::{Error, error};
 use std::path::Path;
 
 pub use agree::Alternative;
-pub use error::InitError;
 pub use evidence::Evidence;
 pub use evidence::Proposed;
 pub use given::Given;
@@ -50,12 +50,16 @@ pub(crate) use scenario::propose_scenario;
 /// Refuses a file that is there already.
 ///
 /// # Errors
-/// [`InitError::Exists`]; a device or a pipe may be written to.
-pub(crate) fn refuse_existing(path: &Path) -> Result<(), InitError> {
+/// If there is a file; a device or a pipe may be written to.
+pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
     match is_there {
-        true => Err(InitError::Exists { path: path.into() }),
+        true => Err(error!(
+            Study,
+            "{path} is there already, and nothing is written over it: name another with -o, or remove it",
+            path = path.display()
+        )),
         false => Ok(()),
     }
 }

@@ -4,13 +4,14 @@
 //! What does not fit is left out with its reason. A study that is complete is tried before it is
 //! given: what a build would refuse is left out as well.
 
+use super::error::no_usable_run;
+use crate::error::{Error, error};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use rayon::prelude::*;
 
 use super::agree::Agreed;
-use super::error::InitError;
 use super::folders::{Folders, names, seen_from};
 use super::given::{Given, GivenForce};
 use super::left_out::{LeftOut, Reason};
@@ -56,8 +57,8 @@ pub(super) struct Recorded {
 /// `progress` is called with the name of each run when it was looked at, from any thread.
 ///
 /// # Errors
-/// [`InitError`] if there is no run, none can be used, or they are several groups.
-pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Proposal, InitError> {
+/// If there is no run, none can be used, or they are several groups.
+pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Proposal, Error> {
     let given = &request.given;
     let folders = Folders::find(&request.folders)?;
     if given.group.is_none() {
@@ -68,7 +69,7 @@ pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Prop
     let surveyed = survey(&folders.runs, given, &mut left_out, &progress);
     let surveys: Vec<&Survey> = surveyed.iter().map(|run| &run.survey).collect();
     let Some(agreed) = Agreed::of(&surveys, given) else {
-        return Err(InitError::NoUsableRun { left_out, doubts: Vec::new() });
+        return Err(no_usable_run(&left_out, &[]));
     };
     refuse_given(&agreed, &surveys, given)?;
     let recorded = record(surveyed, &agreed, &mut left_out);
@@ -81,7 +82,7 @@ pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Prop
     let seen = |path: &PathBuf| seen_from(&study, path);
     let recorded = with_paths(recorded, &seen, &mut left_out);
     if recorded.is_empty() {
-        return Err(InitError::NoUsableRun { left_out, doubts: warnings });
+        return Err(no_usable_run(&left_out, &warnings));
     }
     let runs: Vec<SiRun<'_>> = match units.value() {
         Some(units) => recorded.iter().map(|run| SiRun::of(run, *units, given)).collect(),
@@ -151,7 +152,7 @@ fn usable<T>(runs: Vec<Result<T, Box<LeftOut>>>, left_out: &mut Vec<LeftOut>) ->
 }
 
 /// Holds what the caller says of bodies and force against what there is.
-fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(), InitError> {
+fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(), Error> {
     if let Some(GivenForce { file, id, .. }) = &given.force
         && agreed.force.is_none()
     {
@@ -162,18 +163,28 @@ fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(
             0 => "none".into(),
             _ => known.into_iter().collect::<Vec<_>>().join(", "),
         };
-        return Err(InitError::NoSuchForce { file: file.clone(), id: *id, known });
+        return Err(error!(
+            Study,
+            "no run has a force {file} {id} along the motion: there are {known}",
+            id = *id
+        ));
     }
     if given.half_model {
         let alone = Given { half_model: false, kind: None, ..given.clone() };
         let found = Agreed::of(surveys, &alone);
         if found.is_some_and(|found| found.kind == StudyKind::Pair) {
-            return Err(InitError::HalfModelOfTwo);
+            return Err(error!(
+                Study,
+                "two bodies move in these runs, and a half model has one: leave out --half-model"
+            ));
         }
     } else if (given.kind == Some(StudyKind::Pair) || given.minus_node.is_some())
         && agreed.kind != StudyKind::Pair
     {
-        return Err(InitError::PairOfOne);
+        return Err(error!(
+            Study,
+            "only one body moves in these runs: if it stands for a pair, cut at its symmetry plane, say --half-model; if it meets a wall, leave out --kind pair and --minus-node"
+        ));
     }
     Ok(())
 }

@@ -1,12 +1,10 @@
 //! From models to a proposed scenario: vehicles with the models' masses meet at a speed that the
 //! models were trained for.
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
-use super::error::InitError;
 use super::evidence::{Evidence, Proposed};
 use super::folders::seen_from;
 use super::masses;
@@ -15,6 +13,7 @@ use crate::curve::Parameter;
 use crate::scenario;
 use crate::surrogate::Model;
 use crate::unit::{SpeedKind, km_per_h};
+use serde::Serialize;
 
 /// Vehicles of a train that has a curve between them.
 const VEHICLES: usize = 3;
@@ -76,13 +75,14 @@ pub(crate) struct ProposedVehicle {
 /// Proposes a scenario, which will stand at `path`, for one model or two.
 ///
 /// # Errors
-/// [`InitError`] if a model cannot be read, or they make no scenario.
-pub(crate) fn propose_scenario(
-    models: &[PathBuf],
-    path: &Path,
-) -> Result<ScenarioProposal, InitError> {
+/// If a model cannot be read, or they make no scenario.
+pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<ScenarioProposal, Error> {
     if !(1..=2).contains(&models.len()) {
-        return Err(InitError::Models { found: models.len() });
+        return Err(error!(
+            Usage,
+            "a scenario takes one model or two, found {found}: the curve between the noses, or nose and wall, then that between the vehicles of a train",
+            found = models.len()
+        ));
     }
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -93,7 +93,11 @@ pub(crate) fn propose_scenario(
     let nose = &read[0];
     let inner = read.get(1);
     if inner.is_some_and(|inner| inner.speed_kind == SpeedKind::Wall) {
-        return Err(InitError::WallInside { path: models[1].clone() });
+        return Err(error!(
+            Study,
+            "{path}: its speeds are wall speeds, and between the vehicles of a train stands a curve of closing speeds: name such a model second",
+            path = (models[1]).display()
+        ));
     }
     let mut missing = Vec::new();
     let curves = ["nose", "inner"]

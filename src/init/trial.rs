@@ -1,16 +1,16 @@
 //! A proposed study tried: what its build would refuse is left out before anybody meets it.
 
+use super::error::no_usable_run;
+use crate::error::Error;
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use super::error::InitError;
 use super::left_out::{LeftOut, Reason};
 use super::proposal::Proposal;
 use crate::study::{self, RunError};
+use rayon::prelude::*;
 
 /// Extracts every run of a complete proposal, and leaves out those that give no curve.
-pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), InitError> {
+pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> {
     if !proposal.missing().is_empty() {
         return Ok(());
     }
@@ -33,10 +33,7 @@ pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<
         }
     }
     match proposal.runs.is_empty() {
-        true => Err(InitError::NoUsableRun {
-            left_out: std::mem::take(&mut proposal.left_out),
-            doubts: std::mem::take(&mut proposal.warnings),
-        }),
+        true => Err(no_usable_run(&proposal.left_out, &proposal.warnings)),
         false => Ok(()),
     }
 }

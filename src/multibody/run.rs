@@ -204,6 +204,8 @@ pub enum RunWarning {
     },
 }
 
+crate::error::passes_on!(crate::multibody::ChainError => Other, crate::multibody::DampingError => Other, SimulationError => Simulation);
+
 /// Why a run has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {

@@ -5,7 +5,8 @@
 
 use super::law::{Nsdm, PiecewiseLinear};
 use super::motion::Laws;
-use super::{DAMPING_N_S_PER_M, NsdmError, STIFFNESS_N_PER_M};
+use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M};
+use crate::error::Error;
 
 /// Nodes of the stiffness: 10 segments.
 pub(super) const STIFFNESS_NODES: usize = 11;
@@ -82,7 +83,7 @@ impl Scales {
         Laws::new(mass_kg, [&nodes.x_m, &nodes.v_m_per_s], [&nodes.stiffness, &nodes.damping])
     }
 
-    pub(crate) fn law(&self, genes: &Genes) -> Result<Nsdm, NsdmError> {
+    pub(crate) fn law(&self, genes: &Genes) -> Result<Nsdm, Error> {
         let nodes = self.nodes(genes);
         Ok(Nsdm {
             stiffness: PiecewiseLinear::new(nodes.x_m.into(), nodes.stiffness.into())?,

@@ -1,10 +1,9 @@
 //! The law of the nonlinear spring-damper: two piecewise linear functions.
 
-use serde::{Deserialize, Serialize};
-
-use super::NsdmError;
-use crate::curve::{Envelope, EnvelopeError};
+use crate::curve::Envelope;
+use crate::error::{Error, error};
 use crate::piecewise;
+use serde::{Deserialize, Serialize};
 
 /// Largest difference between [`Nsdm::envelope`] and the spring, as a share of its peak.
 const ENVELOPE_ERROR: f64 = 1e-4;
@@ -23,15 +22,24 @@ impl PiecewiseLinear {
     /// Checks the invariant once.
     ///
     /// # Errors
-    /// [`NsdmError::NodeCount`], [`NsdmError::Node`], naming the first bad node from 1.
-    pub fn new(nodes: Vec<f64>, values: Vec<f64>) -> Result<Self, NsdmError> {
+    /// the error, the error, naming the first bad node from 1.
+    pub fn new(nodes: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if nodes.len() != values.len() || nodes.len() < 2 {
-            return Err(NsdmError::NodeCount { nodes: nodes.len(), values: values.len() });
+            return Err(error!(
+                Comparison,
+                "a law needs a value at each of at least 2 nodes, found {nodes} nodes and {values} values",
+                nodes = nodes.len(),
+                values = values.len()
+            ));
         }
         for (i, (&at, &value)) in nodes.iter().zip(&values).enumerate() {
             let ordered = if i == 0 { at == 0.0 } else { at > nodes[i - 1] };
             if !(ordered && at.is_finite() && value >= 0.0 && value.is_finite()) {
-                return Err(NsdmError::Node { node: i + 1, at, value });
+                return Err(error!(
+                    Comparison,
+                    "node {node} of a law is ({at}, {value}): expected nodes that increase from 0 and values of 0 or more, all finite",
+                    node = i + 1
+                ));
             }
         }
         Ok(Self { nodes, values })
@@ -93,9 +101,9 @@ struct Columns {
 }
 
 impl TryFrom<Columns> for Nsdm {
-    type Error = NsdmError;
+    type Error = Error;
 
-    fn try_from(columns: Columns) -> Result<Self, NsdmError> {
+    fn try_from(columns: Columns) -> Result<Self, Error> {
         Ok(Self {
             stiffness: PiecewiseLinear::new(columns.deflection_m, columns.stiffness_n_per_m)?,
             damping: PiecewiseLinear::new(columns.speed_m_per_s, columns.damping_n_s_per_m)?,
@@ -133,8 +141,8 @@ impl Nsdm {
     /// line through the origin, which an interface continues by `EnvelopeEnd::Slope`.
     ///
     /// # Errors
-    /// [`EnvelopeError`] for stiffnesses whose force is beyond a double.
-    pub fn envelope(&self) -> Result<Envelope, EnvelopeError> {
+    /// For stiffnesses whose force is beyond a double.
+    pub fn envelope(&self) -> Result<Envelope, Error> {
         let nodes = self.stiffness.nodes();
         let segments: Vec<Parabola> = (1..nodes.len()).map(|i| self.parabola(i)).collect();
         let peak = segments.iter().map(Parabola::peak_n).fold(0.0, f64::max);

@@ -21,10 +21,9 @@
 //! let settings = FitSettings { population: 30, generations: 20, ..FitSettings::default() };
 //! let fit = fit(&target, &settings, 1)?;
 //! assert!(fit.velocity_l1 < 0.05);
-//! # Ok::<(), crumple::nsdm::NsdmError>(())
+//! # Ok::<(), crumple::nsdm::Error>(())
 //! ```
 
-mod error;
 mod genes;
 mod genetic;
 mod law;
@@ -33,12 +32,12 @@ mod simplex;
 mod spread;
 mod start;
 
+use crate::error::{Error, error};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
-pub use error::NsdmError;
 use genes::{Genes, Scales};
 pub use law::Nsdm;
 pub use law::PiecewiseLinear;
@@ -83,21 +82,28 @@ impl Target {
     /// time later than 0 the mass moves with the impact speed.
     ///
     /// # Errors
-    /// [`NsdmError`] names the first sample that breaks the invariant, counted from 1.
+    /// It names the first sample that breaks the invariant, counted from 1.
     pub fn new(
         mass_kg: f64,
         speed_m_per_s: f64,
         time_s: Vec<f64>,
         velocity: Vec<f64>,
         acceleration: Vec<f64>,
-    ) -> Result<Self, NsdmError> {
+    ) -> Result<Self, Error> {
         let samples = time_s.len();
         if velocity.len() != samples || acceleration.len() != samples {
             let (velocity, acceleration) = (velocity.len(), acceleration.len());
-            return Err(NsdmError::Lengths { time: samples, velocity, acceleration });
+            return Err(error!(
+                Comparison,
+                "columns differ in length: {time} times, {velocity} velocities, {acceleration} accelerations",
+                time = samples
+            ));
         }
         if samples < FEWEST_SAMPLES {
-            return Err(NsdmError::TooShort { samples });
+            return Err(error!(
+                Comparison,
+                "a motion needs at least {FEWEST_SAMPLES} samples, found {samples}"
+            ));
         }
         check_mass_and_speed(mass_kg, speed_m_per_s)?;
         check_finite("velocity", &velocity)?;
@@ -110,7 +116,10 @@ impl Target {
         }
         let largest_m = displacement_m.iter().copied().fold(0.0, f64::max);
         if !(largest_m > 0.0 && largest_m.is_finite()) {
-            return Err(NsdmError::NoDisplacement);
+            return Err(error!(
+                Comparison,
+                "the reference never moves forwards: is the velocity positive at contact?"
+            ));
         }
         Ok(Self {
             mass_kg,
@@ -215,19 +224,29 @@ pub struct Fit {
 /// gives the same bits for any number of them.
 ///
 /// # Errors
-/// [`NsdmError`] for settings out of range, or if no law found has a finite motion
-/// ([`NsdmError::Diverged`]).
-pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, NsdmError> {
+/// For settings out of range, or if no law found has a finite motion
+/// (the error).
+pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Error> {
     let FitSettings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } =
         *settings;
     if !(2 * genetic::ELITES..=MAX_POPULATION).contains(&population) {
-        return Err(NsdmError::Population { population });
+        return Err(error!(
+            Comparison,
+            "the population is {population}: expected 4 to {MAX_POPULATION}"
+        ));
     }
     if u32::try_from(generations).is_err() {
-        return Err(NsdmError::Generations { count: generations });
+        return Err(error!(
+            Comparison,
+            "{count} generations: expected fewer than 2^32",
+            count = generations
+        ));
     }
     if !(weight_per_s2 >= 0.0 && weight_per_s2.is_finite()) {
-        return Err(NsdmError::Weight { weight_per_s2 });
+        return Err(error!(
+            Comparison,
+            "the weight of the velocity is {weight_per_s2} 1/s²: expected a finite number of 0 or more"
+        ));
     }
     let steps = Steps::new(&target.time_s)?;
     let objective = |genes: &Genes| target.objective(genes, &steps, weight_per_s2);
@@ -235,7 +254,11 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Ns
     let evolved = genetic::minimise(objective, &start, population, generations, seed);
     let (best, used) = simplex::polish(objective, evolved.best, settings.simplex_evaluations);
     if best.objective == PENALTY {
-        return Err(NsdmError::Diverged { mass_kg: target.mass_kg });
+        return Err(error!(
+            Comparison,
+            "the motion of {mass_kg} kg is not finite: it is too light for this spring or damper",
+            mass_kg = target.mass_kg
+        ));
     }
     let model = target.scales().law(&best.genes)?;
     let motion = model.run(target.mass_kg, target.speed_m_per_s, &target.time_s)?;
@@ -259,7 +282,7 @@ pub fn fit_seeds(
     target: &Target,
     settings: &FitSettings,
     seeds: &[u64],
-) -> Result<Vec<Fit>, NsdmError> {
+) -> Result<Vec<Fit>, Error> {
     seeds.par_iter().map(|&seed| fit(target, settings, seed)).collect()
 }
 
@@ -279,32 +302,47 @@ fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<
     (0..count).into_par_iter().map(individual).collect()
 }
 
-fn check_mass_and_speed(mass_kg: f64, speed_m_per_s: f64) -> Result<(), NsdmError> {
+fn check_mass_and_speed(mass_kg: f64, speed_m_per_s: f64) -> Result<(), Error> {
     for (what, value) in [("mass in kg", mass_kg), ("speed in m/s", speed_m_per_s)] {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(NsdmError::NotPositive { what, value });
+            return Err(error!(
+                Comparison,
+                "the {what} is {value}: expected a finite number above 0"
+            ));
         }
     }
     Ok(())
 }
 
-fn check_finite(column: &'static str, values: &[f64]) -> Result<(), NsdmError> {
+fn check_finite(column: &'static str, values: &[f64]) -> Result<(), Error> {
     match values.iter().position(|value| !value.is_finite()) {
-        Some(i) => Err(NsdmError::NotFinite { column, sample: i + 1, value: values[i] }),
+        Some(i) => Err(error!(
+            Comparison,
+            "the {column} of sample {sample} is {value}: expected a finite number",
+            sample = i + 1,
+            value = values[i]
+        )),
         None => Ok(()),
     }
 }
 
 /// Finite, strictly increasing, not before contact.
-fn check_times(time_s: &[f64]) -> Result<(), NsdmError> {
+fn check_times(time_s: &[f64]) -> Result<(), Error> {
     check_finite("time", time_s)?;
     if let Some(&time_s) = time_s.first().filter(|&&time_s| time_s < 0.0) {
-        return Err(NsdmError::BeforeContact { time_s });
+        return Err(error!(
+            Comparison,
+            "the first time is {time_s} s: times count from contact, so expected 0 or more"
+        ));
     }
     match time_s.windows(2).position(|w| w[1] <= w[0]) {
-        Some(i) => {
-            Err(NsdmError::TimeOrder { sample: i + 2, time_s: time_s[i + 1], before_s: time_s[i] })
-        }
+        Some(i) => Err(error!(
+            Comparison,
+            "time does not increase at sample {sample}: {time_s} s follows {before_s} s",
+            before_s = time_s[i],
+            sample = i + 2,
+            time_s = time_s[i + 1]
+        )),
         None => Ok(()),
     }
 }
@@ -335,7 +373,14 @@ mod tests {
         let found = fit(&light, &settings, 1).unwrap();
         assert!(found.objective < PENALTY && found.history.iter().all(|h| !h.is_nan()));
         let error = fit(&target(1e-3), &settings, 1).unwrap_err();
-        assert_eq!(error, NsdmError::Diverged { mass_kg: 1e-3 });
+        assert_eq!(
+            error,
+            error!(
+                Comparison,
+                "the motion of {mass_kg} kg is not finite: it is too light for this spring or damper",
+                mass_kg = 1e-3
+            )
+        );
     }
 
     #[test]

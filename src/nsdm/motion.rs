@@ -4,8 +4,9 @@
 //! passes a node of either law is taken again in eight parts, because between nodes the laws are smooth and one step is exact
 //! to far more digits than a fit. A test holds the errors of random laws against steps 64 times shorter.
 
+use super::check_times;
 use super::law::Nsdm;
-use super::{NsdmError, check_times};
+use crate::error::{Error, error};
 
 /// Longest step, in s: the output interval of the reference method.
 const STEP_S: f64 = 0.75e-3;
@@ -36,14 +37,9 @@ impl Nsdm {
     /// keeps its axis, which ends at the fitted speed, and its last value is held beyond.
     ///
     /// # Errors
-    /// [`NsdmError`] for times out of order, a mass or speed that is not above 0, and a mass so
+    /// For times out of order, a mass or speed that is not above 0, and a mass so
     /// light for its spring that the steps of 0.75 ms diverge.
-    pub fn run(
-        &self,
-        mass_kg: f64,
-        speed_m_per_s: f64,
-        time_s: &[f64],
-    ) -> Result<Motion, NsdmError> {
+    pub fn run(&self, mass_kg: f64, speed_m_per_s: f64, time_s: &[f64]) -> Result<Motion, Error> {
         check_times(time_s)?;
         super::check_mass_and_speed(mass_kg, speed_m_per_s)?;
         let mut motion = Motion::default();
@@ -59,7 +55,10 @@ impl Nsdm {
         });
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         if !(finite(&motion.x_m) && finite(&motion.v_m_per_s) && finite(&motion.a_m_per_s2)) {
-            return Err(NsdmError::Diverged { mass_kg });
+            return Err(error!(
+                Comparison,
+                "the motion of {mass_kg} kg is not finite: it is too light for this spring or damper"
+            ));
         }
         Ok(motion)
     }
@@ -70,18 +69,18 @@ pub(super) struct Steps(Vec<(u32, f64)>);
 
 impl Steps {
     /// Equal steps between two times, none longer than [`STEP_S`].
-    pub(crate) fn new(time_s: &[f64]) -> Result<Self, NsdmError> {
+    pub(crate) fn new(time_s: &[f64]) -> Result<Self, Error> {
         Self::over(time_s, STEP_S)
     }
 
-    fn over(time_s: &[f64], longest_s: f64) -> Result<Self, NsdmError> {
+    fn over(time_s: &[f64], longest_s: f64) -> Result<Self, Error> {
         let before = std::iter::once(&0.0).chain(time_s);
         let steps = time_s.iter().zip(before).map(|(time_s, before_s)| {
             let interval_s = time_s - before_s;
             // Rounding of the times must not double the number of steps.
             let steps = (interval_s / longest_s * (1.0 - 1e-9)).ceil();
             if steps > MAX_STEPS {
-                return Err(NsdmError::Interval { interval_s, time_s: *time_s });
+                return Err(error!(Comparison, "no sample for {interval_s} s before {time_s} s, too long to follow: expected times in seconds", time_s = *time_s));
             }
             Ok((steps as u32, if steps > 0.0 { interval_s / steps } else { 0.0 }))
         });
@@ -296,6 +295,13 @@ mod tests {
     #[test]
     fn a_light_mass_is_an_error_not_nan() {
         let error = constant(1e8, 5e5).run(1e-3, 10.0, &times(100)).unwrap_err();
-        assert_eq!(error, NsdmError::Diverged { mass_kg: 1e-3 });
+        assert_eq!(
+            error,
+            error!(
+                Comparison,
+                "the motion of {mass_kg} kg is not finite: it is too light for this spring or damper",
+                mass_kg = 1e-3
+            )
+        );
     }
 }

@@ -1,9 +1,10 @@
 //! How far fits of several seeds lie apart: whether their parameters mean anything.
 
+use crate::error::{Error, error};
 use serde::Serialize;
 
+use super::Fit;
 use super::law::PiecewiseLinear;
-use super::{Fit, NsdmError};
 
 /// Fewest fits that show a spread.
 const FEWEST: usize = 3;
@@ -88,10 +89,15 @@ impl Identifiability {
     /// Of at least three fits of one target.
     ///
     /// # Errors
-    /// [`NsdmError::Seeds`] for fewer.
-    pub fn of(fits: &[Fit]) -> Result<Self, NsdmError> {
+    /// For fewer.
+    pub fn of(fits: &[Fit]) -> Result<Self, Error> {
         if fits.len() < FEWEST {
-            return Err(NsdmError::Seeds { seeds: fits.len(), fewest: FEWEST });
+            return Err(error!(
+                Comparison,
+                "{seeds} fits show no spread: at least {fewest} seeds are needed",
+                fewest = FEWEST,
+                seeds = fits.len()
+            ));
         }
         let stiffness: Vec<_> = fits.iter().map(|fit| &fit.model.stiffness).collect();
         let damping: Vec<_> = fits.iter().map(|fit| &fit.model.damping).collect();

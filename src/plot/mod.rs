@@ -38,7 +38,6 @@ pub use drawing::PanelPlace;
 pub use drawing::Shape;
 pub use drawing::Shows;
 pub use drawing::Stroke;
-pub use png::PngError;
 pub use svg::SvgFor;
 
 pub use drawing::Paint;

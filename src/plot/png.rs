@@ -1,5 +1,6 @@
 //! A drawing as PNG.
 
+use crate::error::{Error, error};
 use tiny_skia::{
     Color, FillRule, LineJoin, Paint as Ink, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
@@ -8,26 +9,6 @@ use super::drawing::{Drawing, Paint, Shape, Stroke, Text};
 use super::font::{self, Piece};
 use super::svg::colour;
 
-/// Why a picture has no bytes.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PngError {
-    /// Larger than any screen, or empty.
-    #[error(
-        "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {most} each way"
-    )]
-    Size {
-        /// Width in pixels.
-        width: u64,
-        /// Height in pixels.
-        height: u64,
-        /// The most of either.
-        most: u32,
-    },
-    /// The encoder refused.
-    #[error("the picture cannot be encoded: {0}")]
-    Encode(String),
-}
-
 /// Most pixels each way: 400 MB of memory.
 const MOST: u32 = 10_000;
 
@@ -35,11 +16,17 @@ impl Drawing {
     /// The drawing with `scale` pixels for each of its own; 2 suits print and dense screens.
     ///
     /// # Errors
-    /// [`PngError`] for a picture of no or of too many pixels.
-    pub fn png(&self, scale: f64) -> Result<Vec<u8>, PngError> {
+    /// For a picture of no or of too many pixels.
+    pub fn png(&self, scale: f64) -> Result<Vec<u8>, Error> {
         let (width, height) = ((self.width * scale).ceil(), (self.height * scale).ceil());
         let fits = |side: f64| (1.0..=f64::from(MOST)).contains(&side);
-        let size = PngError::Size { width: width as u64, height: height as u64, most: MOST };
+        let size = error!(
+            Plot,
+            "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {most} each way",
+            height = height as u64,
+            most = MOST,
+            width = width as u64
+        );
         if !fits(width) || !fits(height) {
             return Err(size);
         }
@@ -66,7 +53,7 @@ impl Drawing {
                 }
             }
         }
-        map.encode_png().map_err(|e| PngError::Encode(e.to_string()))
+        map.encode_png().map_err(|e| error!(Plot, "the picture cannot be encoded: {}", e))
     }
 }
 

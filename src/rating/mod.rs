@@ -36,6 +36,7 @@ mod signal;
 pub(crate) mod table;
 pub(crate) mod warping;
 
+use crate::error::Error;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -53,7 +54,6 @@ use iso18571::iso18571;
 pub use magnitude_phase::MagnitudePhase;
 use magnitude_phase::{russell, sprague_geers};
 pub use signal::Signal;
-pub use signal::SignalError;
 pub(crate) use signal::{INTERVAL_S, Pair};
 
 /// What two signals are.
@@ -192,12 +192,12 @@ pub struct Decelerations {
 /// with a warning, as their time and memory grow with the square.
 ///
 /// # Errors
-/// [`SignalError`] if they have no or too few common times, or cannot be filtered.
+/// If they have no or too few common times, or cannot be filtered.
 pub fn rate(
     reference: &Signal,
     prediction: &Signal,
     settings: &RatingSettings,
-) -> Result<Rating, SignalError> {
+) -> Result<Rating, Error> {
     let filtered = |signal: &Signal| match settings.cfc {
         Some(class) => signal.filtered(class),
         None => Ok(signal.clone()),

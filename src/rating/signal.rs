@@ -1,6 +1,8 @@
 //! Signals: checked values over time, brought to common times.
 
-use crate::signal::cfc::{self, CfcError};
+use crate::error::{Error, error};
+use crate::signal::CfcError;
+use crate::signal::cfc;
 use crate::signal::resample::interpolate;
 
 /// Interval of ISO/TS 18571: 10 kHz.
@@ -22,101 +24,6 @@ pub struct Signal {
     values: Vec<f64>,
 }
 
-/// Why two columns are no signal, or two signals cannot be rated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SignalError {
-    /// Too few samples to be a history.
-    #[error("{samples} samples are no history: at least {LEAST_SAMPLES} are needed")]
-    TooFew {
-        /// Number of samples.
-        samples: usize,
-    },
-    /// The columns differ in length.
-    #[error("columns differ in length: {times} times, {values} values")]
-    Lengths {
-        /// Number of times.
-        times: usize,
-        /// Number of values.
-        values: usize,
-    },
-    /// A value is infinite, no number or beyond 1e100.
-    #[error("sample {sample}: the value is {value}: expected a finite number up to 1e100")]
-    NotFinite {
-        /// The sample, counted from 1.
-        sample: usize,
-        /// The value.
-        value: f64,
-    },
-    /// A time is not later than the one before it.
-    #[error(
-        "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first"
-    )]
-    TimeGoesBack {
-        /// The later sample, counted from 1.
-        sample: usize,
-        /// Its time, in s.
-        time_s: f64,
-        /// The time before it, in s.
-        before_s: f64,
-    },
-    /// The signal cannot be filtered.
-    #[error("{name}: {}", too_much(source))]
-    Filter {
-        /// Name of the signal.
-        name: String,
-        /// Why.
-        source: CfcError,
-    },
-    /// The signals have no common times.
-    #[error(
-        "there are no common times: the reference goes from {0} s to {1} s, the prediction from {2} s to {3} s; check the units of time",
-        reference.0, reference.1, prediction.0, prediction.1
-    )]
-    NoOverlap {
-        /// First and last time of the reference, in s.
-        reference: (f64, f64),
-        /// First and last time of the prediction, in s.
-        prediction: (f64, f64),
-    },
-    /// The interval that is asked for lies outside the common times.
-    #[error(
-        "what is asked for, from {0} s to {1} s, lies outside the common times from {2} s to {3} s",
-        asked.0, asked.1, common.0, common.1
-    )]
-    Outside {
-        /// Its begin and end, in s.
-        asked: (f64, f64),
-        /// First and last common time, in s.
-        common: (f64, f64),
-    },
-    /// The common times hold too few samples.
-    #[error(
-        "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
-    )]
-    TooShort {
-        /// First common time, in s.
-        from_s: f64,
-        /// Last common time, in s.
-        to_s: f64,
-        /// Number of samples at 10 kHz.
-        samples: usize,
-        /// How many are needed.
-        least: usize,
-    },
-    /// The common times hold more samples than can be rated.
-    #[error(
-        "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
-    )]
-    TooLong {
-        /// First common time, in s.
-        from_s: f64,
-        /// Last common time, in s.
-        to_s: f64,
-        /// Number of samples at 10 kHz.
-        samples: f64,
-    },
-}
-
 /// What the filter cannot take. The filter's own words name the recipe's entry.
 fn too_much(error: &CfcError) -> String {
     match error {
@@ -133,23 +40,41 @@ impl Signal {
     /// `name` stands in messages and results; `time_s` in s.
     ///
     /// # Errors
-    /// [`SignalError`] with the number of the first wrong sample, counted from 1.
-    pub fn new(name: &str, time_s: Vec<f64>, values: Vec<f64>) -> Result<Self, SignalError> {
+    /// With the number of the first wrong sample, counted from 1.
+    pub fn new(name: &str, time_s: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if time_s.len() != values.len() {
-            return Err(SignalError::Lengths { times: time_s.len(), values: values.len() });
+            return Err(error!(
+                Rating,
+                "columns differ in length: {times} times, {values} values",
+                times = time_s.len(),
+                values = values.len()
+            ));
         }
         if values.len() < LEAST_SAMPLES {
-            return Err(SignalError::TooFew { samples: values.len() });
+            return Err(error!(
+                Rating,
+                "{samples} samples are no history: at least {LEAST_SAMPLES} are needed",
+                samples = values.len()
+            ));
         }
         let wrong = |v: &f64| !v.is_finite() || v.abs() > LARGEST;
         for column in [&time_s, &values] {
             if let Some(i) = column.iter().position(wrong) {
-                return Err(SignalError::NotFinite { sample: i + 1, value: column[i] });
+                return Err(error!(
+                    Rating,
+                    "sample {sample}: the value is {value}: expected a finite number up to 1e100",
+                    sample = i + 1,
+                    value = column[i]
+                ));
             }
         }
         if let Some(i) = time_s.windows(2).position(|t| t[1] <= t[0]) {
             let (before_s, time_s) = (time_s[i], time_s[i + 1]);
-            return Err(SignalError::TimeGoesBack { sample: i + 2, time_s, before_s });
+            return Err(error!(
+                Rating,
+                "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first",
+                sample = i + 2
+            ));
         }
         Ok(Self { name: name.into(), time_s, values })
     }
@@ -170,10 +95,11 @@ impl Signal {
     /// The signal behind a CFC filter without phase shift, at its own times.
     ///
     /// # Errors
-    /// [`SignalError::Filter`] if its times are too coarse or too uneven.
-    pub(crate) fn filtered(&self, class: u32) -> Result<Self, SignalError> {
-        let filtered = cfc::filter(class, &self.time_s, &self.values)
-            .map_err(|source| SignalError::Filter { name: self.name.clone(), source })?;
+    /// If its times are too coarse or too uneven.
+    pub(crate) fn filtered(&self, class: u32) -> Result<Self, Error> {
+        let filtered = cfc::filter(class, &self.time_s, &self.values).map_err(|source| {
+            error!(Rating, "{name}: {}", too_much(&source), name = self.name).caused_by(source)
+        })?;
         Ok(Self { values: filtered.values, ..self.clone() })
     }
 }
@@ -190,38 +116,60 @@ impl Pair {
     /// Interpolates linearly from the first common time on, within `from_s` and `to_s`.
     ///
     /// # Errors
-    /// [`SignalError`] if there are no common times, or fewer than `least` or too many samples.
+    /// If there are no common times, or fewer than `least` or too many samples.
     pub(crate) fn new(
         reference: &Signal,
         prediction: &Signal,
         (from_s, to_s): (Option<f64>, Option<f64>),
         least: usize,
-    ) -> Result<Self, SignalError> {
+    ) -> Result<Self, Error> {
         let (r, p) = (reference.range_s(), prediction.range_s());
-        let no_overlap = SignalError::NoOverlap { reference: r, prediction: p };
+        let no_overlap = || {
+            error!(
+                Rating,
+                "there are no common times: the reference goes from {} s to {} s, the prediction from {} s to {} s; check the units of time",
+                r.0,
+                r.1,
+                p.0,
+                p.1
+            )
+        };
         let common = (r.0.max(p.0), r.1.min(p.1));
         if common.0 >= common.1 {
-            return Err(no_overlap);
+            return Err(no_overlap());
         }
         let asked = (from_s.unwrap_or(common.0), to_s.unwrap_or(common.1));
         let (from_s, to_s) = (common.0.max(asked.0), common.1.min(asked.1));
         if from_s >= to_s {
-            return Err(SignalError::Outside { asked, common });
+            return Err(error!(
+                Rating,
+                "what is asked for, from {} s to {} s, lies outside the common times from {} s to {} s",
+                asked.0,
+                asked.1,
+                common.0,
+                common.1
+            ));
         }
         // Times are rounded: a last sample that is missed by so little still counts.
         let samples = ((to_s - from_s) / INTERVAL_S + 1e-6).floor() + 1.0;
         if samples > MOST_COMMON {
-            return Err(SignalError::TooLong { from_s, to_s, samples });
+            return Err(error!(
+                Rating,
+                "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
+            ));
         }
         let samples = samples as usize;
         if samples < least {
-            return Err(SignalError::TooShort { from_s, to_s, samples, least });
+            return Err(error!(
+                Rating,
+                "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
+            ));
         }
         let time_s: Vec<f64> =
             (0..samples).map(|i| (from_s + i as f64 * INTERVAL_S).min(to_s)).collect();
         let at = |signal: &Signal| interpolate(&signal.time_s, &signal.values, &time_s);
         // The times lie within both signals.
-        let outside = |_| no_overlap.clone();
+        let outside = |_| no_overlap();
         let reference = at(reference).map_err(outside)?;
         let prediction = at(prediction).map_err(outside)?;
         Ok(Self { time_s, reference, prediction })
@@ -288,9 +236,7 @@ mod tests {
             "line: its samples are 1.25e-1 s apart, too far for CFC 60: at most 1.67e-3 s; filter with a lower class or not at all"
         );
         let long = line(0.0, 100.0, 10);
-        assert!(matches!(
-            Pair::new(&long, &long, (None, None), 12),
-            Err(SignalError::TooLong { .. })
-        ));
+        let error = Pair::new(&long, &long, (None, None), 12).unwrap_err().to_string();
+        assert!(error.contains("samples at 10 kHz, "), "{error}");
     }
 }

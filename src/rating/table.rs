@@ -1,5 +1,6 @@
 //! Tables: a signal from a CSV file with a header line, whose first column is the time.
 
+use crate::error::{Error, ErrorCode, error};
 use crate::guess;
 use std::io::Read;
 
@@ -18,136 +19,59 @@ pub(crate) struct Columns {
     pub values: Vec<f64>,
 }
 
-/// Why a table holds no signal. Lines and columns count from 1.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum TableError {
-    /// The text is no table.
-    #[error("{0}")]
-    Csv(#[from] csv::Error),
-    /// The text is empty.
-    #[error("the table is empty: expected a header line, then a time and values in every line")]
-    Empty,
-    /// The first line holds numbers.
-    #[error(
-        "line {line}: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"
-    )]
-    NoHeader {
-        /// Line in the file.
-        line: u64,
-    },
-    /// There is only one column.
-    #[error(
-        "line {line}: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"{found}\""
-    )]
-    OneColumn {
-        /// Line in the file.
-        line: u64,
-        /// Its text.
-        found: String,
-    },
-    /// No column has the wanted name.
-    #[error("there is no column \"{wanted}\": name one of {known}{}", guess::hint(wanted, known))]
-    NoColumn {
-        /// The wanted name.
-        wanted: String,
-        /// The columns there are, as a list.
-        known: String,
-    },
-    /// Several columns have the wanted name.
-    #[error("{count} columns are called \"{name}\": rename all but one")]
-    SameNames {
-        /// The name.
-        name: String,
-        /// How many have it.
-        count: usize,
-    },
-    /// There are several columns, and none is named.
-    #[error("there are several columns: name one of {known}")]
-    SeveralColumns {
-        /// The columns there are, as a list.
-        known: String,
-    },
-    /// A field is no number.
-    #[error("line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"")]
-    NotANumber {
-        /// Line in the file.
-        line: u64,
-        /// Column in that line.
-        column: usize,
-        /// Name of the column.
-        name: String,
-        /// The field's text.
-        found: String,
-    },
-    /// A field is infinite, no number or empty.
-    #[error(
-        "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"
-    )]
-    NotFinite {
-        /// Line in the file.
-        line: u64,
-        /// Column in that line.
-        column: usize,
-        /// Name of the column.
-        name: String,
-        /// The field's text.
-        found: String,
-    },
-    /// A time is not later than the one before it.
-    #[error(
-        "line {line}, column 1 (\"{name}\"): time {found} does not come after {before}: times must rise strictly, so cut or sort the file first"
-    )]
-    TimeGoesBack {
-        /// Line in the file.
-        line: u64,
-        /// Name of the time's column.
-        name: String,
-        /// The time, in the table's unit.
-        found: f64,
-        /// The time before it, in the table's unit.
-        before: f64,
-    },
-}
-
 /// Reads the first column and the one called `wanted`; without a name, the only other one.
 ///
 /// Separated by commas, semicolons or tabs, whichever stand in the header; lines that begin
 /// with `#` are comments. Other columns are not looked at.
 ///
 /// # Errors
-/// [`TableError`] with line and column.
-pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, TableError> {
+/// With line and column.
+pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, Error> {
     let mut text = Vec::new();
-    source.read_to_end(&mut text).map_err(csv::Error::from)?;
-    let mut table = CsvTable::open(&text, 0)?;
+    source.read_to_end(&mut text).map_err(|e| not_csv(e.into()))?;
+    let mut table = CsvTable::open(&text, 0).map_err(not_csv)?;
     let (header, line) = (table.header().clone(), table.header_line());
     if header.iter().all(str::is_empty) {
-        return Err(TableError::Empty);
+        return Err(error!(
+            Rating,
+            "the table is empty: expected a header line, then a time and values in every line"
+        ));
     }
     if header.iter().all(|name| name.parse::<f64>().is_ok()) {
-        return Err(TableError::NoHeader { line });
+        return Err(error!(
+            Rating,
+            "line {line}: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"
+        ));
     }
     if header.len() < 2 {
-        return Err(TableError::OneColumn { line, found: header[0].into() });
+        return Err(error!(
+            Rating,
+            "line {line}: expected at least two columns separated by commas, semicolons or tabs, the first of them the time, found \"{found}\"",
+            found = &header[0]
+        ));
     }
     let column = column(&header, wanted)?;
     let (mut time, mut values) = (Vec::<f64>::new(), Vec::new());
     for row in table.rows() {
-        let row = row?;
+        let row = row.map_err(not_csv)?;
         let line = row.line;
         let number = |field: usize| {
             row.number(field).map_err(|NoNumber { line, column, found, is_number }| {
                 let name = header[field].to_string();
                 match is_number {
-                    true => TableError::NotFinite { line, column, name, found },
-                    false => TableError::NotANumber { line, column, name, found },
+                    true => error!(Rating, "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"),
+                    false => error!(Rating, "line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\""),
                 }
             })
         };
         let (at, value) = (number(0)?, number(column)?);
         if let Some(&before) = time.last().filter(|&&before| before >= at) {
             let name = header[0].to_string();
-            return Err(TableError::TimeGoesBack { line, name, found: at, before });
+            return Err(error!(
+                Rating,
+                "line {line}, column 1 (\"{name}\"): time {found} does not come after {before}: times must rise strictly, so cut or sort the file first",
+                found = at
+            ));
         }
         time.push(at);
         values.push(value);
@@ -155,8 +79,12 @@ pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Column
     Ok(Columns { time_name: header[0].into(), name: header[column].into(), time, values })
 }
 
+fn not_csv(error: csv::Error) -> Error {
+    Error::below(ErrorCode::Rating, error)
+}
+
 /// The column to read.
-fn column(header: &csv::StringRecord, wanted: Option<&str>) -> Result<usize, TableError> {
+fn column(header: &csv::StringRecord, wanted: Option<&str>) -> Result<usize, Error> {
     let known = || {
         let names: Vec<String> = header.iter().skip(1).map(|name| format!("\"{name}\"")).collect();
         names.join(", ")
@@ -164,14 +92,24 @@ fn column(header: &csv::StringRecord, wanted: Option<&str>) -> Result<usize, Tab
     let Some(wanted) = wanted else {
         return match header.len() {
             2 => Ok(1),
-            _ => Err(TableError::SeveralColumns { known: known() }),
+            _ => Err(
+                error!(Rating at "column", "there are several columns: name one of {known}", known = known()),
+            ),
         };
     };
     let found: Vec<usize> = (1..header.len()).filter(|&i| &header[i] == wanted).collect();
     match found[..] {
         [column] => Ok(column),
-        [] => Err(TableError::NoColumn { wanted: wanted.into(), known: known() }),
-        _ => Err(TableError::SameNames { name: wanted.into(), count: found.len() }),
+        [] => Err({
+            let known = known();
+            error!(Rating at "column", "there is no column \"{wanted}\": name one of {known}{}", guess::hint(wanted, &known))
+        }),
+        _ => Err(error!(
+            Rating,
+            "{count} columns are called \"{name}\": rename all but one",
+            count = found.len(),
+            name = wanted
+        )),
     }
 }
 

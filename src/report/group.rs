@@ -2,17 +2,15 @@
 
 use super::figure::Figure;
 use super::text::{energy, mega_newton, metres, percent, signed_percent, tonnes};
-use super::{
-    Cell, Content, KeyFigure, MethodSpeeds, Part, ReportError, ReportSettings, Section, Table,
-};
+use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::choose::{Purpose, Selection, next_run};
 use crate::assess::compare::{Comparison, compare, inner_speeds};
-use crate::assess::error::ValidateError;
 use crate::assess::validate::{Choice, train_chosen, validate};
 use crate::charts;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::TrainingSet;
+use crate::error::Error;
 use crate::plural::counted;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
@@ -21,14 +19,14 @@ use crate::unit::km_per_h;
 /// Adds the section of a group.
 ///
 /// # Errors
-/// [`ReportError`] if its models cannot be fitted. A group too small to be validated shows its runs alone.
+/// If its models cannot be fitted. A group too small to be validated shows its runs alone.
 pub(super) fn add(
     content: &mut Content,
     group: &str,
     cases: &[Case],
     models: &[Model],
     settings: &ReportSettings,
-) -> Result<(), ReportError> {
+) -> Result<(), Error> {
     let number = content.sections.len() + 1;
     let mut parts = vec![
         Part::Figure(Figure::new(
@@ -62,7 +60,7 @@ fn known_or_new(
     cases: &[Case],
     models: &[Model],
     settings: &ReportSettings,
-) -> Result<Validation, ValidateError> {
+) -> Result<Validation, Error> {
     let hash = TrainingSet::new(group, cases)?.hash();
     let is_of_these = |model: &&Model| model.group == group && model.training_hash == hash;
     match models.iter().find(is_of_these).and_then(|model| model.leave_one_out.clone()) {
@@ -224,7 +222,7 @@ impl Validated<'_> {
         content: &mut Content,
         parts: &mut Vec<Part>,
         settings: &ReportSettings,
-    ) -> Result<(), ReportError> {
+    ) -> Result<(), Error> {
         let Self { group, cases, validation, .. } = self;
         let model = train_chosen(group, cases, &ModelKind::all(settings.seed), validation.clone())?;
         let Some(speed) = settings.speed_m_per_s.or_else(|| middle_of_widest_gap(cases)) else {
@@ -286,11 +284,7 @@ impl Validated<'_> {
     }
 
     /// FE, FDRM, NSDM, DDTCM and the best model at the inner speeds, left out in turn.
-    fn add_methods(
-        &self,
-        parts: &mut Vec<Part>,
-        settings: &ReportSettings,
-    ) -> Result<(), ReportError> {
+    fn add_methods(&self, parts: &mut Vec<Part>, settings: &ReportSettings) -> Result<(), Error> {
         let Self { group, cases, .. } = self;
         let speeds = match settings.methods {
             MethodSpeeds::None => Vec::new(),

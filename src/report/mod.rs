@@ -4,15 +4,13 @@
 //! 'none'`). Every picture stands in it as SVG; the script gives it values under the pointer and zoom. Without the script,
 //! tables and pictures remain.
 
-mod error;
 mod figure;
 mod group;
 mod page;
 mod text;
 mod train;
 
-pub(crate) use error::ReportError;
-
+use crate::error::Error;
 use std::path::{Path, PathBuf};
 
 use figure::Figure;
@@ -132,7 +130,7 @@ impl Content {
 /// Of `models`, those that `auto` chose for these very cases spare their validation; `step` is told what is being done.
 ///
 /// # Errors
-/// [`ReportError`] for a group that is not there, one that makes no table, or a scenario that does not run.
+/// For a group that is not there, one that makes no table, or a scenario that does not run.
 pub(crate) fn report(
     path: &Path,
     database: &Database,
@@ -140,7 +138,7 @@ pub(crate) fn report(
     models: &[Model],
     settings: &ReportSettings,
     mut step: impl FnMut(&str),
-) -> Result<(String, usize), ReportError> {
+) -> Result<(String, usize), Error> {
     let mut content = Content {
         title: settings.title.clone().unwrap_or_else(|| text::file_name(path)),
         subtitle: format!(

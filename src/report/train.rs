@@ -1,12 +1,11 @@
 //! What the report says of a scenario: motion, crush and energy of its run, and FE's train beside it.
 
+use crate::error::Error;
 use std::path::Path;
 
 use super::figure::Figure;
 use super::text::{energy, file_name, mega_newton, metres, percent, tonnes};
-use super::{
-    Cell, Content, KeyFigure, MethodSpeeds, Part, ReportError, ReportSettings, Section, Table,
-};
+use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
 use crate::charts::{Motion, Quantity, train_speeds};
@@ -17,12 +16,12 @@ use crate::unit::km_per_h;
 /// Runs a scenario and adds its section; with FE's run as its reference also the methods beside it.
 ///
 /// # Errors
-/// [`ReportError`] if it cannot be read or run.
+/// If it cannot be read or run.
 pub(super) fn add(
     content: &mut Content,
     path: &Path,
     settings: &ReportSettings,
-) -> Result<(), ReportError> {
+) -> Result<(), Error> {
     let read = scenario::read(path)?;
     let prepared = scenario::load(path)?;
     let run = prepared.run()?;

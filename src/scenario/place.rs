@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use super::{CheckedScenario, Prepared, Scenario, TrainTable, VehicleTable};
 use crate::error::{Document, KeyPath, Place};
 use crate::multibody::{ChainError, SimulationError};
-use crate::surrogate::predict::PredictError;
 
 impl CheckedScenario<'_> {
     /// The place of a key; of a scenario that is not as its file has it only the file, at `path`.
@@ -166,18 +165,5 @@ impl Scenario {
         };
         let found = self.vehicles().find(|(_, vehicle)| is_of(vehicle));
         found.map_or(KeyPath::of("train"), |(path, _)| path)
-    }
-}
-
-/// The key that tells why a model gives no curve.
-pub(super) fn predict_key(error: &PredictError) -> KeyPath {
-    match error {
-        PredictError::Parameters(_) => KeyPath::of("parameters"),
-        PredictError::UnknownParameter { name: parameter, .. } => {
-            KeyPath::of("parameters").key(parameter).itself()
-        }
-        PredictError::NoContactForce | PredictError::NoBodyForce => KeyPath::of("force"),
-        PredictError::MaxCrush { .. } => KeyPath::of("max_crush"),
-        _ => KeyPath::of("model"),
     }
 }

@@ -1,13 +1,13 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
 use super::layout::{Role, Slot};
-use super::place;
 use super::{CurveSource, CurveTable as Table, EndName, LawName};
 use crate::curve::driving::NoDrivingCurve;
-use crate::curve::{DrivingCurve, EnvelopeError, ForceKind};
+use crate::curve::{DrivingCurve, ForceKind};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
-use crate::surrogate::predict::{PredictError, predict_driving};
+use crate::surrogate::invalid;
+use crate::surrogate::predict::predict_driving;
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
 
 /// The curve at one interface, with what must be said of it.
@@ -22,14 +22,13 @@ pub(super) fn scale_error(factor: f64) -> Error {
 }
 
 /// The error of a curve that is no envelope, or none any more.
-fn envelope_error(error: EnvelopeError) -> Error {
-    Error::below(ErrorCode::Scenario, error)
+fn envelope_error(error: Error) -> Error {
+    error.coded(ErrorCode::Scenario)
 }
 
-/// The error of a model that gives no curve, at the key that tells why.
-fn predict_error(error: PredictError) -> Error {
-    let key = place::predict_key(&error);
-    Error::below(ErrorCode::Prediction, error).at(key)
+/// The error of a model that gives no curve, at the key that decides it.
+fn predict_error(error: Error) -> Error {
+    error.coded_as(ErrorCode::Prediction).or_at_key("model")
 }
 
 /// The curve of a source that the interface needs, at `speed_m_per_s` if a model gives it.
@@ -113,7 +112,7 @@ fn of_model(
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) =
         predict_driving(model, &query, force, table.band).map_err(predict_error)?;
-    let curve = curve.continued().map_err(|e| predict_error(PredictError::Envelope(e)))?;
+    let curve = curve.continued().map_err(|e| predict_error(invalid(e)))?;
     Ok(Spring { curve, warnings: texts(&warnings) })
 }
 
@@ -148,7 +147,9 @@ fn which_force(
     has_body: bool,
 ) -> Result<Option<ForceKind>, Error> {
     if asked == Some(ForceKind::Contact) && declared == Some(ForceKind::Body) {
-        return Err(predict_error(PredictError::NoContactForce));
+        return Err(predict_error(
+            error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+        ));
     }
     if slot.split && slot.role != Role::Within && asked.or(declared) == Some(ForceKind::Body) {
         return Err(error!(

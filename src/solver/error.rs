@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Entity, NoDataReason, Selection, SolverFile, WantedId};
 
+crate::error::passes_on!(ReadError => SolverFile);
+
 /// Why a file could not be read at all, or not what was asked of it.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {

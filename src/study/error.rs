@@ -1,11 +1,10 @@
 //! Why one of the runs of a study cannot be used.
 
-use std::io;
-use std::path::PathBuf;
-
-use crate::curve::extract::ExtractError;
+use crate::curve::ExtractError;
 use crate::guess;
 use crate::solver::ReadError;
+use std::io;
+use std::path::PathBuf;
 
 /// Why one run gives no case.
 #[derive(Debug, thiserror::Error)]

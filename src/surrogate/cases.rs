@@ -1,10 +1,11 @@
 //! What a model keeps of its training cases, and their curves by force.
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 use super::CaseCurve;
 use super::cached::Cached;
-use crate::curve::{EnvelopeError, ForceKind};
+use crate::curve::ForceKind;
 use crate::dataset::{STEPS, TrainingCase, grid};
 
 /// Forces beyond this are damage, not measurement.
@@ -86,7 +87,7 @@ impl ModelCase {
         Ok(())
     }
 
-    fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, EnvelopeError> {
+    fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, Error> {
         CaseCurve::new(
             self.speed_m_per_s,
             self.features.clone(),
@@ -115,7 +116,7 @@ pub(super) struct Kink {
 }
 
 impl Curves {
-    pub(crate) fn of(cases: &[ModelCase]) -> Result<Self, EnvelopeError> {
+    pub(crate) fn of(cases: &[ModelCase]) -> Result<Self, Error> {
         let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
             cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
         };

@@ -1,6 +1,7 @@
 //! The training curves of a model, one force of each case, and how they are blended.
 
-use crate::curve::{Envelope, EnvelopeError};
+use crate::curve::Envelope;
+use crate::error::{Error, ErrorCode};
 
 /// One force of one training case over its loading branch.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,19 +16,23 @@ pub(crate) struct CaseCurve {
 
 impl CaseCurve {
     /// # Errors
-    /// [`EnvelopeError`] if the columns are no envelopes; closing speeds may be none.
+    /// If the columns are no envelopes; closing speeds may be none.
     pub(crate) fn new(
         speed_m_per_s: f64,
         features: Vec<f64>,
         deflection_m: Vec<f64>,
         force_n: Vec<f64>,
         closing_m_per_s: Vec<f64>,
-    ) -> Result<Self, EnvelopeError> {
+    ) -> Result<Self, Error> {
         let closing = match closing_m_per_s.is_empty() {
             true => None,
-            false => Some(Envelope::new(deflection_m.clone(), closing_m_per_s)?),
+            false => Some(
+                Envelope::new(deflection_m.clone(), closing_m_per_s)
+                    .map_err(|e| e.coded(ErrorCode::Model))?,
+            ),
         };
-        let envelope = Envelope::new(deflection_m, force_n)?;
+        let envelope =
+            Envelope::new(deflection_m, force_n).map_err(|e| e.coded(ErrorCode::Model))?;
         Ok(Self { speed_m_per_s, features, envelope, closing })
     }
 

@@ -1,5 +1,6 @@
 //! What the table of models says of each.
 
+use crate::error::{Error, error};
 use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
@@ -7,7 +8,7 @@ use serde_json::value::RawValue;
 
 use super::forest_options::ForestOptions;
 use super::max_crush::MaxCrushRule;
-use super::{CaseCurve, CrushLaw, ModelError, Surrogate};
+use super::{CaseCurve, CrushLaw, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 
@@ -40,7 +41,7 @@ pub struct ModelEntry {
 }
 
 /// Fits a model.
-pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, ModelError>;
+pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, Error>;
 
 /// Makes a model of its parameters in a model file.
 pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
@@ -65,9 +66,9 @@ impl FitInput<'_> {
     /// The crush law with stopped mass.
     ///
     /// # Errors
-    /// [`ModelError::NoCrushLaw`] if the runs tell none.
-    pub(crate) fn crush_law(&self) -> Result<CrushLaw, ModelError> {
-        self.crush_law.cloned().ok_or(ModelError::NoCrushLaw)
+    /// If the runs tell none.
+    pub(crate) fn crush_law(&self) -> Result<CrushLaw, Error> {
+        self.crush_law.cloned().ok_or(error!(Model, "model crush-law needs runs that tell the mass which the crush zone stops: contact force and speed of a body against a wall or of two of equal mass, whose momentum agrees; this group's do not: use --model rate"))
     }
 }
 

@@ -5,11 +5,11 @@
 //! energy too early (W/E in `db ls`). A model uses the rule with the smallest errors of crush and energy when speeds were
 //! left out, never the spline, which need not be monotone; `--paper` uses the spline.
 
+use crate::error::{Error, error};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use super::predict_error::PredictError;
 use crate::curve::Envelope;
 
 /// How the maximal crush is found.
@@ -206,17 +206,15 @@ impl MaxCrush {
 }
 
 /// The answer of one rule, which must be a length.
-pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, PredictError> {
+pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error> {
     match crush.by(rule) {
         Some(end) if end > 0.0 && end.is_finite() => Ok(end),
-        found => Err(PredictError::MaxCrush {
-            rule: rule.name(),
-            found: found.map_or("not defined for these cases".into(), |d| format!("{d} m")),
-            other: MaxCrushRule::ALL
+        found => Err(
+            error!(Prediction at "max_crush", "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
-                .map_or("(no rule has an answer here)", MaxCrushRule::name),
-        }),
+                .map_or("(no rule has an answer here)", MaxCrushRule::name), rule = rule.name()),
+        ),
     }
 }
 

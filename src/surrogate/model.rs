@@ -1,7 +1,6 @@
 //! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
 
-use crate::error::Error;
-use std::path::PathBuf;
+use crate::error::{Error, error};
 use std::sync::Arc;
 
 use super::band::{self, Band};
@@ -13,13 +12,11 @@ use super::forest::ForestSurrogate;
 use super::landmarks::Landmarks;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
-use super::model_file::VERSION;
 use super::models::{MODELS, ModelKind};
 use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::body::rebound_stiffness_n_per_m;
-use crate::curve::{EnvelopeError, ForceKind, Masses};
-use crate::dataset::{DatasetError, Feature, TrainingSet, nearest};
-use crate::forest::ForestError;
+use crate::curve::{ForceKind, Masses};
+use crate::dataset::{Feature, TrainingSet, nearest};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A nearest training speed further away than this share of the speed causes a warning.
@@ -66,98 +63,14 @@ pub struct Model {
     pub(super) curves: Curves,
 }
 
-/// Why a model cannot be fitted, read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum ModelError {
-    /// The cases are no training set.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The forest cannot be fitted.
-    #[error(transparent)]
-    Forest(#[from] ForestError),
-    /// The group has fewer curves than the model needs.
-    #[error(
-        "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
-    )]
-    TooFewCurves {
-        /// Name of the model.
-        model: &'static str,
-        /// How many it needs.
-        least: usize,
-        /// How many there are.
-        found: usize,
-    },
-    /// The cases differ in more than the speed, which is all the model sees.
-    #[error(
-        "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone"
-    )]
-    OneParameter {
-        /// Name of the model.
-        model: &'static str,
-        /// What else they differ in, as a list.
-        features: String,
-        /// Models that see it, as a list.
-        others: String,
-    },
-    /// The runs tell no mass that a crush zone stops.
-    #[error(
-        "model crush-law needs runs that tell the mass which the crush zone stops: contact force and speed of a body against a wall or of two of equal mass, whose momentum agrees; this group's do not: use --model rate"
-    )]
-    NoCrushLaw,
-    /// The curve of a case is no envelope.
-    #[error("{0}")]
-    Curve(#[from] EnvelopeError),
-    /// The file cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is no model file.
-    #[error(
-        "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train"
-    )]
-    NotAModel {
-        /// The file.
-        path: PathBuf,
-        /// Line in the file, counted from 1.
-        line: usize,
-        /// Column in that line, counted from 1.
-        column: usize,
-        /// What was expected there.
-        detail: String,
-    },
-    /// The file was written by a later or much earlier program.
-    #[error("{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train", known = VERSION)]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Version of its layout.
-        found: u32,
-    },
-    /// The file contradicts itself.
-    #[error("{path}: the model is damaged: {detail}")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// How.
-        detail: String,
-    },
-    /// A room below says why.
-    #[error(transparent)]
-    Below(#[from] Error),
-}
-
 impl Model {
     /// Fits the model to both forces of the set. The choice of a model by leaving speeds
     /// out is `validate::train`'s.
     ///
     /// # Errors
-    /// [`ModelError`] if the set is too small for the model, differs in more than the model
+    /// If the set is too small for the model, differs in more than the model
     /// sees, or its options are wrong.
-    pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
+    pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
         let model = Self::fit_curves(set, kind)?;
         let crush_law = match model.crush_law {
             Some(law) => Some(law),
@@ -170,7 +83,7 @@ impl Model {
     ///
     /// # Errors
     /// As of [`fit`](Self::fit).
-    pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, ModelError> {
+    pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
         Self::check_inputs(set, kind)?;
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
@@ -221,8 +134,8 @@ impl Model {
     /// Whether the model can be fitted to the set, without fitting it.
     ///
     /// # Errors
-    /// [`ModelError::TooFewCurves`], [`ModelError::OneParameter`] or [`ModelError::NoCrushLaw`].
-    pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
+    /// the error, the error or the error.
+    pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
         Self::check_inputs(set, kind)?;
         match kind.entry().needs_crush_law {
             true => Self::fit_curves(set, kind).map(|_| ()),
@@ -231,20 +144,24 @@ impl Model {
     }
 
     /// Whether number and parameters of the set's cases serve the model.
-    fn check_inputs(set: &TrainingSet, kind: ModelKind) -> Result<(), ModelError> {
+    fn check_inputs(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
         let (model, entry) = (kind.name(), kind.entry());
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
-            return Err(ModelError::TooFewCurves { model, least, found });
+            return Err(error!(
+                Model,
+                "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
+            ));
         }
         if !set.features.is_empty() && !entry.sees_features {
             let names = |names: Vec<String>| names.join(", ");
             let others = MODELS.iter().filter(|e| e.sees_features && e.least_curves > 1);
-            return Err(ModelError::OneParameter {
-                model,
-                features: names(set.features.iter().map(Feature::name).collect()),
-                others: others.map(|e| e.name).collect::<Vec<_>>().join(" or "),
-            });
+            return Err(error!(
+                Model,
+                "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone",
+                features = names(set.features.iter().map(Feature::name).collect()),
+                others = others.map(|e| e.name).collect::<Vec<_>>().join(" or ")
+            ));
         }
         match kind.forest_options() {
             Some(options) => Ok(options.check()?),

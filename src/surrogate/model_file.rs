@@ -1,6 +1,7 @@
 //! Model files: versioned, self-describing JSON, readable without this program
 //! (`schemas/model.md`).
 
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use super::crush_law::CrushLaw;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::ModelKind;
-use super::{Model, ModelError, Surrogate};
+use super::{Model, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::Feature;
 use crate::file::{self, write_whole};
@@ -70,10 +71,11 @@ impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// [`ModelError`] with the place in the file where it is no model of ours.
-    pub fn read(path: &Path) -> Result<Self, ModelError> {
-        let text = file::read(path, MAX_BYTES)
-            .map_err(|source| ModelError::Io { path: path.into(), source })?;
+    /// With the place in the file where it is no model of ours.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = file::read(path, MAX_BYTES).map_err(|source| {
+            error!(Model, "{path}: {source}", path = path.display()).caused_by(source)
+        })?;
         Self::parse(path, &text)
     }
 
@@ -81,12 +83,13 @@ impl Model {
     ///
     /// # Errors
     /// As of [`read`](Self::read).
-    pub fn parse(path: &Path, text: &[u8]) -> Result<Self, ModelError> {
-        let no_model = |line, column, detail| ModelError::NotAModel {
-            path: path.into(),
-            line,
-            column,
-            detail,
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self, Error> {
+        let no_model = |line, column, detail| {
+            error!(
+                Model,
+                "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train",
+                path = path.display()
+            )
         };
         let at_its_place = |e: serde_json::Error| no_model(e.line(), e.column(), e.to_string());
         let head: Head = serde_json::from_slice(text).map_err(at_its_place)?;
@@ -94,7 +97,13 @@ impl Model {
             return Err(no_model(1, 1, format!("its format is \"{}\"", head.format)));
         }
         if head.version != VERSION {
-            return Err(ModelError::Version { path: path.into(), found: head.version });
+            return Err(error!(
+                Model,
+                "{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train",
+                known = VERSION,
+                found = head.version,
+                path = path.display()
+            ));
         }
         let file: ModelFile<'_> = serde_json::from_slice(text).map_err(at_its_place)?;
         let fitted = |raw: &RawValue| {
@@ -107,7 +116,8 @@ impl Model {
                 no_model(line, column, e.to_string())
             })
         };
-        let damaged = |detail| ModelError::Damaged { path: path.into(), detail };
+        let damaged =
+            |detail| error!(Model, "{path}: the model is damaged: {detail}", path = path.display());
         let model = Self {
             fitted: fitted(file.fitted)?,
             fitted_body: file.fitted_body.map(fitted).transpose()?,
@@ -225,11 +235,16 @@ impl Model {
     ///
     /// # Errors
     /// If the target cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), ModelError> {
-        let bytes = self
-            .to_json()
-            .map_err(|e| ModelError::Damaged { path: path.into(), detail: e.to_string() })?;
-        Ok(write_whole(path, &bytes)?)
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let bytes = self.to_json().map_err(|e| {
+            error!(
+                Model,
+                "{path}: the model is damaged: {detail}",
+                detail = e,
+                path = path.display()
+            )
+        })?;
+        write_whole(path, &bytes)
     }
 }
 

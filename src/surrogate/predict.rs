@@ -18,17 +18,17 @@
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predict_error::CORRECTION;
+use super::predict_error::envelope;
+pub(crate) use super::predicted::ForestQuantiles;
+pub use super::predicted::PredictedCurve;
+pub(crate) use super::predicted::Provenance;
+pub use super::query::Query;
 use super::query::{Asked, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
 use crate::dataset::{grid, nearest};
-
-pub(crate) use super::predict_error::PredictError;
-pub(crate) use super::predicted::ForestQuantiles;
-pub use super::predicted::PredictedCurve;
-pub(crate) use super::predicted::Provenance;
-pub use super::query::Query;
+use crate::error::{Error, error};
 
 /// Points of a predicted curve besides (0, 0), as in the reference data.
 const POINTS: usize = 400;
@@ -38,9 +38,9 @@ const REACH: f64 = 1.5;
 /// The curve of `model` at the speed of `query`, with its audit and warnings.
 ///
 /// # Errors
-/// [`PredictError`] if the speed is not above 0 or far outside the training speeds, a parameter is missing, the rule gives no
+/// If the speed is not above 0 or far outside the training speeds, a parameter is missing, the rule gives no
 /// maximal crush, or an energy correction is out of bounds.
-pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, PredictError> {
+pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, Error> {
     let prediction = Prediction::new(model, query)?;
     prediction.curve(prediction.rule())
 }
@@ -58,7 +58,7 @@ pub fn predict_driving(
     query: &Query,
     force: ForceKind,
     member: Option<f64>,
-) -> Result<(DrivingCurve, Vec<Warning>), PredictError> {
+) -> Result<(DrivingCurve, Vec<Warning>), Error> {
     let motion = Motion::new(model, query)?;
     let needs_declared = motion.rule() == MaxCrushRule::Energy
         || query.energy_correct
@@ -90,10 +90,7 @@ pub struct Beyond {
 ///
 /// # Errors
 /// As [`predict`].
-pub fn predict_beyond(
-    model: &Model,
-    query: &Query,
-) -> Result<(PredictedCurve, Beyond), PredictError> {
+pub fn predict_beyond(model: &Model, query: &Query) -> Result<(PredictedCurve, Beyond), Error> {
     let prediction = Prediction::new(model, query)?;
     let curve = prediction.curve(prediction.rule())?;
     let Prediction { motion, declared, .. } = prediction;
@@ -109,13 +106,13 @@ struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
+    fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
         let asked = Asked::new(model, query)?;
         let longest = model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
         let along = grid(REACH * longest, POINTS);
         let force_n = model.body_force_n(&asked.at(), &along);
         let force_n = without_spikes(model, &along, force_n, true)?;
-        let body = Envelope::new(along, force_n)?;
+        let body = envelope(along, force_n)?;
         Ok(Self { asked, query, body })
     }
 
@@ -124,7 +121,7 @@ impl<'a> Motion<'a> {
     }
 
     /// The declared force in N, at the speeds that the motion gives at these deflections.
-    fn declared_n(&self, deflection_m: &[f64]) -> Result<Vec<f64>, PredictError> {
+    fn declared_n(&self, deflection_m: &[f64]) -> Result<Vec<f64>, Error> {
         let Asked { model, v, mass_kg, .. } = self.asked;
         if !model.has_body_force() {
             return Ok(deflection_m.iter().map(|&d| self.body.force_at(d)).collect());
@@ -136,14 +133,14 @@ impl<'a> Motion<'a> {
     }
 
     /// The body's force to the maximal crush and how it unloads, without the declared force.
-    fn driving(self) -> Result<(DrivingCurve, Vec<Warning>), PredictError> {
+    fn driving(self) -> Result<(DrivingCurve, Vec<Warning>), Error> {
         let Self { asked, body: beyond, .. } = &self;
         let model = asked.model;
         // The energy rule's answer, which needs the declared force, is not asked for.
         let crush = asked.max_crush(beyond, beyond);
         let deflection_m = evenly(chosen(&crush, self.rule())?);
         let force_n = deflection_m.iter().map(|&d| beyond.force_at(d)).collect();
-        let loading = Envelope::new(deflection_m, force_n)?;
+        let loading = envelope(deflection_m, force_n)?;
         let unloading = over_speed(model, asked.v, |c| c.unloading_stiffness_n_per_m);
         let mut warnings = model.warnings(&asked.at());
         warnings.extend(asked.warnings(unloading, loading.work() / asked.kinetic_energy_j));
@@ -182,13 +179,13 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// As [`predict`].
-    pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
         Self::of(Motion::new(model, query)?)
     }
 
-    fn of(motion: Motion<'a>) -> Result<Self, PredictError> {
+    fn of(motion: Motion<'a>) -> Result<Self, Error> {
         let along = motion.body.deflection_m();
-        let declared = Envelope::new(along.to_vec(), motion.declared_n(along)?)?;
+        let declared = envelope(along.to_vec(), motion.declared_n(along)?)?;
         let crush = motion.asked.max_crush(&declared, &motion.body);
         Ok(Self { motion, declared, crush })
     }
@@ -201,8 +198,8 @@ impl<'a> Prediction<'a> {
     /// The curve to the maximal crush of one rule.
     ///
     /// # Errors
-    /// [`PredictError`] if the rule gives no crush, or the energy correction is out of bounds.
-    pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, PredictError> {
+    /// If the rule gives no crush, or the energy correction is out of bounds.
+    pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, Error> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
         let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;
@@ -217,21 +214,22 @@ impl<'a> Prediction<'a> {
     }
 
     /// The force over these deflections, scaled to the impact's energy if that is asked for.
-    fn corrected(
-        &self,
-        deflection_m: &[f64],
-        force_n: Vec<f64>,
-    ) -> Result<Corrected, PredictError> {
-        let envelope = Envelope::new(deflection_m.to_vec(), force_n)?;
+    fn corrected(&self, deflection_m: &[f64], force_n: Vec<f64>) -> Result<Corrected, Error> {
+        let level = envelope(deflection_m.to_vec(), force_n)?;
         if !self.motion.query.energy_correct {
-            return Ok(Corrected { envelope, factor: None });
+            return Ok(Corrected { envelope: level, factor: None });
         }
-        let factor = self.motion.asked.kinetic_energy_j / envelope.work();
+        let factor = self.motion.asked.kinetic_energy_j / level.work();
         if !(CORRECTION.0..=CORRECTION.1).contains(&factor) {
-            return Err(PredictError::Correction { factor });
+            return Err(error!(
+                Prediction,
+                "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: the scale is not what is wrong; look at mass, speed and the rule for the maximal crush",
+                low = CORRECTION.0,
+                high = CORRECTION.1
+            ));
         }
-        let force_n = envelope.force_n().iter().map(|f| factor * f).collect();
-        let envelope = Envelope::new(deflection_m.to_vec(), force_n)?;
+        let force_n = level.force_n().iter().map(|f| factor * f).collect();
+        let envelope = envelope(deflection_m.to_vec(), force_n)?;
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 

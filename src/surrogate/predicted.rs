@@ -1,5 +1,7 @@
 //! The predicted curve: the master format of exports, and what can be made of it.
 
+use super::predict_error::envelope;
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -8,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::Warning;
 use super::band::Band;
 use super::max_crush::{MaxCrush, MaxCrushRule};
-use super::predict_error::PredictError;
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -163,13 +164,15 @@ impl PredictedCurve {
     /// The loading branch as a function.
     ///
     /// # Errors
-    /// [`PredictError`] if the curve was read from a file and breaks its promises.
-    pub(crate) fn envelope(&self) -> Result<Envelope, PredictError> {
+    /// If the curve was read from a file and breaks its promises.
+    pub(crate) fn envelope(&self) -> Result<Envelope, Error> {
         let stiffness = self.unloading_stiffness_n_per_m;
         if !(stiffness > 0.0 && stiffness.is_finite()) {
-            return Err(PredictError::Damaged(format!(
-                "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
-            )));
+            return Err(error!(
+                Prediction,
+                "{}",
+                format!("unloading_stiffness_N_per_m is {stiffness}: expected more than 0")
+            ));
         }
         for (name, value) in [
             ("speed_m_per_s", Some(self.speed_m_per_s)),
@@ -178,17 +181,23 @@ impl PredictedCurve {
             ("body_unloading_stiffness_N_per_m", self.body_unloading_stiffness_n_per_m),
         ] {
             if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-                return Err(PredictError::Damaged(format!(
-                    "{name} is {value}: expected more than 0"
-                )));
+                return Err(error!(
+                    Prediction,
+                    "{}",
+                    format!("{name} is {value}: expected more than 0")
+                ));
             }
         }
         let end = self.deflection_m.last().copied().unwrap_or_default();
         if (end / self.max_deflection_m - 1.0).abs() > SAME_END {
-            return Err(PredictError::Damaged(format!(
-                "max_deflection_m is {}, but the points end at {end} m",
-                self.max_deflection_m
-            )));
+            return Err(error!(
+                Prediction,
+                "{}",
+                format!(
+                    "max_deflection_m is {}, but the points end at {end} m",
+                    self.max_deflection_m
+                )
+            ));
         }
         for (name, values) in [
             ("force_low_N", &self.force_low_n),
@@ -200,14 +209,14 @@ impl PredictedCurve {
             if let Some(values) = values
                 && values.len() != self.force_n.len()
             {
-                return Err(PredictError::Damaged(format!(
-                    "{name} has {} values, force_N {}",
-                    values.len(),
-                    self.force_n.len()
-                )));
+                return Err(error!(
+                    Prediction,
+                    "{}",
+                    format!("{name} has {} values, force_N {}", values.len(), self.force_n.len())
+                ));
             }
         }
-        let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
+        let envelope = envelope(self.deflection_m.clone(), self.force_n.clone())?;
         pushing("force_N", envelope)
     }
 
@@ -215,17 +224,19 @@ impl PredictedCurve {
     /// quantiles are of the declared force only.
     ///
     /// # Errors
-    /// [`PredictError::NoBodyForce`] or [`PredictError::NoContactForce`] if it does not have that
+    /// the error or If it does not have that
     /// force, else the error that its points are no envelope.
-    pub fn of_force(&self, kind: ForceKind) -> Result<Self, PredictError> {
+    pub fn of_force(&self, kind: ForceKind) -> Result<Self, Error> {
         match (kind, self.provenance.force_kind) {
-            (ForceKind::Contact, ForceKind::Body) => Err(PredictError::NoContactForce),
+            (ForceKind::Contact, ForceKind::Body) => Err(
+                error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+            ),
             (ForceKind::Contact, ForceKind::Contact) => self.of_contact_force(),
             (ForceKind::Body, _) => self.of_body_force(),
         }
     }
 
-    fn of_contact_force(&self) -> Result<Self, PredictError> {
+    fn of_contact_force(&self) -> Result<Self, Error> {
         let stiffness = self.stiffness_at_end(&self.envelope()?);
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m = stiffness;
@@ -236,7 +247,7 @@ impl PredictedCurve {
         Ok(curve)
     }
 
-    fn of_body_force(&self) -> Result<Self, PredictError> {
+    fn of_body_force(&self) -> Result<Self, Error> {
         let envelope = self.driving_envelope()?;
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m = self.stiffness_at_end(&envelope);
@@ -284,8 +295,8 @@ impl PredictedCurve {
     /// The curve of one force that drives an interface.
     ///
     /// # Errors
-    /// [`PredictError`] if the curve does not have that force, or its points are no envelope.
-    pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, PredictError> {
+    /// If the curve does not have that force, or its points are no envelope.
+    pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, Error> {
         self.driving_member(force, None)
     }
 
@@ -293,16 +304,20 @@ impl PredictedCurve {
     /// to 1.
     ///
     /// # Errors
-    /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] or
-    /// [`PredictError::NoContactForce`] if it does not have that force; [`PredictError::Damaged`]
+    /// As [`envelope`](Self::envelope); the error or
+    /// If it does not have that force; the error
     /// for a member outside these bounds or a force without a band.
     pub(crate) fn driving_member(
         &self,
         force: ForceKind,
         member: Option<f64>,
-    ) -> Result<DrivingCurve, PredictError> {
+    ) -> Result<DrivingCurve, Error> {
         let mut loading = match (force, self.provenance.force_kind) {
-            (ForceKind::Contact, ForceKind::Body) => return Err(PredictError::NoContactForce),
+            (ForceKind::Contact, ForceKind::Body) => {
+                return Err(
+                    error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+                );
+            }
             (ForceKind::Contact, ForceKind::Contact) => self.envelope()?,
             (ForceKind::Body, _) => self.driving_envelope()?,
         };
@@ -333,9 +348,13 @@ impl PredictedCurve {
         force: ForceKind,
         loading: &Envelope,
         member: f64,
-    ) -> Result<Envelope, PredictError> {
+    ) -> Result<Envelope, Error> {
         if !(-1.0..=1.0).contains(&member) {
-            return Err(PredictError::Damaged(format!("band = {member}: expected from -1 to 1")));
+            return Err(error!(
+                Prediction,
+                "{}",
+                format!("band = {member}: expected from -1 to 1")
+            ));
         }
         let (low_n, high_n) = self.edges(force);
         let edge_n = if member < 0.0 { low_n } else { high_n };
@@ -345,27 +364,27 @@ impl PredictedCurve {
             if self.force_low_n.is_some() {
                 why += ", or train the model anew";
             }
-            PredictError::Damaged(why)
+            error!(Prediction, "{}", why)
         })?;
         let moved = |(force, edge): (&f64, &f64)| (force + member.abs() * (edge - force)).max(0.0);
         let force_n = loading.force_n().iter().zip(edge_n).map(moved).collect();
-        Ok(Envelope::new(loading.deflection_m().to_vec(), force_n)?)
+        envelope(loading.deflection_m().to_vec(), force_n)
     }
 
     /// The curve that moves a body of one mass: the body force, or the only force there is.
     ///
     /// # Errors
-    /// As [`envelope`](Self::envelope); [`PredictError::NoBodyForce`] for a contact force alone.
-    pub(crate) fn driving_envelope(&self) -> Result<Envelope, PredictError> {
+    /// As [`envelope`](Self::envelope); For a contact force alone.
+    pub(crate) fn driving_envelope(&self) -> Result<Envelope, Error> {
         let declared = self.envelope()?;
         match &self.body_force_n {
             Some(force_n) => {
-                let envelope = Envelope::new(self.deflection_m.clone(), force_n.clone())?;
+                let envelope = envelope(self.deflection_m.clone(), force_n.clone())?;
                 pushing("body_force_N", envelope)
             }
-            None if self.provenance.force_kind == ForceKind::Contact => {
-                Err(PredictError::NoBodyForce)
-            }
+            None if self.provenance.force_kind == ForceKind::Contact => Err(
+                error!(Prediction at "force", "the curve has a contact force and no body force: use the contact force, or predict it again with a model whose runs record velocities"),
+            ),
             None => Ok(declared),
         }
     }
@@ -375,11 +394,13 @@ impl PredictedCurve {
 const SAME_END: f64 = 1e-6;
 
 /// An envelope of the forces called `name`, none of which pulls.
-fn pushing(name: &str, envelope: Envelope) -> Result<Envelope, PredictError> {
+fn pushing(name: &str, envelope: Envelope) -> Result<Envelope, Error> {
     match envelope.first_pulling_point() {
-        Some(point) => Err(PredictError::Damaged(format!(
-            "{name} of point {point} is below 0: an interface only pushes"
-        ))),
+        Some(point) => Err(error!(
+            Prediction,
+            "{}",
+            format!("{name} of point {point} is below 0: an interface only pushes")
+        )),
         None => Ok(envelope),
     }
 }

@@ -1,11 +1,11 @@
 //! Queries: what is asked of a model, and what follows from that alone.
 
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use std::collections::BTreeMap;
 
 use super::cases::ModelCase;
 use super::curves::{interpolate_held, neighbours};
 use super::max_crush::{self, MaxCrush, MaxCrushRule};
-use super::predict_error::PredictError;
 use super::predicted::Rebound;
 use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
@@ -71,14 +71,22 @@ pub(super) struct Asked<'a> {
 }
 
 impl<'a> Asked<'a> {
-    pub(crate) fn new(model: &'a Model, query: &Query) -> Result<Self, PredictError> {
+    pub(crate) fn new(model: &'a Model, query: &Query) -> Result<Self, Error> {
         let v = query.speed_m_per_s;
         if !(v > 0.0 && v.is_finite()) {
-            return Err(PredictError::Speed { speed_m_per_s: v });
+            return Err(error!(
+                Prediction,
+                "the speed must be above 0, found {speed_m_per_s} m/s",
+                speed_m_per_s = v
+            ));
         }
         let (low, high) = model.range_m_per_s();
         if !query.extrapolate && is_far_outside(v, low, high) {
-            return Err(PredictError::FarOutside { outside: outside_of(v, low, high) });
+            return Err(error!(
+                Prediction,
+                "{outside}: further outside than a third of the range, where nothing tells how wrong a curve is: run FE at such a speed, or ask for it all the same with --extrapolate",
+                outside = outside_of(v, low, high)
+            ));
         }
         let mut parameters = query.parameters.clone();
         let other = match parameters.get(OTHER_MASS) {
@@ -109,13 +117,17 @@ impl<'a> Asked<'a> {
             let mut names: Vec<&str> =
                 model.features.iter().map(|f| f.parameter.as_str()).collect();
             names.dedup();
-            return Err(PredictError::UnknownParameter {
-                name: name.clone(),
-                known: if names.is_empty() { "none".into() } else { names.join(", ") },
-            });
+            let known_names = if names.is_empty() { vec!["none"] } else { names };
+            let known_names = known_names.into_iter();
+            return Err(error!(
+                Prediction,
+                "the model has no parameter \"{name}\": its parameters are"
+            )
+            .names(name, known_names)
+            .at(KeyPath::of("parameters").key(name).itself()));
         }
         let features = feature_values(&model.features, &parameters)
-            .map_err(|e| PredictError::Parameters(Box::new(e)))?;
+            .map_err(|e| e.coded_as(ErrorCode::Prediction).at_key("parameters"))?;
         let mass_kg = masses.effective_kg();
         let same_mass = (mass_kg / model.masses().effective_kg() - 1.0).abs() <= SAME_MASS;
         let kinetic_energy_j =

@@ -1,12 +1,14 @@
 //! A recorded case in the form of a predicted curve, so that it exports like one.
 
+use super::predict_error::envelope;
+use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
+use super::Warning;
 use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound};
-use super::{PredictError, Warning};
 use crate::curve::driving::NoDrivingCurve;
-use crate::curve::{Case, DrivingCurve, Envelope, EnvelopeError, ForceKind, Parameter};
+use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 
 /// The name that stands where a predicted curve has its model's.
@@ -18,9 +20,9 @@ impl PredictedCurve {
     /// piecewise linear.
     ///
     /// # Errors
-    /// [`PredictError::Damaged`] if the case's states make no loading branch.
-    pub fn of_case(case: &Case) -> Result<Self, PredictError> {
-        let no_curve = |e: NoDrivingCurve| PredictError::Damaged(format!("{}: {e}", case.name));
+    /// If the case's states make no loading branch.
+    pub fn of_case(case: &Case) -> Result<Self, Error> {
+        let no_curve = |e: NoDrivingCurve| error!(Prediction, "{}", format!("{}: {e}", case.name));
         let of_case = |force: ForceKind| {
             let mut curve = DrivingCurve::of_case(case, force)?;
             if case.moves_by_its_force() {
@@ -40,7 +42,7 @@ impl PredictedCurve {
         };
         let force_n = at(&declared.loading);
         let steepest = declared.loading.max_slope();
-        let loading = Envelope::new(deflection_m.clone(), force_n.clone())?;
+        let loading = envelope(deflection_m.clone(), force_n.clone())?;
         let driving = body.as_ref().unwrap_or(&declared);
         let top_n = driving.loading.force_at(driving.loading.end_m());
         let rebound = driving.unloading.stiffness_n_per_m().map(|stiffness_n_per_m| Rebound {
@@ -87,7 +89,7 @@ const ON_LINE: f64 = 1e-9;
 const FEWEST: usize = 4;
 
 /// The same function through its corners alone.
-fn corners(curve: Envelope) -> Result<Envelope, EnvelopeError> {
+fn corners(curve: Envelope) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let margin_n = ON_LINE * curve.peak_force_n();
     let (mut kept, mut from) = (vec![0], 0);

@@ -1,7 +1,7 @@
 //! Spikes: points of a predicted force that stand alone as none of a training curve does.
 
 use super::Model;
-use super::predict_error::PredictError;
+use crate::error::{Error, error};
 
 /// A point stands alone if its force lies above both neighbours, or below both, by more than
 /// this factor of what any training curve shows.
@@ -18,9 +18,13 @@ pub(super) fn without_spikes(
     deflection_m: &[f64],
     force_n: Vec<f64>,
     of_body: bool,
-) -> Result<Vec<f64>, PredictError> {
+) -> Result<Vec<f64>, Error> {
     if force_n.iter().any(|f| !f.is_finite()) {
-        return Err(PredictError::NoAnswer { model: model.name() });
+        return Err(error!(
+            Prediction,
+            "the {model} model has no answer at this speed: train another one",
+            model = model.name()
+        ));
     }
     let mut force_n: Vec<f64> = force_n.into_iter().map(|f| f.max(0.0)).collect();
     let step = deflection_m[1] - deflection_m[0];

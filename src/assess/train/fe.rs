@@ -1,12 +1,11 @@
 //! FE's run of a whole train: the vehicles' speeds from a solver's file.
 
-use std::path::Path;
-
-use crate::assess::error::TrainError;
+use crate::error::{Error, KeyPath, error};
 use crate::file;
 use crate::history::EntityId;
 use crate::scenario::ReferenceTable;
-use crate::solver::{self, Selection, WantedId};
+use crate::solver::{self, ReadError, Selection, WantedId};
+use std::path::Path;
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
 /// in which the first train moves.
@@ -29,8 +28,8 @@ impl FeTrain {
     /// Reads what a scenario's reference names; `path` is the scenario's.
     ///
     /// # Errors
-    /// [`TrainError`] names the file, node or component.
-    pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, TrainError> {
+    /// It names the file, node or component.
+    pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(&reference.file);
         let selection = Selection {
@@ -38,17 +37,26 @@ impl FeTrain {
             components: Some(vec![reference.component.clone()]),
             ..Selection::all()
         };
-        let read = solver::read(&file, None, &selection)?;
+        let read = solver::read(&file, None, &selection).map_err(|error| {
+            let node = |id: i64| reference.nodes.iter().find(|(_, node)| **node == id);
+            let key = match &error {
+                ReadError::NoSuchEntity { id, .. } => match node(id.id) {
+                    Some((name, _)) => KeyPath::of("nodes").key(name),
+                    None => KeyPath::default(),
+                },
+                ReadError::NoSuchComponent { .. } => KeyPath::of("component"),
+                _ => KeyPath::of("file"),
+            };
+            Error::from(error).at(KeyPath::of("reference").then(key))
+        })?;
         let units = reference.units;
         let contact_s = reference.contact.map_or(0.0, |t| t.0);
         let first = read.time.iter().take_while(|&&t| t * units.time_s < contact_s).count();
         let time_s = read.time[first..].iter().map(|t| t * units.time_s - contact_s).collect();
         let mut velocities = Vec::new();
         for (name, &node) in &reference.nodes {
-            let missing = || TrainError::NoHistory {
-                path: file.clone(),
-                node,
-                component: reference.component.clone(),
+            let missing = || {
+                error!(Comparison, "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]", component = reference.component, path = file.display()).at(KeyPath::of("reference.nodes").key(name))
             };
             let history = read.history(Some(EntityId::new(node)), &reference.component);
             let values = &history.ok_or_else(missing)?.values[first..];

@@ -1,11 +1,11 @@
 //! The methods in a train: what each makes of the scenario and its sources.
 
+use crate::error::{Error, KeyPath, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
 use crate::assess::choose::Purpose;
-use crate::assess::error::{CompareError, TrainError};
 use crate::assess::methods::{ddtcm_model, fit_nsdm};
 use crate::assess::settings::ComparisonSettings;
 use crate::assess::validate::{self, Choice};
@@ -28,20 +28,19 @@ pub(super) struct Method {
 }
 
 /// The case that each curve names and the group around it.
-fn groups(
-    path: &Path,
-    scenario: &Scenario,
-) -> Result<BTreeMap<String, (Case, Vec<Case>)>, CompareError> {
+fn groups(path: &Path, scenario: &Scenario) -> Result<BTreeMap<String, (Case, Vec<Case>)>, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut groups = BTreeMap::new();
     for (name, table) in &scenario.curves {
-        let not_a_case = || TrainError::NotACase { curve: name.clone() };
+        let not_a_case = || {
+            error!(Comparison, "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\"", curve = name).at(KeyPath::of("curves").key(name))
+        };
         let file = folder.join(table.database.as_ref().ok_or_else(not_a_case)?);
         let case = table.case.as_deref().and_then(|c| c.split_once('/'));
         let (group, case) = case.ok_or_else(not_a_case)?;
-        let database = Database::read(&file).map_err(TrainError::from)?;
-        let cases = database.group(&file, group).map_err(TrainError::from)?;
-        let case = database.case(&file, group, case).map_err(TrainError::from)?;
+        let database = Database::read(&file)?;
+        let cases = database.group(&file, group)?;
+        let case = database.case(&file, group, case)?;
         groups.insert(name.clone(), (case.clone(), cases.to_vec()));
     }
     Ok(groups)
@@ -50,13 +49,13 @@ fn groups(
 /// Every method in the scenario, in the order of the table.
 ///
 /// # Errors
-/// [`CompareError`] names the curve or group.
+/// It names the curve or group.
 pub(super) fn methods(
     path: &Path,
     scenario: &Scenario,
     sources: &Sources,
     settings: &ComparisonSettings,
-) -> Result<Vec<Method>, CompareError> {
+) -> Result<Vec<Method>, Error> {
     let groups = groups(path, scenario)?;
     // Every curve with the body's force, or with the recipe's.
     let with_body = || {
@@ -87,7 +86,7 @@ pub(super) fn methods(
     let start = Instant::now();
     let forests = with_models(sources, &groups, |group, cases| {
         // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
-        Ok(ddtcm_model(&TrainingSet::new(group, cases)?, settings.seed)?)
+        ddtcm_model(&TrainingSet::new(group, cases)?, settings.seed)
     })?;
     let mut paper = with_declared();
     paper.run.interface_speed = InterfaceSpeed::Train;
@@ -96,7 +95,7 @@ pub(super) fn methods(
     let start = Instant::now();
     let best = with_models(sources, &groups, |group, cases| {
         let choice = Choice::Auto { purpose: Purpose::Train, seed: settings.seed, trees: None };
-        Ok(validate::train(group, cases, choice)?)
+        validate::train(group, cases, choice)
     })?;
     let fit_s = start.elapsed().as_secs_f64();
     for (name, speed) in
@@ -191,8 +190,8 @@ fn of_model(name: &str, table: &mut CurveTable) {
 fn with_models(
     sources: &Sources,
     groups: &BTreeMap<String, (Case, Vec<Case>)>,
-    fit: impl Fn(&str, &[Case]) -> Result<Model, CompareError>,
-) -> Result<Sources, CompareError> {
+    fit: impl Fn(&str, &[Case]) -> Result<Model, Error>,
+) -> Result<Sources, Error> {
     let mut models = sources.clone();
     for (name, (case, cases)) in groups {
         models.replace(name, CurveSource::Model(Box::new(fit(&case.group, cases)?)));
@@ -206,7 +205,7 @@ fn with_nsdm(
     sources: &Sources,
     groups: &BTreeMap<String, (Case, Vec<Case>)>,
     settings: &ComparisonSettings,
-) -> Result<(Scenario, Sources), CompareError> {
+) -> Result<(Scenario, Sources), Error> {
     let (mut changed, mut springs) = (scenario.clone(), sources.clone());
     for (name, (case, _)) in groups {
         let fitted = fit_nsdm(case, settings)?;

@@ -7,17 +7,14 @@ mod row;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use super::error::{CompareError, TrainError};
 use super::settings::ComparisonSettings;
-use crate::error::KeyPath;
-use crate::scenario::{CheckedScenario, Scenario, Sources};
-use crate::solver::ReadError;
+use crate::error::{Error, KeyPath, error};
+use crate::scenario::{CheckedScenario, Sources};
 use fe::FeTrain;
 use methods::methods;
 use row::row;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Every method in one train.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -107,72 +104,55 @@ const SAME_SPEED: f64 = 0.02;
 /// vehicles' speeds with its reference.
 ///
 /// # Errors
-/// [`CompareError`] names the curve, vehicle or method.
+/// It names the curve, vehicle or method.
 pub fn compare_train(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     settings: &ComparisonSettings,
-) -> Result<TrainComparison, CompareError> {
-    compared(path, scenario, settings).map_err(|error| match error {
-        CompareError::Train(source) => match key(&source, scenario) {
-            Some(key) => {
-                let place = scenario.place(path, &key);
-                TrainError::InScenario { place, source: source.into() }.into()
-            }
-            None => source.into(),
-        },
-        other => other,
-    })
-}
-
-/// The key of the scenario that an error is about.
-fn key(error: &TrainError, scenario: &Scenario) -> Option<KeyPath> {
-    let reference = |key: &str| KeyPath::of("reference").key(key);
-    let of_node = |id: i64| {
-        let mut nodes = scenario.reference.iter().flat_map(|r| &r.nodes);
-        let (name, _) = nodes.find(|(_, node)| **node == id)?;
-        Some(reference("nodes").key(name))
-    };
-    Some(match error {
-        TrainError::NotACase { curve } => KeyPath::of("curves").key(curve),
-        TrainError::NoVehicle { name, .. } => reference("nodes").key(name).itself(),
-        TrainError::OtherSpeed { vehicle, .. } => reference("nodes").key(vehicle),
-        TrainError::NoHistory { node, .. } => of_node(*node)?,
-        TrainError::TooShort { .. } => reference("until"),
-        TrainError::RunTooShort { .. } => KeyPath::of("run.duration"),
-        TrainError::NoNodes => reference("nodes"),
-        TrainError::NoReference => KeyPath::default(),
-        TrainError::Read(ReadError::NoSuchEntity { id, .. }) => of_node(id.id)?,
-        TrainError::Read(ReadError::NoSuchComponent { .. }) => reference("component"),
-        TrainError::Read(_) => reference("file"),
-        TrainError::InScenario { .. } | TrainError::Scenario(_) => return None,
-    })
+) -> Result<TrainComparison, Error> {
+    compared(path, scenario, settings)
+        .map_err(|error| error.placed_if_keyed(|key| scenario.place(path, key)))
 }
 
 fn compared(
     path: &Path,
     scenario: &CheckedScenario<'_>,
     settings: &ComparisonSettings,
-) -> Result<TrainComparison, CompareError> {
-    let reference = scenario.reference.as_ref().ok_or(TrainError::NoReference)?;
+) -> Result<TrainComparison, Error> {
+    let reference = scenario.reference.as_ref().ok_or_else(|| {
+        error!(
+            Comparison,
+            "the scenario has no [reference]: add one that names FE's run of the train"
+        )
+        .placed(|key| scenario.place(path, key))
+    })?;
     if reference.nodes.is_empty() {
-        return Err(TrainError::NoNodes.into());
+        return Err(error!(
+            Comparison,
+            "[reference] nodes names no vehicle: write nodes = {{ A1 = 900001 }}"
+        )
+        .at_key("reference.nodes"));
     }
-    let fe = &FeTrain::read(path, reference).map_err(CompareError::from)?;
+    let fe = &FeTrain::read(path, reference)?;
     for (name, speeds) in &fe.velocities {
         let train = scenario.train.iter().find(|t| t.vehicles.iter().any(|v| v.name == *name));
         if let (Some(train), Some(&fe_m_per_s)) = (train, speeds.first()) {
             let m_per_s = train.speed.0;
             if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
                 let vehicle = name.clone();
-                return Err(TrainError::OtherSpeed { vehicle, fe_m_per_s, m_per_s }.into());
+                return Err(error!(Comparison, "in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
             }
         }
     }
     let until_s = reference.until.map_or(f64::MAX, |t| t.0);
     let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
     if states < 3 {
-        return Err(TrainError::TooShort { states, until_s }.into());
+        return Err(error!(
+            Comparison,
+            "FE's record has {} up to {until_s} s: at least 3 are needed",
+            crate::plural::counted(states, "state")
+        )
+        .at_key("reference.until"));
     }
     let time_s = &fe.time_s[..states];
     let sources = Sources::read(path, scenario)?;

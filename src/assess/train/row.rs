@@ -1,5 +1,6 @@
 //! One method in a train: its run, held against FE's.
 
+use crate::error::{Error, KeyPath, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -7,7 +8,6 @@ use std::time::Instant;
 use super::fe::FeTrain;
 use super::methods::Method;
 use super::{InterfaceCrush, TrainRow, VehicleErrors};
-use crate::assess::error::{CompareError, TrainError};
 use crate::curve::body::filtered;
 use crate::multibody::{Chain, Run, simulate};
 use crate::scenario;
@@ -18,13 +18,13 @@ use crate::signal::{derivative, integral, l1_ratio};
 /// FE's run.
 ///
 /// # Errors
-/// [`CompareError`] names the vehicle or curve.
+/// It names the vehicle or curve.
 pub(super) fn row(
     path: &Path,
     method: Method,
     fe: &FeTrain,
     time_s: &[f64],
-) -> Result<TrainRow, CompareError> {
+) -> Result<TrainRow, Error> {
     let start = Instant::now();
     let scenario = scenario::check(path, &method.scenario)?;
     let prepared = scenario::assemble(path, &scenario, &method.sources)?;
@@ -35,16 +35,16 @@ pub(super) fn row(
     for (name, reference) in &fe.velocities {
         let Some(i) = bodies.iter().position(|b| b.name == *name) else {
             let known: Vec<&str> = bodies.iter().map(|b| b.name.as_str()).collect();
-            return Err(
-                TrainError::NoVehicle { name: name.clone(), known: known.join(", ") }.into()
-            );
+            return Err(error!(
+                Comparison,
+                "the scenario has no vehicle \"{name}\": its vehicles are"
+            )
+            .names(name, known.into_iter())
+            .at(KeyPath::of("reference.nodes").key(name).itself()));
         };
         let reference = &reference[..time_s.len()];
         let ours = interpolate(&run.time_s, &run.bodies[i].v_m_per_s, time_s).map_err(|_| {
-            TrainError::RunTooShort {
-                duration_s: run.time_s.last().copied().unwrap_or(0.0),
-                until_s: time_s[time_s.len() - 1],
-            }
+            error!(Comparison, "the run ends at {duration_s} s, before FE's record or until ({until_s} s): lengthen duration, or set until in [reference]", duration_s = run.time_s.last().copied().unwrap_or(0.0), until_s = time_s[time_s.len() - 1]).at_key("run.duration")
         })?;
         vehicles.push(vehicle_errors(name, time_s, reference, &ours, fe.fastest_m_per_s()));
         velocities.insert(name.clone(), ours);

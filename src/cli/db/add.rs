@@ -9,7 +9,7 @@ use crate::import::{self, Item, Settings};
 use crate::unit::UnitSystem;
 use serde::Serialize;
 
-use super::super::curve_file::{self, CurveFile};
+use super::super::curve_file::CurveFile;
 use super::super::export::{FORCES, units};
 use super::arguments::{mass, one_of, parameter, speed};
 use super::list::print_group;
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         replace: args.replace,
         ..said
     };
-    let cases = import::add(database, &items, &settings).map_err(curve_file::failure)?;
+    let cases = import::add(database, &items, &settings)?;
     report(&cases, &database.display().to_string(), group, options)
 }
 

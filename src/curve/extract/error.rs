@@ -1,7 +1,8 @@
 //! Why a run gives no curve.
 
 use crate::curve::contact::milliseconds;
-use crate::curve::{CurveError, energy};
+use crate::curve::energy;
+use crate::error::Error;
 use crate::signal::cfc;
 
 /// Why a run gives no curve.
@@ -103,7 +104,7 @@ pub enum ExtractError {
     Filter(#[from] cfc::CfcError),
     /// The columns are no curve.
     #[error("{0}")]
-    Curve(#[from] CurveError),
+    Curve(#[from] Error),
 }
 
 impl ExtractError {

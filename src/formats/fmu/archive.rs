@@ -1,5 +1,6 @@
 //! The archive of an FMU: which file lies where.
 
+use crate::error::{Error, error};
 use std::io::{Cursor, Write};
 
 use zip::write::SimpleFileOptions;
@@ -8,7 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use super::description::{build_description, model_description};
 use super::table::Table;
 use super::text::{escaped, identifier};
-use super::{BINARIES, FmiVersion, FmuError, SOURCES, Spring, TABLE_HEADER};
+use super::{BINARIES, FmiVersion, SOURCES, Spring, TABLE_HEADER};
 
 /// Name of the generated C file.
 const TABLE_SOURCE: &str = "table.c";
@@ -18,7 +19,7 @@ pub(super) fn pack(
     version: FmiVersion,
     table: &Table,
     token: &str,
-) -> Result<Vec<u8>, FmuError> {
+) -> Result<Vec<u8>, Error> {
     let name = identifier(spring.name);
     let mut sources = SOURCES.to_vec();
     let table_source = table.source();
@@ -34,10 +35,9 @@ pub(super) fn pack(
         .last_modified_time(DateTime::default())
         .unix_permissions(0o644);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let mut add = |path: &str, bytes: &[u8]| -> Result<(), FmuError> {
-        archive.start_file(path, options)?;
-        archive.write_all(bytes)?;
-        Ok(())
+    let mut add = |path: &str, bytes: &[u8]| -> Result<(), Error> {
+        archive.start_file(path, options).map_err(not_packed)?;
+        archive.write_all(bytes).map_err(not_packed)
     };
     let model = model_description(spring, version, &name, token, &compiled);
     add("modelDescription.xml", model.as_bytes())?;
@@ -54,7 +54,11 @@ pub(super) fn pack(
     }
     add("documentation/index.html", documentation(spring).as_bytes())?;
     add("extra/crumple/facts.json", facts(spring)?.as_bytes())?;
-    Ok(archive.finish()?.into_inner())
+    Ok(archive.finish().map_err(not_packed)?.into_inner())
+}
+
+fn not_packed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    error!(Export, "the archive cannot be packed: {error}").caused_by(error)
 }
 
 /// What a user of the FMU must know.
@@ -72,12 +76,16 @@ fn documentation(spring: &Spring<'_>) -> String {
 }
 
 /// The facts for programs.
-fn facts(spring: &Spring<'_>) -> Result<String, FmuError> {
+fn facts(spring: &Spring<'_>) -> Result<String, Error> {
     let mut facts = serde_json::Map::new();
     facts.insert("name".into(), spring.name.into());
     facts.insert("description".into(), spring.description.into());
     for (key, value) in spring.facts {
         facts.insert((*key).into(), value.as_str().into());
     }
-    Ok(serde_json::to_string_pretty(&facts)? + "\n")
+    let text = serde_json::to_string_pretty(&facts);
+    let text = text.map_err(|e| {
+        error!(Export, "the facts of the curve cannot be written: {e}").caused_by(e)
+    })?;
+    Ok(text + "\n")
 }

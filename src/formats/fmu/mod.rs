@@ -10,6 +10,7 @@ mod description;
 mod table;
 mod text;
 
+use crate::error::Error;
 use crate::multibody::ForceLaw;
 use table::Table;
 
@@ -32,48 +33,6 @@ pub struct Spring<'a> {
     pub law: &'a ForceLaw,
     /// What is known of the curve, for documentation/ and extra/.
     pub facts: &'a [(&'static str, String)],
-}
-
-/// Why there is no FMU.
-#[derive(Debug, thiserror::Error)]
-pub enum FmuError {
-    /// The loading branch is longer than the table.
-    #[error("an FMU holds at most {room} points of a curve, found {points}")]
-    TooManyPoints {
-        /// Points of the loading branch.
-        points: usize,
-        /// As many as the binary has room for.
-        room: usize,
-    },
-    /// The unloading branch is longer than the table.
-    #[error("an FMU holds at most {room} points of an unloading branch, found {points}")]
-    TooManyShapePoints {
-        /// Points of the unloading branch.
-        points: usize,
-        /// As many as the binary has room for.
-        room: usize,
-    },
-    /// A number of the law is none.
-    #[error("the curve's {what} is no finite number")]
-    NotFinite {
-        /// Which of its numbers.
-        what: &'static str,
-    },
-    /// A compiled component without its marked block: it was built wrongly.
-    #[error("the FMU binary of {platform} has no place for a curve")]
-    NoPlace {
-        /// Whose binary it is.
-        platform: &'static str,
-    },
-    /// The archive's format does not allow it.
-    #[error("the archive cannot be packed: {0}")]
-    Packing(#[from] zip::result::ZipError),
-    /// The archive cannot be written in memory.
-    #[error("the archive cannot be packed: {0}")]
-    Writing(#[from] std::io::Error),
-    /// JSON cannot hold the facts.
-    #[error("the facts of the curve cannot be written: {0}")]
-    Facts(#[from] serde_json::Error),
 }
 
 /// A compiled component without a curve.
@@ -120,8 +79,8 @@ pub fn binaries() -> impl Iterator<Item = &'static str> {
 /// the force.
 ///
 /// # Errors
-/// [`FmuError`] if the curve has more points than the FMU has room for.
-pub fn archive(spring: &Spring<'_>, version: FmiVersion) -> Result<Vec<u8>, FmuError> {
+/// If the curve has more points than the FMU has room for.
+pub fn archive(spring: &Spring<'_>, version: FmiVersion) -> Result<Vec<u8>, Error> {
     let token = token(spring, version, &Table::new(spring.law, "")?);
     let table = Table::new(spring.law, &token)?;
     archive::pack(spring, version, &table, &token)

@@ -1,10 +1,9 @@
 //! The numbers of a law as the C sources hold them (c/table.h): the block of a ready binary, and a C
 //! file.
 
-use std::fmt::Write;
-
-use super::FmuError;
+use crate::error::{Error, error};
 use crate::multibody::{ForceLaw, LawTables};
+use std::fmt::Write;
 
 /// Begins the block. `c/blank.c` has the same, and a test compares the rest of the layout.
 const MARK: &[u8; 16] = b"CRUMPLE TABLE 1\0";
@@ -36,16 +35,25 @@ pub(super) struct Table {
 
 impl Table {
     /// # Errors
-    /// [`FmuError`] if a law has too many points, or numbers that are not finite.
-    pub(super) fn new(law: &ForceLaw, token: &str) -> Result<Self, FmuError> {
+    /// If a law has too many points, or numbers that are not finite.
+    pub(super) fn new(law: &ForceLaw, token: &str) -> Result<Self, Error> {
         let LawTables { deflection_m, force_n, slope_n_per_m, work_j, memory, .. } = law.tables();
         let LawTables { shape_length, shape_force, shape_rest, .. } = law.tables();
         let (points, shape_points) = (deflection_m.len(), shape_length.len());
         if points > POINTS {
-            return Err(FmuError::TooManyPoints { points, room: POINTS });
+            return Err(error!(
+                Export,
+                "an FMU holds at most {room} points of a curve, found {points}",
+                room = POINTS
+            ));
         }
         if shape_points > SHAPE {
-            return Err(FmuError::TooManyShapePoints { points: shape_points, room: SHAPE });
+            return Err(error!(
+                Export,
+                "an FMU holds at most {room} points of an unloading branch, found {points}",
+                points = shape_points,
+                room = SHAPE
+            ));
         }
         let (flags, numbers, dissipated_j) = match memory {
             // Never read, but no divisor should be 0.
@@ -69,7 +77,7 @@ impl Table {
         ];
         for (what, values) in checks {
             if values.iter().any(|v| !v.is_finite()) {
-                return Err(FmuError::NotFinite { what });
+                return Err(error!(Export, "the curve's {what} is no finite number"));
             }
         }
         let mut bytes = [0; TOKEN];
@@ -129,13 +137,13 @@ impl Table {
     /// A ready binary with this table in its block.
     ///
     /// # Errors
-    /// [`FmuError::NoPlace`] if it has not exactly one block of this layout.
+    /// If it has not exactly one block of this layout.
     pub(super) fn written_into(
         &self,
         binary: &[u8],
         platform: &'static str,
-    ) -> Result<Vec<u8>, FmuError> {
-        let no_place = FmuError::NoPlace { platform };
+    ) -> Result<Vec<u8>, Error> {
+        let no_place = error!(Export, "the FMU binary of {platform} has no place for a curve");
         let mut found = memchr::memmem::find_iter(binary, MARK);
         let (Some(at), None) = (found.next(), found.next()) else { return Err(no_place) };
         let block = self.bytes();

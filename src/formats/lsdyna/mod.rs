@@ -5,7 +5,8 @@
 mod deck;
 
 use super::text::{Lines, nine_digits, title};
-use super::{ExportCurve, ExportError, Exported, Options, TargetUnloading};
+use super::{ExportCurve, Exported, Options, TargetUnloading};
+use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
 /// Columns of a title.
@@ -65,10 +66,10 @@ struct Ids {
     material: u32,
 }
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, ExportError> {
+pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     if options.deck && curves.len() != 1 {
         let needs = format!("one curve for a deck of one mass, found {}", curves.len());
-        return Err(ExportError::Unfit { format: "lsdyna --deck", needs });
+        return Err(error!(Export, "{format} takes {needs}", format = "lsdyna --deck"));
     }
     let mut lines = Lines::default();
     let mut notes = Vec::new();

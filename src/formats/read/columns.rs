@@ -1,11 +1,12 @@
 //! Columns as a file holds them, and the curve made of them: one sign, one direction, without
 //! the points that other tools need.
 
+use crate::error::{Error, error};
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
 use super::curve::{Facts, ReadCurve, ReadFile};
-use super::error::{ContentError, Place};
+use super::error::Place;
 use crate::unit::UnitSystem;
 
 /// Most points of a curve: guards memory. Test records have some ten thousand.
@@ -15,9 +16,13 @@ pub(super) const MAX_POINTS: usize = 1_000_000;
 pub(super) const MAX_CURVES: usize = 10_000;
 
 /// Refuses one curve more than a file may have.
-pub(super) fn check_curves(curves: usize) -> Result<(), ContentError> {
+pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
     match curves > MAX_CURVES {
-        true => Err(ContentError::TooManyCurves { most: MAX_CURVES }),
+        true => Err(error!(
+            CurveFile,
+            "the file has more than {most} curves: take out the one that is meant",
+            most = MAX_CURVES
+        )),
         false => Ok(()),
     }
 }
@@ -88,11 +93,17 @@ impl Columns {
     /// The curve of these columns. A record over time keeps its signs, which its motion tells.
     ///
     /// # Errors
-    /// [`ContentError`] names the first point that does not fit.
-    pub(super) fn curve(mut self) -> Result<ReadCurve, ContentError> {
+    /// It names the first point that does not fit.
+    pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
-            return Err(ContentError::TooFew { points, of: "", least: MIN_POINTS });
+            return Err(error!(
+                CurveFile,
+                "the curve has {}{of}: expected at least {least}",
+                crate::plural::counted(points, "point"),
+                least = MIN_POINTS,
+                of = ""
+            ));
         }
         self.check_finite()?;
         if self.time_s.is_none() {
@@ -114,7 +125,7 @@ impl Columns {
         })
     }
 
-    fn check_finite(&self) -> Result<(), ContentError> {
+    fn check_finite(&self) -> Result<(), Error> {
         let columns = [
             ("deflection", Some(&self.deflection_m)),
             ("force", Some(&self.force_n)),
@@ -124,10 +135,14 @@ impl Columns {
             let Some(values) = values else { continue };
             if let Some(i) = values.iter().position(|v| !v.is_finite()) {
                 let place = self.places.of(i);
-                return Err(ContentError::NotFinite { place, what, value: values[i] });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: the {what} is {value}: expected a finite number",
+                    value = values[i]
+                ));
             }
             if what != "time" && values.iter().all(|v| *v == 0.0) {
-                return Err(ContentError::Nothing { what });
+                return Err(error!(CurveFile, "the {what} is 0 in every point: expected a curve"));
             }
         }
         Ok(())
@@ -155,7 +170,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Points {
-    fn of(columns: &Columns) -> Result<Self, ContentError> {
+    fn of(columns: &Columns) -> Result<Self, Error> {
         let most = (
             largest(columns.deflection_m.iter().copied()).abs(),
             largest(columns.force_n.iter().copied()).abs(),
@@ -171,7 +186,7 @@ impl Points {
         &mut self,
         crush_m: Option<f64>,
         notes: &mut Vec<String>,
-    ) -> Result<Vec<Point>, ContentError> {
+    ) -> Result<Vec<Point>, Error> {
         self.turn(notes);
         self.check_sides()?;
         self.put_in_order(notes);
@@ -182,7 +197,12 @@ impl Points {
         let points = self.list.len();
         if points < MIN_POINTS {
             let of = " without those of guard and repetition";
-            return Err(ContentError::TooFew { points, of, least: MIN_POINTS });
+            return Err(error!(
+                CurveFile,
+                "the curve has {}{of}: expected at least {least}",
+                crate::plural::counted(points, "point"),
+                least = MIN_POINTS
+            ));
         }
         self.check_order()?;
         if self.list[0].d > 0.0 {
@@ -219,7 +239,7 @@ impl Points {
     }
 
     /// Refuses pull, and forces beyond zero deflection.
-    fn check_sides(&mut self) -> Result<(), ContentError> {
+    fn check_sides(&mut self) -> Result<(), Error> {
         let (most_d, most_f) = self.most;
         for point in &mut self.list {
             let place = || point.place.clone();
@@ -228,10 +248,19 @@ impl Points {
             }
             if point.d < 0.0 && point.f.abs() > NOTHING * most_f {
                 let (deflection_m, force_n) = (point.d, point.f);
-                return Err(ContentError::BothSides { place: place(), deflection_m, force_n });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: the force is {force_n} N on the other side of zero deflection ({deflection_m} m): expected one side, compression; remove the points of tension",
+                    place = place()
+                ));
             }
             if point.f < -NOTHING * most_f {
-                return Err(ContentError::PullsAt { place: place(), force_n: point.f });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: the force is {force_n} N against the others' sign: an interface only pushes, so write pull as 0",
+                    force_n = point.f,
+                    place = place()
+                ));
             }
             point.f = point.f.max(0.0);
         }
@@ -339,7 +368,7 @@ impl Points {
     }
 
     /// Up to the largest deflection it must increase, behind it decrease.
-    fn check_order(&self) -> Result<(), ContentError> {
+    fn check_order(&self) -> Result<(), Error> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
         let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
         for i in 1..d.len() {
@@ -348,12 +377,13 @@ impl Points {
                 false => (d[i] < d[i - 1], "decrease behind the largest"),
             };
             if !fits {
-                return Err(ContentError::Order {
-                    place: self.list[i].place.clone(),
-                    way,
-                    deflection_m: d[i],
-                    before_m: d[i - 1],
-                });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: the deflection must {way}, found {deflection_m} m after {before_m} m: give the loading branch and at most one unloading branch behind it, or a column of times",
+                    before_m = d[i - 1],
+                    deflection_m = d[i],
+                    place = self.list[i].place
+                ));
             }
         }
         Ok(())

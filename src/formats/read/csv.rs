@@ -1,11 +1,12 @@
 //! Curve of a CSV file: columns by their headers, with their units.
 
+use crate::error::{Error, ErrorCode, error};
 use std::path::Path;
 
 use super::columns::{Columns, MAX_POINTS, Places};
 use super::curve::{self, Facts, title};
 use super::encoding::decoded;
-use super::error::{ContentError, Place, ReadCurveError, shown};
+use super::error::{Place, shown};
 use super::frame::{self, Fit, Frame};
 use super::label::Quantity;
 use super::layout::{Lack, Layout};
@@ -19,15 +20,18 @@ use crate::unit::UnitSystem;
 /// `# key: value` lines: [`super`].
 ///
 /// # Errors
-/// [`ReadCurveError`] with line and field.
-pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, ReadCurveError> {
+/// With line and field.
+pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, Error> {
     let (bytes, _) = open(path)?;
     let read = || {
         let text = decoded(&bytes).bytes;
         let table = Table::read(&text, None, &ColumnNames::default(), Lack::OfColumn)?;
         let envelope = Envelope::new(table.deflection_m, table.force_n)?;
         match envelope.first_pulling_point() {
-            Some(point) => Err(ContentError::Pulling { point }),
+            Some(point) => Err(error!(
+                CurveFile,
+                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+            )),
             None => Ok(table.facts.driving(envelope)),
         }
     };
@@ -50,7 +54,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     }
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let options = input.options;
     let mut table = Table::read(input.text, options.units, &options.columns, Lack::OfUnit)?;
     Ok(Columns {
@@ -86,7 +90,7 @@ impl Table {
         units: Option<UnitSystem>,
         asked: &ColumnNames,
         lack: Lack,
-    ) -> Result<Self, ContentError> {
+    ) -> Result<Self, Error> {
         let mut table = Self::default();
         let found = Frame::find(text, &asked.all(), lack == Lack::OfUnit);
         let frame = found.unwrap_or_else(|| Frame::at_first_line(text, separator(text)));
@@ -94,7 +98,8 @@ impl Table {
         table.title = frame.titles.first().map_or(String::new(), |(_, title)| title.clone());
         table.notes.extend(frame.note());
         let rest = frame.table(text);
-        let mut csv = CsvTable::separated(&rest, frame.lines, frame.separator.byte())?;
+        let mut csv =
+            CsvTable::separated(&rest, frame.lines, frame.separator.byte()).map_err(not_csv)?;
         let header = csv.header_row();
         let mut names: Vec<String> =
             csv.header().iter().take(frame::MOST_COLUMNS).map(Into::into).collect();
@@ -112,7 +117,13 @@ impl Table {
             Err(_) => false,
         });
         let layout = match has_names {
-            true => Layout::of(&names, line, units_row.transpose()?.as_ref(), lack, asked)?,
+            true => Layout::of(
+                &names,
+                line,
+                units_row.transpose().map_err(not_csv)?.as_ref(),
+                lack,
+                asked,
+            )?,
             false => Layout::without_header(&header, units, asked)?,
         };
         table.notes.extend(layout.note());
@@ -121,7 +132,7 @@ impl Table {
             table.push(&header, &taken)?;
         }
         for row in rows {
-            let row = row?;
+            let row = row.map_err(not_csv)?;
             // Spreadsheets write rows of separators alone.
             if row.fields().any(|field| !field.is_empty()) {
                 table.push(&row, &taken)?;
@@ -131,7 +142,7 @@ impl Table {
     }
 
     /// Takes the facts of the comments in front of the table; gives the last one with its line.
-    fn comments(&mut self, text: &[u8]) -> Result<Option<(u64, String)>, ContentError> {
+    fn comments(&mut self, text: &[u8]) -> Result<Option<(u64, String)>, Error> {
         let mut last = None;
         for (k, line) in text.split(|&b| b == b'\n').enumerate() {
             let line = String::from_utf8_lossy(line);
@@ -143,11 +154,15 @@ impl Table {
         Ok(last)
     }
 
-    fn push(&mut self, row: &Row, taken: &[(Quantity, usize, f64)]) -> Result<(), ContentError> {
+    fn push(&mut self, row: &Row, taken: &[(Quantity, usize, f64)]) -> Result<(), Error> {
         for &(quantity, field, size) in taken {
             let value = row.number(field).map_err(|NoNumber { line, column, found, .. }| {
                 let place = Place::Field { line, field: column };
-                ContentError::Number { place, found: shown(&found) }
+                error!(
+                    CurveFile,
+                    "{place}: expected a number, found \"{found}\"",
+                    found = shown(&found)
+                )
             })?;
             match quantity {
                 Quantity::Deflection => self.deflection_m.push(value * size),
@@ -157,8 +172,15 @@ impl Table {
         }
         self.lines.push(row.line);
         match self.lines.len() > MAX_POINTS {
-            true => Err(ContentError::TooMany { most: MAX_POINTS }),
+            true => Err(error!(
+                CurveFile,
+                "the curve has more than {most} points: thin it",
+                most = MAX_POINTS
+            )),
             false => Ok(()),
         }
     }
+}
+fn not_csv(error: csv::Error) -> Error {
+    Error::below(ErrorCode::CurveFile, error)
 }

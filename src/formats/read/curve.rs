@@ -1,8 +1,9 @@
 //! A curve as its file has it, in SI, with what the file says of it.
 
+use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
-use super::error::{ContentError, Place, ReadCurveError, shown};
+use super::error::{Place, shown};
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind};
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -78,20 +79,17 @@ impl Facts {
     /// comment's, for messages.
     ///
     /// # Errors
-    /// [`ContentError::Fact`] if the key is known and the value is none of its.
-    pub(super) fn take(
-        &mut self,
-        mark: &str,
-        comment: &str,
-        place: Place,
-    ) -> Result<(), ContentError> {
+    /// If the key is known and the value is none of its.
+    pub(super) fn take(&mut self, mark: &str, comment: &str, place: Place) -> Result<(), Error> {
         let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
         let (key, value) = (key.trim(), value.trim());
-        let wrong = |expected| ContentError::Fact {
-            place: place.clone(),
-            key: format!("{mark} {key}"),
-            found: shown(value),
-            expected,
+        let wrong = |expected| {
+            error!(
+                CurveFile,
+                "{place}: \"{key}: {found}\": expected {expected}",
+                found = shown(value),
+                key = format!("{mark} {key}")
+            )
         };
         let above_zero = || {
             let number = value.parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
@@ -157,7 +155,7 @@ pub(super) fn units(
     given: Option<UnitSystem>,
     remedy: &'static str,
     notes: &mut Vec<String>,
-) -> Result<UnitSystem, ContentError> {
+) -> Result<UnitSystem, Error> {
     match (stated, given) {
         (Some((units, line)), None) => {
             notes.push(format!("units: {units} by line {line} of the file"));
@@ -171,11 +169,17 @@ pub(super) fn units(
             notes.push(format!("units: {given} as given"));
             Ok(given)
         }
-        (None, None) => Err(ContentError::NoUnits { remedy }),
+        (None, None) => Err(error!(
+            CurveFile,
+            "the file does not say its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
+        )),
     }
 }
 
 /// An error of content, of the file at `path`.
-pub(super) fn content(path: &Path) -> impl Fn(ContentError) -> ReadCurveError {
-    move |error| ReadCurveError::Content { path: path.into(), source: Box::new(error) }
+pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
+    move |error| {
+        error!(CurveFile, "{path}: {source}", path = path.display(), source = error)
+            .caused_by(error)
+    }
 }

@@ -5,13 +5,15 @@
 //! reference channel, or without any, times are the time of the first sample and multiples of the interval, in s;
 //! with an explicit one they are the values of the channel that `Reference channel name` says.
 
+use crate::error::{Error, error};
+use crate::guess;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
 use super::curve::{Facts, ReadFile, title};
 use super::encoding::decoded;
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::label::Quantity;
 use super::text::{lines, number};
 use super::{Input, MAX_CURVE_BYTES};
@@ -41,13 +43,16 @@ pub(super) fn tests(folder: &Path) -> Vec<PathBuf> {
 const LISTED: usize = 20;
 
 /// Refuses a folder of several tests: each has a speed of its own.
-pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), ContentError> {
+pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), Error> {
     match tests {
         [only] if only.parent() == Some(folder) && !only.is_dir() => Ok(()),
         tests => {
             let known = tests.iter().take(LISTED).map(|test| test.display().to_string());
             let (tests, known) = (tests.len(), known.collect::<Vec<_>>().join(" "));
-            Err(ContentError::SeveralTests { tests, known })
+            Err(error!(
+                CurveFile,
+                "the folder holds {tests} ISO-MME tests: give those that are meant, each by itself: {known}"
+            ))
         }
     }
 }
@@ -59,14 +64,18 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
         || lines(input.beginning()).any(|(_, line)| is_header(&line))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut columns = Columns::at(Places::Rows);
     test_facts(input, &mut columns)?;
     let (mut found, mut bytes_left) = (Vec::new(), MAX_CURVE_BYTES);
     for path in channel_files(input.path)? {
-        let named = |source: ContentError| ContentError::Beside {
-            file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            source: Box::new(source),
+        let named = |source: Error| {
+            error!(
+                CurveFile,
+                "{file}: {source}",
+                file = path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+            )
+            .caused_by(source)
         };
         let bytes = file::read(&path, bytes_left).map_err(|e| named(e.into()))?;
         bytes_left -= bytes.len() as u64;
@@ -103,7 +112,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
     if motion_s.len() > 1 && !time_s.is_empty() {
         columns.deflection_m =
             interpolate(&motion_s, &deflection.values, &time_s).map_err(|e| {
-                ContentError::NoCurve { expected: "common times", found: e.to_string() }
+                error!(
+                    CurveFile,
+                    "expected {expected}, found {found}",
+                    expected = "common times",
+                    found = e
+                )
             })?;
     }
     columns.notes.push(format!(
@@ -118,7 +132,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
 }
 
 /// Takes what the test's `.mme` file says: of the folder, or the one that was given.
-fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), ContentError> {
+fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
     if !input.path.is_dir() {
         described(input.text, &mut columns.facts);
         return comments(input.text, &mut columns.facts);
@@ -160,7 +174,7 @@ fn merged(first: Facts, others: &[Facts]) -> Facts {
 }
 
 /// Takes the facts of lines `Comments :key: value`.
-fn comments(bytes: &[u8], facts: &mut Facts) -> Result<(), ContentError> {
+fn comments(bytes: &[u8], facts: &mut Facts) -> Result<(), Error> {
     for (at, line) in lines(bytes) {
         if let Some((key, value)) = line.split_once(':')
             && key.trim().eq_ignore_ascii_case("comments")
@@ -184,7 +198,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 }
 
 /// The channel files of a test: of its folder, of its `.mme` file, or beside one of them.
-fn channel_files(path: &Path) -> Result<Vec<PathBuf>, ContentError> {
+fn channel_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let is_channel = |p: &Path| {
         let digits = |e: &std::ffi::OsStr| e.to_string_lossy().bytes().all(|b| b.is_ascii_digit());
         p.extension().is_some_and(digits) && p.is_file()
@@ -239,7 +253,7 @@ enum Times {
 
 impl Channel {
     /// In s, one per value.
-    fn times(&self, channels: &[Self]) -> Result<Vec<f64>, ContentError> {
+    fn times(&self, channels: &[Self]) -> Result<Vec<f64>, Error> {
         let (wanted, line) = match &self.times {
             Times::Even { first_s, interval_s, .. } => {
                 return Ok((0..self.values.len())
@@ -254,21 +268,27 @@ impl Channel {
             _ => channels.iter().find(is_wanted),
         };
         let file = self.file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let named = |source| ContentError::Beside { file, source: Box::new(source) };
+        let named = |source| error!(CurveFile, "{file}: {source}").caused_by(source);
         let Some(found) = found else {
             let known: Vec<&str> = channels.iter().map(|c| &*c.code).take(LISTED).collect();
             let known = if known.is_empty() { "none".into() } else { known.join(", ") };
-            return Err(named(ContentError::NoTimes { place: Place::Line(line), known }));
+            return Err(named(error!(
+                CurveFile,
+                "{place}: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\" with the code of a channel of time (…TI…) beside it; there are {known}",
+                place = Place::Line(line)
+            )));
         };
         match found.values.len() == self.values.len() {
             true => Ok(found.values.clone()),
-            false => Err(named(ContentError::Declared {
-                place: Place::Line(line),
-                what: format!("the reference channel {}", found.code),
-                declared: format!("{} times", found.values.len()),
-                found: format!("{} values", self.values.len()),
-                remedy: "name the channel of its own times",
-            })),
+            false => Err(named(error!(
+                CurveFile,
+                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+                declared = format!("{} times", found.values.len()),
+                found = format!("{} values", self.values.len()),
+                place = Place::Line(line),
+                remedy = "name the channel of its own times",
+                what = format!("the reference channel {}", found.code)
+            ))),
         }
     }
 
@@ -285,7 +305,7 @@ impl Channel {
     }
 
     /// The channel of a file; `None` if it is of another dimension.
-    fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ContentError> {
+    fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, Error> {
         let file = ReadFile::of(path, bytes);
         let bytes = &decoded(bytes).bytes;
         let header = Header::read(bytes);
@@ -297,11 +317,16 @@ impl Channel {
             _ => return Ok(None),
         };
         let (line, unit) = header.entry("unit");
-        let size = quantity.size_of(unit).ok_or_else(|| ContentError::UnknownUnit {
-            place: Place::Line(line),
-            what: quantity.name(),
-            unit: shown(unit),
-            known: quantity.dimension().known_units(),
+        let size = quantity.size_of(unit).ok_or_else(|| {
+            let known = quantity.dimension().known_units();
+            let place = Place::Line(line);
+            let unit = shown(unit);
+            let what = quantity.name();
+            error!(
+                CurveFile,
+                "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}",
+                guess::hint(&unit, &known)
+            )
         })?;
         let times = match quantity {
             Quantity::Time => Times::Even { first_s: 0.0, interval_s: 0.0, is_stated: true },
@@ -354,17 +379,21 @@ impl Header {
         self.entry(name).1
     }
 
-    fn number(&self, name: &str) -> Result<f64, ContentError> {
+    fn number(&self, name: &str) -> Result<f64, Error> {
         let (line, text) = self.entry(name);
-        number(text).ok_or_else(|| ContentError::Expected {
-            place: Place::Line(line),
-            expected: format!("\"{name} :\" with a number"),
-            found: shown(text),
+        number(text).ok_or_else(|| {
+            error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = format!("\"{name} :\" with a number"),
+                found = shown(text),
+                place = Place::Line(line)
+            )
         })
     }
 
     /// Of which channel the times are, or how they follow from an interval.
-    fn times(&self) -> Result<Times, ContentError> {
+    fn times(&self) -> Result<Times, Error> {
         let (line, reference) = self.entry("reference channel");
         let is = |text: &str| reference.eq_ignore_ascii_case(text);
         let is_stated = is("implicit");
@@ -379,43 +408,57 @@ impl Header {
         let interval_s = self.number("sampling interval")?;
         if interval_s <= 0.0 {
             let (line, found) = self.entry("sampling interval");
-            let expected = "an interval above 0 in s".into();
+            let expected = "an interval above 0 in s";
             let place = Place::Line(line);
-            return Err(ContentError::Expected { place, expected, found: shown(found) });
+            return Err(error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                found = shown(found)
+            ));
         }
         Ok(Times::Even { first_s, interval_s, is_stated })
     }
 
     /// The values, in SI, and their lines.
-    fn values(&self, bytes: &[u8], size: f64) -> Result<(Vec<f64>, Vec<u64>), ContentError> {
+    fn values(&self, bytes: &[u8], size: f64) -> Result<(Vec<f64>, Vec<u64>), Error> {
         let (mut values, mut at) = (Vec::new(), Vec::new());
         for (line, text) in lines(bytes).filter(|(_, t)| !t.contains(':') && !t.trim().is_empty()) {
             let value = number(&text).ok_or_else(|| {
                 let place = Place::Line(line);
-                ContentError::Number { place, found: shown(&text) }
+                error!(
+                    CurveFile,
+                    "{place}: expected a number, found \"{found}\"",
+                    found = shown(&text)
+                )
             })?;
             values.push(value * size);
             at.push(line);
             if values.len() > MAX_POINTS {
-                return Err(ContentError::TooMany { most: MAX_POINTS });
+                return Err(error!(
+                    CurveFile,
+                    "the curve has more than {most} points: thin it",
+                    most = MAX_POINTS
+                ));
             }
         }
         let (line, declared) = self.entry("number of samples");
         match declared.parse::<usize>() {
             Ok(count) if count == values.len() => Ok((values, at)),
-            _ => Err(ContentError::Declared {
-                place: Place::Line(line),
-                what: "number of samples".into(),
-                declared: shown(declared),
-                found: format!("{} values", values.len()),
-                remedy: "write the file anew, it may be cut",
-            }),
+            _ => Err(error!(
+                CurveFile,
+                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+                declared = shown(declared),
+                found = format!("{} values", values.len()),
+                place = Place::Line(line),
+                remedy = "write the file anew, it may be cut",
+                what = "number of samples"
+            )),
         }
     }
 }
 
 /// The channels of the codes that were asked for, or the only ones.
-fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel), ContentError> {
+fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel), Error> {
     let codes = |quantity: Quantity, from: &[Channel]| {
         let of = from.iter().filter(|c| c.quantity == quantity);
         let codes: Vec<String> = of.map(|c| c.code.clone()).take(20).collect();
@@ -440,13 +483,25 @@ fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel)
         deflections.next().is_some() || forces.next().is_some(),
     ) {
         (Some(deflection), Some(force), false) => Ok((deflection, force)),
-        (Some(_), Some(_), true) => Err(ContentError::WhichCurve { known }),
+        (Some(_), Some(_), true) => Err(error!(
+            CurveFile,
+            "the file holds several curves: choose one with --curve: {known}"
+        )),
         _ => match asked {
-            Some(asked) => Err(ContentError::NoSuchCurve { asked: shown(asked), known }),
-            None => Err(ContentError::NoCurve {
-                expected: "a channel of displacement (code …DS…) and one of force (…FO…)",
-                found: known,
+            Some(asked) => Err({
+                let asked = shown(asked);
+                error!(
+                    CurveFile,
+                    "the file has no curve \"{asked}\": it has {known}{}",
+                    guess::hint(&asked, &known)
+                )
             }),
+            None => Err(error!(
+                CurveFile,
+                "expected {expected}, found {found}",
+                expected = "a channel of displacement (code …DS…) and one of force (…FO…)",
+                found = known
+            )),
         },
     }
 }

@@ -1,63 +1,34 @@
 //! Curve of a JSON file made by `crumple predict`: the master format of exports.
 
-use std::path::{Path, PathBuf};
+use crate::error::{Error, error};
+use std::path::Path;
 
 use super::curve::{Facts, ReadCurve, title};
-use super::error::{ContentError, ReadCurveError};
 use super::{Input, MIN_POINTS, curve};
 use crate::curve::{ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 use crate::file;
 use crate::formats::MAX_CURVE_BYTES;
 use crate::surrogate::PredictedCurve;
-use crate::surrogate::predict::PredictError;
 use crate::unit::UnitSystem;
-
-/// Why a file is no predicted curve.
-#[derive(Debug, thiserror::Error)]
-pub enum CurveFileError {
-    /// It cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is no such JSON.
-    #[error(
-        "{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict"
-    )]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What does not fit, with line and column.
-        source: serde_json::Error,
-    },
-    /// It breaks a promise of predicted curves.
-    #[error("{path}: {source}")]
-    Curve {
-        /// The file.
-        path: PathBuf,
-        /// Which promise.
-        source: PredictError,
-    },
-}
 
 /// Reads a predicted curve and checks its promises.
 ///
 /// # Errors
-/// [`CurveFileError`] with line and column, or with the promise that is broken.
-pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, CurveFileError> {
-    let bytes = file::read(path, MAX_CURVE_BYTES)
-        .map_err(|source| CurveFileError::Io { path: path.into(), source })?;
+/// With line and column, or with the promise that is broken.
+pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, Error> {
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|source| {
+        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
+    })?;
     parse(path, &bytes)
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, CurveFileError> {
+fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, Error> {
     let curve: PredictedCurve = serde_json::from_slice(bytes)
-        .map_err(|source| CurveFileError::Json { path: path.into(), source })?;
-    curve.envelope().map_err(|source| CurveFileError::Curve { path: path.into(), source })?;
+        .map_err(|source| error!(CurveFile, "{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict", path = path.display()).caused_by(source))?;
+    curve.envelope().map_err(|source| {
+        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
+    })?;
     Ok(curve)
 }
 
@@ -68,8 +39,10 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 /// The declared force, with the body's beside it where the file has both; or the force that was
 /// asked for, alone.
-pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, ReadCurveError> {
-    let damaged = |source| CurveFileError::Curve { path: input.path.into(), source };
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
+    let damaged = |source| {
+        error!(CurveFile, "{path}: {source}", path = input.path.display()).caused_by(source)
+    };
     let mut curve = parse(input.path, input.text)?;
     let both = curve.body_force_n.is_some();
     let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
@@ -78,7 +51,13 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, ReadCurveError> {
     }
     let points = curve.deflection_m.len();
     if points < MIN_POINTS {
-        let few = ContentError::TooFew { points, of: "", least: MIN_POINTS };
+        let few = error!(
+            CurveFile,
+            "the curve has {}{of}: expected at least {least}",
+            crate::plural::counted(points, "point"),
+            least = MIN_POINTS,
+            of = ""
+        );
         return Err(curve::content(input.path)(few));
     }
     if both {

@@ -1,7 +1,9 @@
 //! Labels of columns and axes: which quantity a text such as `displacement [mm]` or `F_kN` names,
 //! and its unit.
 
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::{Dimension, FORCE, LENGTH, TIME, UnitSystem};
 
 /// What a column of a curve's file can hold.
@@ -211,23 +213,23 @@ impl Label {
     /// SI value of one unit: the label's own, else that of the given system.
     ///
     /// # Errors
-    /// [`ContentError::UnknownUnit`], or [`ContentError::NoUnit`] without either.
+    /// the error, or the error without either.
     pub(super) fn size(
         &self,
         text: &str,
         given: Option<UnitSystem>,
         place: Place,
-    ) -> Result<f64, ContentError> {
+    ) -> Result<f64, Error> {
         let what = self.quantity.name();
         match (&self.unit, given) {
             (Some(unit), _) => self.quantity.size_of(unit).ok_or_else(|| {
                 let known = self.quantity.dimension().known_units();
-                ContentError::UnknownUnit { place, what, unit: shown(unit), known }
+                { let unit = shown(unit); error!(CurveFile, "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}", guess::hint(&unit, &known)) }
             }),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
                 let example = self.quantity.example();
-                Err(ContentError::NoUnit { place, what, found: shown(text), example })
+                Err(error!(CurveFile, "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI", found = shown(text)))
             }
         }
     }

@@ -1,9 +1,10 @@
 //! Which columns of a table hold what: by their headers, by a row of units below, or as the user has named them.
 
 use super::ColumnNames;
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::frame::unit_of;
 use super::label::{Label, Quantity};
+use crate::error::{Error, error};
 use crate::table::Row;
 use crate::unit::UnitSystem;
 
@@ -56,7 +57,7 @@ impl Column {
     }
 
     /// Takes its unit from the row below the header.
-    fn with_unit(mut self, units: Option<&Row>) -> Result<Self, ContentError> {
+    fn with_unit(mut self, units: Option<&Row>) -> Result<Self, Error> {
         let Some(row) = units else { return Ok(self) };
         let unit = unit_of(row.field(self.field));
         let size = |unit: &str| self.label.quantity.size_of(unit);
@@ -64,11 +65,13 @@ impl Column {
             _ if unit.is_empty() => {}
             None => (self.label.unit, self.line) = (Some(unit.into()), row.line),
             Some(own) if size(own).is_some() && size(own) != size(unit) => {
-                return Err(ContentError::Expected {
-                    place: Place::Field { line: row.line, field: self.field + 1 },
-                    expected: format!("the unit of the header, {}", shown(own)),
-                    found: shown(unit),
-                });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: expected {expected}, found \"{found}\"",
+                    expected = format!("the unit of the header, {}", shown(own)),
+                    found = shown(unit),
+                    place = Place::Field { line: row.line, field: self.field + 1 }
+                ));
             }
             Some(_) => {}
         }
@@ -84,7 +87,7 @@ impl Layout {
         units: Option<&Row>,
         lack: Lack,
         asked: &ColumnNames,
-    ) -> Result<Self, ContentError> {
+    ) -> Result<Self, Error> {
         let mut layout = Self { columns: Vec::new(), others: Vec::new() };
         let named = |quantity: Quantity| match asked.of(quantity) {
             Some(asked) => named(names, line, quantity, asked).map(Some),
@@ -118,7 +121,7 @@ impl Layout {
         mut found: Vec<Column>,
         (names, line): (&[String], u64),
         lack: Lack,
-    ) -> Result<(), ContentError> {
+    ) -> Result<(), Error> {
         let place = Place::Line(line);
         found.retain(|column| lack == Lack::OfUnit || column.label.unit.is_some());
         found.sort_by_key(Column::fit);
@@ -128,7 +131,10 @@ impl Layout {
         if alike.len() > 1 && lack == Lack::OfUnit {
             let (what, option) = (quantity.name(), quantity.option());
             let found = alike[..alike.len().min(LISTED)].join(", ");
-            return Err(ContentError::WhichColumn { place, what, found, option });
+            return Err(error!(
+                CurveFile,
+                "{place}: several columns could be the {what}: {found}; choose one with {option}, by its name or number"
+            ));
         }
         let mut found = found.into_iter();
         match found.next() {
@@ -144,7 +150,10 @@ impl Layout {
                     Lack::OfColumn => String::new(),
                 };
                 let (wanted, example) = (quantity.name(), quantity.example());
-                return Err(ContentError::Header { place, wanted, example, found, remedy });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"{remedy}"
+                ));
             }
         }
         self.others.extend(found);
@@ -156,14 +165,16 @@ impl Layout {
         row: &Row,
         units: Option<UnitSystem>,
         asked: &ColumnNames,
-    ) -> Result<Self, ContentError> {
+    ) -> Result<Self, Error> {
         if units.is_none() {
-            return Err(ContentError::NoUnit {
-                place: Place::Line(row.line),
-                what: "header (the names of the columns)",
-                found: shown(&format!("{} {}", row.field(0), row.field(1))),
-                example: "\"d_mm,force_kN\" above the values",
-            });
+            return Err(error!(
+                CurveFile,
+                "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
+                example = "\"d_mm,force_kN\" above the values",
+                found = shown(&format!("{} {}", row.field(0), row.field(1))),
+                place = Place::Line(row.line),
+                what = "header (the names of the columns)"
+            ));
         }
         let names: Vec<String> =
             (1..=row.fields().count()).map(|k| format!("column {k}")).collect();
@@ -201,7 +212,7 @@ impl Layout {
         units: Option<UnitSystem>,
         units_used: &mut bool,
         notes: &mut Vec<String>,
-    ) -> Result<Vec<(Quantity, usize, f64)>, ContentError> {
+    ) -> Result<Vec<(Quantity, usize, f64)>, Error> {
         let mut taken = Vec::new();
         let mut said = Vec::new();
         for Column { field, name, label, line } in &self.columns {
@@ -225,12 +236,7 @@ impl Layout {
 }
 
 /// The column of that name, or of that number counted from 1.
-fn named(
-    names: &[String],
-    line: u64,
-    quantity: Quantity,
-    asked: &str,
-) -> Result<Column, ContentError> {
+fn named(names: &[String], line: u64, quantity: Quantity, asked: &str) -> Result<Column, Error> {
     let asked = asked.trim();
     let by_name = names.iter().position(|name| name == asked);
     let by_case = || names.iter().position(|name| name.eq_ignore_ascii_case(asked));
@@ -243,12 +249,14 @@ fn named(
         None => {
             let known: Vec<String> =
                 names.iter().take(LISTED).map(|n| format!("\"{}\"", shown(n))).collect();
-            Err(ContentError::NoSuchColumn {
-                place: Place::Line(line),
-                option: quantity.option(),
-                asked: shown(asked),
-                known: known.join(", "),
-            })
+            Err(error!(
+                CurveFile,
+                "{place}: {option} \"{asked}\" is no column: expected a number from 1, or one of {known}",
+                asked = shown(asked),
+                known = known.join(", "),
+                option = quantity.option(),
+                place = Place::Line(line)
+            ))
         }
     }
 }

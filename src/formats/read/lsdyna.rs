@@ -8,8 +8,10 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{stated_units, title, units};
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::text::{lines, number};
+use crate::error::{Error, error};
+use crate::guess;
 
 const REMEDY: &str = " (or in a comment of the file: \"$ units: mm-t-s\")";
 
@@ -20,7 +22,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     })
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
     let found = deck.choose(input.options.curve.as_deref())?;
     let Found { id, title: found, scale, points, lines, facts, units: stated } = found;
@@ -97,7 +99,7 @@ struct Deck {
 }
 
 impl Deck {
-    fn read(bytes: &[u8]) -> Result<Self, ContentError> {
+    fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut deck = Self::default();
         let (mut next, mut is_long) = (Next::Other, false);
         for (number, line) in lines(bytes) {
@@ -134,7 +136,7 @@ impl Deck {
         Ok(deck)
     }
 
-    fn comment(&mut self, comment: &str, line: u64) -> Result<(), ContentError> {
+    fn comment(&mut self, comment: &str, line: u64) -> Result<(), Error> {
         let comment = comment.trim_start_matches(['$', '#']);
         if let Some(units) = stated_units(comment) {
             self.units = Some((units, line));
@@ -163,7 +165,7 @@ impl Deck {
         }
     }
 
-    fn card(&mut self, line: &str, number: u64, width: usize) -> Result<(), ContentError> {
+    fn card(&mut self, line: &str, number: u64, width: usize) -> Result<(), Error> {
         let (comment_line, facts, units) = (self.comment_line, self.facts, self.units);
         let Some(curve) = self.curves.last_mut() else { return Ok(()) };
         (curve.facts, curve.units) = (facts, units);
@@ -176,11 +178,13 @@ impl Deck {
                 }
                 None => String::new(),
             };
-            ContentError::Expected {
-                place: fields.place(0),
-                expected: format!("the number of a curve (LCID){hint}"),
-                found: shown(id),
-            }
+            error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = format!("the number of a curve (LCID){hint}"),
+                found = shown(id),
+                place = fields.place(0)
+            )
         })?;
         let or_one = |value: f64| if value == 0.0 { 1.0 } else { value };
         curve.scale = Scale {
@@ -192,7 +196,7 @@ impl Deck {
         Ok(())
     }
 
-    fn point(&mut self, line: &str, number: u64) -> Result<(), ContentError> {
+    fn point(&mut self, line: &str, number: u64) -> Result<(), Error> {
         let Some(curve) = self.curves.last_mut() else { return Ok(()) };
         if line.trim().is_empty() {
             return Ok(());
@@ -201,13 +205,17 @@ impl Deck {
         curve.points.push((fields.number(0, false)?, fields.number(1, false)?));
         curve.lines.push(number);
         match curve.points.len() > MAX_POINTS {
-            true => Err(ContentError::TooMany { most: MAX_POINTS }),
+            true => Err(error!(
+                CurveFile,
+                "the curve has more than {most} points: thin it",
+                most = MAX_POINTS
+            )),
             false => Ok(()),
         }
     }
 
     /// The curve of that number, or the only one.
-    fn choose(&mut self, asked: Option<&str>) -> Result<Found, ContentError> {
+    fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
         let known = || {
             let shown = |c: &Found| match c.title.is_empty() {
                 true => c.id.to_string(),
@@ -217,16 +225,31 @@ impl Deck {
         };
         let at = match (asked, self.curves.len()) {
             (_, 0) => {
-                let found = "none in this deck".into();
-                return Err(ContentError::NoCurve { expected: "a *DEFINE_CURVE", found });
+                let found = "none in this deck";
+                return Err(error!(
+                    CurveFile,
+                    "expected {expected}, found {found}",
+                    expected = "a *DEFINE_CURVE"
+                ));
             }
             (None, 1) => 0,
-            (None, _) => return Err(ContentError::WhichCurve { known: known() }),
+            (None, _) => {
+                return Err(error!(
+                    CurveFile,
+                    "the file holds several curves: choose one with --curve: {known}",
+                    known = known()
+                ));
+            }
             (Some(asked), _) => {
                 let is_asked = |c: &Found| c.id.to_string() == asked.trim();
-                self.curves.iter().position(is_asked).ok_or_else(|| ContentError::NoSuchCurve {
-                    asked: shown(asked),
-                    known: known(),
+                self.curves.iter().position(is_asked).ok_or_else(|| {
+                    let asked = shown(asked);
+                    let known = known();
+                    error!(
+                        CurveFile,
+                        "the file has no curve \"{asked}\": it has {known}{}",
+                        guess::hint(&asked, &known)
+                    )
                 })?
             }
         };
@@ -273,21 +296,28 @@ impl<'a> Fields<'a> {
     }
 
     /// A number; 0 for an empty field where that may be.
-    pub(super) fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, ContentError> {
+    pub(super) fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, Error> {
         let text = self.text(field).trim();
         if text.is_empty() && may_be_empty {
             return Ok(0.0);
         }
         number(text).ok_or_else(|| match text.split_whitespace().count() {
-            0 | 1 => ContentError::Number { place: self.place(field), found: shown(text) },
-            _ => ContentError::Expected {
-                place: self.place(field),
-                expected: format!(
+            0 | 1 => error!(
+                CurveFile,
+                "{place}: expected a number, found \"{found}\"",
+                found = shown(text),
+                place = self.place(field)
+            ),
+            _ => error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = format!(
                     "one number in each field of {} columns, or fields with commas between",
                     self.width
                 ),
-                found: shown(text),
-            },
+                found = shown(text),
+                place = self.place(field)
+            ),
         })
     }
 }

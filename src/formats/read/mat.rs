@@ -9,8 +9,10 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::units;
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::modelica::OURS;
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Longest name of a matrix, with its zero byte.
@@ -22,10 +24,14 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     is_later(input.bytes) || head(input.bytes, 0).is_some()
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     if is_later(input.bytes) {
-        let found = "one of a later version: save it with -v4".into();
-        return Err(ContentError::NoCurve { expected: "a MAT file of version 4", found });
+        let found = "one of a later version: save it with -v4";
+        return Err(error!(
+            CurveFile,
+            "expected {expected}, found {found}",
+            expected = "a MAT file of version 4"
+        ));
     }
     let matrices = matrices(input.bytes)?;
     let table = choose(&matrices, input.options.curve.as_deref())?;
@@ -151,14 +157,18 @@ fn head(bytes: &[u8], at: usize) -> Option<Head> {
 }
 
 /// The full matrices of doubles; others are passed over.
-fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, ContentError> {
+fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
     let mut found = Vec::new();
     let mut at = 0;
     while at < bytes.len() {
-        let head = head(bytes, at).ok_or_else(|| ContentError::Expected {
-            place: Place::Byte(at),
-            expected: "a matrix of a MAT file of version 4 (save it with -v4)".into(),
-            found: format!("{} bytes of something else", bytes.len() - at),
+        let head = head(bytes, at).ok_or_else(|| {
+            error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = "a matrix of a MAT file of version 4 (save it with -v4)",
+                found = format!("{} bytes of something else", bytes.len() - at),
+                place = Place::Byte(at)
+            )
         })?;
         let begin = at + HEAD + head.name;
         let name = bytes.get(at + HEAD..begin).unwrap_or_default();
@@ -167,13 +177,15 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, ContentError> {
         let size = values.and_then(|n| n.checked_mul(head.number << usize::from(head.is_complex)));
         let end = size.and_then(|size| begin.checked_add(size)).filter(|end| *end <= bytes.len());
         let Some(end) = end else {
-            return Err(ContentError::Declared {
-                place: Place::Byte(at),
-                what: format!("matrix {}", shown(&name)),
-                declared: format!("{} rows of {}", head.rows, head.columns),
-                found: format!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
-                remedy: "write the file anew, it may be cut",
-            });
+            return Err(error!(
+                CurveFile,
+                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+                declared = format!("{} rows of {}", head.rows, head.columns),
+                found = format!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
+                place = Place::Byte(at),
+                remedy = "write the file anew, it may be cut",
+                what = format!("matrix {}", shown(&name))
+            ));
         };
         if head.is_read {
             found.push(Matrix {
@@ -192,10 +204,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, ContentError> {
 }
 
 /// The matrix that was asked for, else ours, else the only one of two columns.
-fn choose<'a>(
-    matrices: &'a [Matrix<'_>],
-    asked: Option<&str>,
-) -> Result<&'a Matrix<'a>, ContentError> {
+fn choose<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
     let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2 && !m.is_text).collect();
     let known = || fitting.iter().map(|m| shown(&m.name)).collect::<Vec<_>>().join(", ");
     let by_name = |name: &str| fitting.iter().find(|m| m.name == name).copied();
@@ -209,16 +218,33 @@ fn choose<'a>(
                 _ => sizes.take(20).collect::<Vec<_>>().join(", "),
             };
             let expected = "a full matrix of doubles with two columns, such as fd_load";
-            return Err(ContentError::NoCurve { expected, found });
+            return Err(error!(CurveFile, "expected {expected}, found {found}"));
         }
-        (Some(asked), ..) => by_name(asked)
-            .ok_or_else(|| ContentError::NoSuchCurve { asked: shown(asked), known: known() })?,
+        (Some(asked), ..) => by_name(asked).ok_or_else(|| {
+            let asked = shown(asked);
+            let known = known();
+            error!(
+                CurveFile,
+                "the file has no curve \"{asked}\": it has {known}{}",
+                guess::hint(&asked, &known)
+            )
+        })?,
         (None, Some(ours), _) => ours,
         (None, None, [only]) => only,
-        (None, None, _) => return Err(ContentError::WhichCurve { known: known() }),
+        (None, None, _) => {
+            return Err(error!(
+                CurveFile,
+                "the file holds several curves: choose one with --curve: {known}",
+                known = known()
+            ));
+        }
     };
     match table.rows > MAX_POINTS {
-        true => Err(ContentError::TooMany { most: MAX_POINTS }),
+        true => Err(error!(
+            CurveFile,
+            "the curve has more than {most} points: thin it",
+            most = MAX_POINTS
+        )),
         false => Ok(table),
     }
 }

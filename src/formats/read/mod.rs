@@ -26,6 +26,8 @@ mod radioss;
 mod text;
 mod two_columns;
 
+use crate::error::{Error, error};
+use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
@@ -36,8 +38,6 @@ use columns::Columns;
 pub(crate) use curve::Facts;
 pub use curve::ReadCurve;
 pub(crate) use curve::ReadFile;
-pub(crate) use error::ContentError;
-pub(crate) use error::ReadCurveError;
 use label::Quantity;
 
 /// One format of curves.
@@ -58,11 +58,11 @@ pub struct Reader {
 #[derive(Debug)]
 enum Read {
     /// Columns of a binary file, of which the curve is made.
-    Binary(fn(&Input<'_>) -> Result<Columns, ContentError>),
+    Binary(fn(&Input<'_>) -> Result<Columns, Error>),
     /// Columns of a text, of which the curve is made.
-    Columns(fn(&Input<'_>) -> Result<Columns, ContentError>),
+    Columns(fn(&Input<'_>) -> Result<Columns, Error>),
     /// The curve itself.
-    Curve(fn(&Input<'_>) -> Result<ReadCurve, ReadCurveError>),
+    Curve(fn(&Input<'_>) -> Result<ReadCurve, Error>),
 }
 
 /// Every format we read, in the order in which content is tried. To add one: write its module, add
@@ -219,11 +219,8 @@ pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
 /// Reads the curve at `path`, a file, or for ISO-MME a test's folder.
 ///
 /// # Errors
-/// [`ReadCurveError`] names the file, the place in it, what was expected there and what to do.
-pub fn read(
-    path: &Path,
-    options: &ReadOptions,
-) -> Result<(ReadCurve, &'static Reader), ReadCurveError> {
+/// It names the file, the place in it, what was expected there and what to do.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static Reader), Error> {
     let tests = if path.is_dir() { iso_mme::tests(path) } else { Vec::new() };
     let (bytes, own) = match tests.is_empty() {
         false => {
@@ -233,19 +230,32 @@ pub fn read(
         true => open(path).map(|(bytes, own)| (bytes, Some(own)))?,
     };
     if bytes.starts_with(ZIP) {
-        let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV".into();
-        return Err(curve::content(path)(ContentError::NoCurve { expected: "a curve", found }));
+        let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV";
+        return Err(curve::content(path)(error!(
+            CurveFile,
+            "expected {expected}, found {found}",
+            expected = "a curve"
+        )));
     }
     let text = encoding::decoded(&bytes);
     let input = Input { path, bytes: &bytes, text: &text.bytes, options };
     if bytes.is_empty() && own.is_some() {
-        let empty = ContentError::NoCurve { expected: "a curve", found: "an empty file".into() };
+        let empty = error!(
+            CurveFile,
+            "expected {expected}, found {found}",
+            expected = "a curve",
+            found = "an empty file"
+        );
         return Err(curve::content(path)(empty));
     }
     let reader = reader(&input)?;
     if let (Some(option), true) = (options.columns.option(), reader.name != TABLES) {
-        let (path, format) = (path.into(), reader.name);
-        return Err(ReadCurveError::NoColumns { path, format, option });
+        let format = reader.name;
+        return Err(error!(
+            CurveFile,
+            "{path}: this is read as {format}, which has no columns to choose: remove {option}, or read it as a table with --from csv",
+            path = path.display()
+        ));
     }
     let mut curve = match reader.read {
         Read::Binary(read) | Read::Columns(read) => {
@@ -265,12 +275,18 @@ pub fn read(
 }
 
 /// The reader that was named, else the first that knows the content, else that of the extension.
-fn reader(input: &Input<'_>) -> Result<&'static Reader, ReadCurveError> {
+fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
     let known = || READERS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
     if let Some(name) = &input.options.format {
         let found = READERS.iter().find(|r| r.name == name);
-        return found
-            .ok_or_else(|| ReadCurveError::NoSuchFormat { name: name.clone(), known: known() });
+        return found.ok_or_else(|| {
+            let known = known();
+            error!(
+                CurveFile,
+                "there is no format \"{name}\" of curves that can be read: use one of {known}{}",
+                guess::hint(name, &known)
+            )
+        });
     }
     let extension = input.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let extension = extension.to_ascii_lowercase();
@@ -278,13 +294,14 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, ReadCurveError> {
         .iter()
         .find(|r| (r.recognise)(input))
         .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
-        .ok_or_else(|| ReadCurveError::Unrecognised { path: input.path.into(), known: known() })
+        .ok_or_else(|| error!(CurveFile, "{path}: neither content nor extension tell the format of this file: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.
-fn open(path: &Path) -> Result<(Vec<u8>, ReadFile), ReadCurveError> {
-    let bytes = file::read(path, MAX_CURVE_BYTES)
-        .map_err(|source| ReadCurveError::Io { path: path.into(), source })?;
+fn open(path: &Path) -> Result<(Vec<u8>, ReadFile), Error> {
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|source| {
+        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
+    })?;
     let own = ReadFile::of(path, &bytes);
     Ok((bytes, own))
 }

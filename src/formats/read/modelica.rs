@@ -7,9 +7,11 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, units};
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Name of the table and of the matrix that our exports write, in SI.
@@ -24,7 +26,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
         .is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let file = File::read(input.text)?;
     let table = file.choose(input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: table {} of the file", table.name)];
@@ -85,7 +87,7 @@ struct File {
 }
 
 impl File {
-    fn read(bytes: &[u8]) -> Result<Self, ContentError> {
+    fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut file = Self { tables: Vec::new(), facts: Facts::default(), units: None };
         for (at, line) in lines(bytes) {
             let (text, comment) = line.split_once('#').unwrap_or((&line, ""));
@@ -115,22 +117,35 @@ impl File {
         Ok(file)
     }
 
-    fn values(&mut self, text: &str, line: u64) -> Result<(), ContentError> {
+    fn values(&mut self, text: &str, line: u64) -> Result<(), Error> {
         let words = text.split([' ', '\t', ',', ';', '\r']).filter(|w| !w.is_empty());
         for (field, word) in words.enumerate() {
             let place = Place::Field { line, field: field + 1 };
             let Some(table) = self.tables.last_mut() else {
-                let expected = "a table such as \"double fd_load(4,2)\" in front of values".into();
-                return Err(ContentError::Expected { place, expected, found: shown(word) });
+                let expected = "a table such as \"double fd_load(4,2)\" in front of values";
+                return Err(error!(
+                    CurveFile,
+                    "{place}: expected {expected}, found \"{found}\"",
+                    found = shown(word)
+                ));
             };
-            let value = number(word)
-                .ok_or_else(|| ContentError::Number { place: place.clone(), found: shown(word) })?;
+            let value = number(word).ok_or_else(|| {
+                error!(
+                    CurveFile,
+                    "{place}: expected a number, found \"{found}\"",
+                    found = shown(word)
+                )
+            })?;
             if table.values.len() == table.rows * table.columns {
                 let expected = format!(
                     "no more than the {} rows of {} that table {} declares",
                     table.rows, table.columns, table.name
                 );
-                return Err(ContentError::Expected { place, expected, found: shown(word) });
+                return Err(error!(
+                    CurveFile,
+                    "{place}: expected {expected}, found \"{found}\"",
+                    found = shown(word)
+                ));
             }
             if table.values.len() % table.columns == 0 {
                 table.lines.push(line);
@@ -141,44 +156,57 @@ impl File {
     }
 
     /// Whether the last table has all its values.
-    fn check_last(&self) -> Result<(), ContentError> {
+    fn check_last(&self) -> Result<(), Error> {
         let Some(table) = self.tables.last() else { return Ok(()) };
         match table.values.len() == table.rows * table.columns {
             true => Ok(()),
-            false => Err(ContentError::Declared {
-                place: Place::Line(table.line),
-                what: format!("table {}", table.name),
-                declared: format!("{} rows of {}", table.rows, table.columns),
-                found: format!("{} values for it", table.values.len()),
-                remedy: "write the file anew, it may be cut",
-            }),
+            false => Err(error!(
+                CurveFile,
+                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+                declared = format!("{} rows of {}", table.rows, table.columns),
+                found = format!("{} values for it", table.values.len()),
+                place = Place::Line(table.line),
+                remedy = "write the file anew, it may be cut",
+                what = format!("table {}", table.name)
+            )),
         }
     }
 
     /// The table that was asked for, else ours, else the only one that can be a curve.
-    fn choose(&self, asked: Option<&str>) -> Result<&Table, ContentError> {
+    fn choose(&self, asked: Option<&str>) -> Result<&Table, Error> {
         let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
         let known = || fitting.iter().map(|t| t.name.clone()).collect::<Vec<_>>().join(", ");
         if fitting.is_empty() {
             let found = format!("{} others", self.tables.len());
             let expected = "a table of two columns, such as \"double fd_load(4,2)\"";
-            return Err(ContentError::NoCurve { expected, found });
+            return Err(error!(CurveFile, "expected {expected}, found {found}"));
         }
         let by_name = |name: &str| fitting.iter().find(|t| t.name == name).copied();
         // Several of ours are the curves of several speeds.
         let ours = fitting.iter().filter(|t| t.name.starts_with(OURS)).count();
         match (asked, by_name(OURS).filter(|_| ours == 1), &fitting[..]) {
-            (Some(asked), ..) => by_name(asked)
-                .ok_or_else(|| ContentError::NoSuchCurve { asked: shown(asked), known: known() }),
+            (Some(asked), ..) => by_name(asked).ok_or_else(|| {
+                let asked = shown(asked);
+                let known = known();
+                error!(
+                    CurveFile,
+                    "the file has no curve \"{asked}\": it has {known}{}",
+                    guess::hint(&asked, &known)
+                )
+            }),
             (None, Some(ours), _) => Ok(ours),
             (None, None, [only]) => Ok(only),
-            (None, None, _) => Err(ContentError::WhichCurve { known: known() }),
+            (None, None, _) => Err(error!(
+                CurveFile,
+                "the file holds several curves: choose one with --curve: {known}",
+                known = known()
+            )),
         }
     }
 }
 
 /// Name, rows and columns, if the line declares a table.
-fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, ContentError> {
+fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, Error> {
     let text = text.trim();
     let rest = ["double", "float"].iter().find_map(|kind| text.strip_prefix(kind));
     let Some(rest) = rest.filter(|rest| rest.starts_with([' ', '\t'])) else { return Ok(None) };
@@ -188,10 +216,14 @@ fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, 
         let (rows, columns) = (rows.trim().parse().ok()?, columns.trim().parse().ok()?);
         (rows > 0 && columns > 0).then(|| (name.trim().to_string(), rows, columns))
     };
-    parse().map(Some).ok_or_else(|| ContentError::Expected {
-        place: Place::Line(line),
-        expected: "a table such as \"double fd_load(4,2)\"".into(),
-        found: shown(text),
+    parse().map(Some).ok_or_else(|| {
+        error!(
+            CurveFile,
+            "{place}: expected {expected}, found \"{found}\"",
+            expected = "a table such as \"double fd_load(4,2)\"",
+            found = shown(text),
+            place = Place::Line(line)
+        )
     })
 }
 
@@ -202,19 +234,25 @@ fn check_size(
     columns: usize,
     bytes: usize,
     line: u64,
-) -> Result<(), ContentError> {
+) -> Result<(), Error> {
     if rows > MAX_POINTS {
-        return Err(ContentError::TooMany { most: MAX_POINTS });
+        return Err(error!(
+            CurveFile,
+            "the curve has more than {most} points: thin it",
+            most = MAX_POINTS
+        ));
     }
     match rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
         true => Ok(()),
-        false => Err(ContentError::Declared {
-            place: Place::Line(line),
-            what: format!("table {}", shown(name)),
-            declared: format!("{rows} rows of {columns}"),
-            found: format!("{bytes} bytes"),
-            remedy: "correct the size",
-        }),
+        false => Err(error!(
+            CurveFile,
+            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+            declared = format!("{rows} rows of {columns}"),
+            found = format!("{bytes} bytes"),
+            place = Place::Line(line),
+            remedy = "correct the size",
+            what = format!("table {}", shown(name))
+        )),
     }
 }
 

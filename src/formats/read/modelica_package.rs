@@ -6,8 +6,10 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, title};
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::text::{lines, number};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::UnitSystem;
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
@@ -16,20 +18,22 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
         || lines(input.beginning()).any(|(_, line)| line.trim().starts_with("constant Real d["))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let packages = packages(input.text)?;
     let package = choose(&packages, input.options.curve.as_deref())?;
     for array in [&package.d, &package.f] {
         array.check()?;
     }
     if package.d.values.len() != package.f.values.len() {
-        return Err(ContentError::Declared {
-            place: Place::Line(package.f.line),
-            what: "constant f".into(),
-            declared: format!("{} forces", package.f.values.len()),
-            found: format!("{} deflections", package.d.values.len()),
-            remedy: "write the file anew",
-        });
+        return Err(error!(
+            CurveFile,
+            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+            declared = format!("{} forces", package.f.values.len()),
+            found = format!("{} deflections", package.d.values.len()),
+            place = Place::Line(package.f.line),
+            remedy = "write the file anew",
+            what = "constant f"
+        ));
     }
     let mut notes = vec![
         format!("curve: constants d and f of package {}, SI", shown(&package.name)),
@@ -57,16 +61,18 @@ struct Array {
 }
 
 impl Array {
-    fn check(&self) -> Result<(), ContentError> {
+    fn check(&self) -> Result<(), Error> {
         match self.is_closed && self.values.len() == self.declared {
             true => Ok(()),
-            false => Err(ContentError::Declared {
-                place: Place::Line(self.line),
-                what: format!("constant {}", self.name),
-                declared: format!("{} values", self.declared),
-                found: self.values.len().to_string(),
-                remedy: "write the file anew, it may be cut",
-            }),
+            false => Err(error!(
+                CurveFile,
+                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
+                declared = format!("{} values", self.declared),
+                found = self.values.len(),
+                place = Place::Line(self.line),
+                remedy = "write the file anew, it may be cut",
+                what = format!("constant {}", self.name)
+            )),
         }
     }
 }
@@ -81,7 +87,7 @@ struct Package {
 }
 
 /// The packages that hold a table.
-fn packages(text: &[u8]) -> Result<Vec<Package>, ContentError> {
+fn packages(text: &[u8]) -> Result<Vec<Package>, Error> {
     let (mut packages, mut facts) = (Vec::<Package>::new(), Facts::default());
     // The array that goes on in the next line.
     let mut open: Option<&'static str> = None;
@@ -131,7 +137,7 @@ impl Package {
 
 impl Array {
     /// Takes the numbers of a line, up to the closing brace.
-    fn take(&mut self, text: &str, line: u64) -> Result<(), ContentError> {
+    fn take(&mut self, text: &str, line: u64) -> Result<(), Error> {
         let (text, is_closed) = match text.split_once('}') {
             Some((text, _)) => (text, true),
             None => (text, false),
@@ -139,11 +145,20 @@ impl Array {
         for (field, word) in text.split(',').enumerate().filter(|(_, word)| !word.trim().is_empty())
         {
             let place = Place::Field { line, field: field + 1 };
-            let value =
-                number(word).ok_or_else(|| ContentError::Number { place, found: shown(word) })?;
+            let value = number(word).ok_or_else(|| {
+                error!(
+                    CurveFile,
+                    "{place}: expected a number, found \"{found}\"",
+                    found = shown(word)
+                )
+            })?;
             self.values.push(value);
             if self.values.len() > MAX_POINTS {
-                return Err(ContentError::TooMany { most: MAX_POINTS });
+                return Err(error!(
+                    CurveFile,
+                    "the curve has more than {most} points: thin it",
+                    most = MAX_POINTS
+                ));
             }
         }
         self.is_closed = is_closed;
@@ -152,19 +167,31 @@ impl Array {
 }
 
 /// The package that was asked for, or the only one.
-fn choose<'a>(packages: &'a [Package], asked: Option<&str>) -> Result<&'a Package, ContentError> {
+fn choose<'a>(packages: &'a [Package], asked: Option<&str>) -> Result<&'a Package, Error> {
     let known = || packages.iter().map(|p| shown(&p.name)).collect::<Vec<_>>().join(", ");
     let by_name = |asked: &str| packages.iter().find(|p| p.name == asked.trim());
     match (asked, packages) {
-        (_, []) => Err(ContentError::NoCurve {
-            expected: "a package that crumple export wrote (constant Real d[…], f[…])",
-            found:
+        (_, []) => Err(error!(
+            CurveFile,
+            "expected {expected}, found {found}",
+            expected = "a package that crumple export wrote (constant Real d[…], f[…])",
+            found =
                 "none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file"
-                    .into(),
-        }),
+        )),
         (None, [only]) => Ok(only),
-        (None, _) => Err(ContentError::WhichCurve { known: known() }),
-        (Some(asked), _) => by_name(asked)
-            .ok_or_else(|| ContentError::NoSuchCurve { asked: shown(asked), known: known() }),
+        (None, _) => Err(error!(
+            CurveFile,
+            "the file holds several curves: choose one with --curve: {known}",
+            known = known()
+        )),
+        (Some(asked), _) => by_name(asked).ok_or_else(|| {
+            let asked = shown(asked);
+            let known = known();
+            error!(
+                CurveFile,
+                "the file has no curve \"{asked}\": it has {known}{}",
+                guess::hint(&asked, &known)
+            )
+        }),
     }
 }

@@ -7,9 +7,11 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, title, units};
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::lsdyna::Fields;
 use super::text::{lines, number};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::UnitSystem;
 
 const REMEDY: &str = " (or in a comment of the file: \"# units: mm-t-s\")";
@@ -25,7 +27,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     first.is_some_and(|(_, line)| is_keyword(&line))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
     let found = deck.choose(input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: /FUNCT/{} of the deck", found.id)];
@@ -79,7 +81,7 @@ struct Deck {
 }
 
 impl Deck {
-    fn read(text: &[u8]) -> Result<Self, ContentError> {
+    fn read(text: &[u8]) -> Result<Self, Error> {
         let mut deck = Self::default();
         let mut next = Next::Other;
         for (at, line) in lines(text) {
@@ -115,7 +117,7 @@ impl Deck {
     }
 
     /// Takes a line that is neither comment nor keyword; gives what the one behind it is.
-    fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, ContentError> {
+    fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, Error> {
         let Some(function) = self.functions.last_mut() else {
             return Ok(match next {
                 Next::Begin(0) => {
@@ -136,7 +138,11 @@ impl Deck {
                 function.points.push((fields.number(0, false)?, fields.number(1, false)?));
                 function.lines.push(at);
                 match function.points.len() > MAX_POINTS {
-                    true => Err(ContentError::TooMany { most: MAX_POINTS }),
+                    true => Err(error!(
+                        CurveFile,
+                        "the curve has more than {most} points: thin it",
+                        most = MAX_POINTS
+                    )),
                     false => Ok(Next::Point),
                 }
             }
@@ -145,7 +151,7 @@ impl Deck {
     }
 
     /// The function of that number, or the only one.
-    fn choose(&mut self, asked: Option<&str>) -> Result<Found, ContentError> {
+    fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
         let known = || {
             let shown = |f: &Found| format!("{} (\"{}\")", shown(&f.id), shown(&f.title));
             self.functions.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
@@ -153,15 +159,30 @@ impl Deck {
         let at = match (asked, self.functions.len()) {
             (_, 0) => {
                 let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
-                return Err(ContentError::NoCurve { expected: "a /FUNCT", found: found.into() });
+                return Err(error!(
+                    CurveFile,
+                    "expected {expected}, found {found}",
+                    expected = "a /FUNCT"
+                ));
             }
             (None, 1) => 0,
-            (None, _) => return Err(ContentError::WhichCurve { known: known() }),
+            (None, _) => {
+                return Err(error!(
+                    CurveFile,
+                    "the file holds several curves: choose one with --curve: {known}",
+                    known = known()
+                ));
+            }
             (Some(asked), _) => {
                 let by_id = self.functions.iter().position(|f| f.id == asked.trim());
-                by_id.ok_or_else(|| ContentError::NoSuchCurve {
-                    asked: shown(asked),
-                    known: known(),
+                by_id.ok_or_else(|| {
+                    let asked = shown(asked);
+                    let known = known();
+                    error!(
+                        CurveFile,
+                        "the file has no curve \"{asked}\": it has {known}{}",
+                        guess::hint(&asked, &known)
+                    )
                 })?
             }
         };

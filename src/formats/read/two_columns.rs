@@ -8,9 +8,11 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Facts, stated_units, title};
-use super::error::{ContentError, Place, shown};
+use super::error::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Lines in front of a curve: more are another kind of file.
@@ -23,7 +25,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     data.any(|(_, line)| pair(&line).is_some())
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
+pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut file = File::read(input.text)?;
     let found = file.choose(input.options.curve.as_deref())?;
     let given = input.options.units.or(file.units);
@@ -37,11 +39,13 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, ContentError> {
             (found.lines.first().copied().unwrap_or(1), format!("the {which} column"), label)
         });
         if label.quantity != quantity {
-            return Err(ContentError::Expected {
-                place: Place::Line(line),
-                expected: format!("a {} in the {which} column", quantity.name()),
-                found: shown(&text),
-            });
+            return Err(error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = format!("a {} in the {which} column", quantity.name()),
+                found = shown(&text),
+                place = Place::Line(line)
+            ));
         }
         sizes[k] = label.size(&text, given, Place::Line(line))?;
         notes.push(match (&label.unit, given) {
@@ -127,7 +131,7 @@ struct File {
 }
 
 impl File {
-    fn read(bytes: &[u8]) -> Result<Self, ContentError> {
+    fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut file =
             Self { curves: vec![Found::default()], facts: Facts::default(), units: None };
         for (at, line) in lines(bytes) {
@@ -157,7 +161,7 @@ impl File {
     }
 
     /// The curve of that number or name, or the only one.
-    fn choose(&mut self, asked: Option<&str>) -> Result<Found, ContentError> {
+    fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
         let known = || {
             let curves = self.curves.iter().enumerate().take(20);
             curves
@@ -168,15 +172,31 @@ impl File {
         let at = match (asked, self.curves.len()) {
             (_, 0) => {
                 let expected = "a curve: lines of two numbers";
-                return Err(ContentError::NoCurve { expected, found: "no such line".into() });
+                return Err(error!(
+                    CurveFile,
+                    "expected {expected}, found {found}",
+                    found = "no such line"
+                ));
             }
             (None, 1) => 0,
-            (None, _) => return Err(ContentError::WhichCurve { known: known() }),
+            (None, _) => {
+                return Err(error!(
+                    CurveFile,
+                    "the file holds several curves: choose one with --curve: {known}",
+                    known = known()
+                ));
+            }
             (Some(asked), _) => {
                 let by_name = self.curves.iter().position(|c| c.name().trim() == asked.trim());
                 let by_number = asked.trim().parse::<usize>().ok().and_then(|n| n.checked_sub(1));
                 by_name.or(by_number.filter(|k| *k < self.curves.len())).ok_or_else(|| {
-                    ContentError::NoSuchCurve { asked: shown(asked), known: known() }
+                    let asked = shown(asked);
+                    let known = known();
+                    error!(
+                        CurveFile,
+                        "the file has no curve \"{asked}\": it has {known}{}",
+                        guess::hint(&asked, &known)
+                    )
                 })?
             }
         };
@@ -185,12 +205,16 @@ impl File {
 }
 
 impl Found {
-    fn take(&mut self, line: &str, at: u64) -> Result<(), ContentError> {
+    fn take(&mut self, line: &str, at: u64) -> Result<(), Error> {
         if let Some(pair) = pair(line) {
             self.points.push(pair);
             self.lines.push(at);
             return match self.points.len() > MAX_POINTS {
-                true => Err(ContentError::TooMany { most: MAX_POINTS }),
+                true => Err(error!(
+                    CurveFile,
+                    "the curve has more than {most} points: thin it",
+                    most = MAX_POINTS
+                )),
                 false => Ok(()),
             };
         }
@@ -202,13 +226,19 @@ impl Found {
         Err(match wrong {
             Some((field, word)) if words(line).count() == 2 => {
                 let place = Place::Field { line: at, field: field + 1 };
-                ContentError::Number { place, found: shown(word) }
+                error!(
+                    CurveFile,
+                    "{place}: expected a number, found \"{found}\"",
+                    found = shown(word)
+                )
             }
-            _ => ContentError::Expected {
-                place: Place::Line(at),
-                expected: "two numbers, or CONTINUE behind a curve".into(),
-                found: shown(line),
-            },
+            _ => error!(
+                CurveFile,
+                "{place}: expected {expected}, found \"{found}\"",
+                expected = "two numbers, or CONTINUE behind a curve",
+                found = shown(line),
+                place = Place::Line(at)
+            ),
         })
     }
 }
