@@ -26,10 +26,10 @@ fn motion() -> &'static (f64, f64, Vec<f64>, Vec<f64>) {
         let report = crumple::build::build(&study, &folder.path().join("curves.h5"), |_| {})
             .expect("the bundled runs make a database");
         let mut cases = report.database.cases(GROUP).iter();
-        let case = cases.find(|case| case.name == CASE).expect("a case of that name");
-        let time_s = case.sampled.time_s().to_vec();
-        let velocity = case.closing_speed_m_per_s.clone();
-        (case.masses.effective_kg(), case.speed.m_per_s, time_s, velocity)
+        let case = cases.find(|case| case.id.name == CASE).expect("a case of that name");
+        let time_s = case.curves.sampled.time_s().to_vec();
+        let velocity = case.curves.closing_speed_m_per_s.clone();
+        (case.conditions.masses.effective_kg(), case.conditions.speed.m_per_s, time_s, velocity)
     })
 }
 

@@ -202,7 +202,7 @@ fn chain() -> Result<(Chain, Vec<Envelope>), Box<dyn Error>> {
         let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe").join(group);
         let report = build(&study.join("study.toml"), &folder.path().join("c.h5"), |_| {})?;
         let cases = report.database.cases(group);
-        let case = cases.iter().find(|c| c.name == "36kmh").ok_or("a case at 36 km/h")?;
+        let case = cases.iter().find(|c| c.id.name == "36kmh").ok_or("a case at 36 km/h")?;
         let fine = case.loading()?.envelope;
         let d: Vec<f64> =
             (0..POINTS).map(|i| fine.end_m() * i as f64 / (POINTS - 1) as f64).collect();

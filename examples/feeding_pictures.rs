@@ -38,7 +38,8 @@ fn main() -> Anything<()> {
     let (curve, beyond) = predict_beyond(&model, &Query::at(PREDICTED_M_PER_S))?;
     let predicted = ExportInput { curve, beyond: None };
     let along_faster_runs = ExportInput { beyond: Some(beyond), ..predicted.clone() };
-    let is_recorded = |case: &&Case| (case.speed.m_per_s - RECORDED_M_PER_S).abs() < 0.01;
+    let is_recorded =
+        |case: &&Case| (case.conditions.speed.m_per_s - RECORDED_M_PER_S).abs() < 0.01;
     let case = cases.iter().find(is_recorded).ok_or("no run at 48 km/h")?;
     let recorded = ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None };
     for (name, picture) in [
@@ -213,9 +214,9 @@ fn matlab(predicted: &ExportInput) -> Anything<String> {
 
 /// The record, beside the straight unloading of a curve's exports.
 fn iso_mme(case: &Case, recorded: &ExportInput) -> Anything<String> {
-    let curve = ready(recorded, case.force_kind)?;
-    let d = case.sampled.deflection_m().iter().copied();
-    let record: Points = d.zip(case.sampled.force_n().iter().copied()).collect();
+    let curve = ready(recorded, case.curves.force_kind)?;
+    let d = case.curves.sampled.deflection_m().iter().copied();
+    let record: Points = d.zip(case.curves.sampled.force_n().iter().copied()).collect();
     let mut left = Sheet::whole("run at 48 km/h, contact force");
     left.line(0, both_ways(&curve));
     left.line(1, record.clone());

@@ -49,7 +49,7 @@ fn read(folder: &Path, name: &str) -> Database {
 
 /// `GROUP/CASE` of all cases, in order.
 fn names(folder: &Path, name: &str) -> Vec<String> {
-    read(folder, name).all().map(|case| format!("{}/{}", case.group, case.name)).collect()
+    read(folder, name).all().map(|case| format!("{}/{}", case.id.group, case.id.name)).collect()
 }
 
 /// The names of cases in a group, in order of speed.
@@ -195,8 +195,10 @@ fn cases_and_groups_get_other_names() {
     assert_eq!(names(here, "curves.h5")[4..], expected);
     let after = read(here, "curves.h5");
     for (old, new) in before.cases(WALL).iter().zip(after.cases("nose")) {
-        let renamed = Case { group: "nose".into(), name: new.name.clone(), ..old.clone() };
-        assert!(renamed == *new, "{}", old.name);
+        let mut renamed = old.clone();
+        renamed.id.group = "nose".into();
+        renamed.id.name = new.id.name.clone();
+        assert!(renamed == *new, "{}", old.id.name);
     }
     fails(
         here,
@@ -287,11 +289,12 @@ fn a_renamed_group_takes_its_cases_along() {
     let after = read(here, "curves.h5");
     for (old, new) in before.cases(WALL).iter().zip(after.cases("nose")) {
         let group = "nose".to_string();
-        let mut moved = Case { group: group.clone(), ..old.clone() };
-        moved.origin.as_mut().unwrap().group = group;
+        let mut moved = old.clone();
+        moved.id.group = group.clone();
+        moved.provenance.origin.as_mut().unwrap().group = group;
         assert!(moved == *new);
     }
-    assert_eq!(after.cases("nose")[3].tags, ["reviewed"]);
+    assert_eq!(after.cases("nose")[3].provenance.tags, ["reviewed"]);
     studied.is_settled();
     let text = {
         studied.change("group = \"nose\"", "group = \"front\"");
@@ -311,7 +314,7 @@ fn a_renamed_study_takes_its_cases_along() {
     studied.build();
     ok(here, "db tag curves.h5 --group lead-car-wall --add reviewed");
     ok(here, "db rename curves.h5 --case 36kmh --to reference");
-    let study = read(here, "curves.h5").cases(WALL)[0].study.clone();
+    let study = read(here, "curves.h5").cases(WALL)[0].id.study.clone();
     // The study, then study and group at once, then a run as well.
     studied.change(&format!("\"{study}\""), "\"another\"");
     let report = studied.build();
@@ -330,7 +333,11 @@ fn a_renamed_study_takes_its_cases_along() {
         of("nose", &["slowest", "18kmh", "25kmh", "reference", "48kmh", "60kmh", "72kmh"]);
     assert_eq!(names(here, "curves.h5"), expected);
     let database = read(here, "curves.h5");
-    assert!(database.all().all(|case| case.study == "a third" && case.tags == ["reviewed"]));
+    assert!(
+        database
+            .all()
+            .all(|case| case.id.study == "a third" && case.provenance.tags == ["reviewed"])
+    );
     studied.is_settled();
 }
 
@@ -395,8 +402,12 @@ fn a_build_goes_on_with_what_was_renamed_in_the_database() {
     assert_eq!(Studied::outcomes(&report), BTreeSet::from(["built"]));
     assert_eq!(report["runs"][3]["renamed"], "nose/reference");
     let database = read(here, "curves.h5");
-    assert!(database.all().all(|case| case.group == "nose" && case.masses.body_kg == 24.5e3));
-    assert_eq!(database.cases("nose")[3].name, "reference");
+    assert!(
+        database
+            .all()
+            .all(|case| case.id.group == "nose" && case.conditions.masses.body_kg == 24.5e3)
+    );
+    assert_eq!(database.cases("nose")[3].id.name, "reference");
     studied.change("/36kmh\"", "/37kmh\"");
     let output =
         crumple_in(here, &["build", studied.study.to_str().unwrap(), "-o", "curves.h5", "--json"]);
@@ -436,7 +447,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     assert_eq!(twenty_five.unwrap()["now"], "lead-car-wall/25kmh");
     let all = read(here, "all.h5");
     assert_eq!(all.all().count(), 11);
-    assert_eq!(all.cases(WALL)[3].tags, ["one", "two"]);
+    assert_eq!(all.cases(WALL)[3].provenance.tags, ["one", "two"]);
     assert!(all.cases(WALL)[0] == read(here, "a.h5").cases(WALL)[0]);
     fails(
         here,
@@ -459,7 +470,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     assert!(fs::read(here.join("all.h5")).unwrap() == before);
     ok(here, "db merge all.h5 heavy.h5 -o all.h5 --rename");
     assert_eq!(names(here, "all.h5").len(), 18);
-    assert_eq!(read(here, "all.h5").cases(WALL)[1].masses.body_kg, 30e3);
+    assert_eq!(read(here, "all.h5").cases(WALL)[1].conditions.masses.body_kg, 30e3);
     // Again: all of it is there.
     assert!(
         ok(here, "db merge all.h5 heavy.h5 -o all.h5")
@@ -467,7 +478,10 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     );
     ok(here, "db merge heavy.h5 a.h5 -o heavy.h5 --replace");
     let replaced = read(here, "heavy.h5");
-    assert!(replaced.all().all(|case| case.masses.body_kg == 24e3) && replaced.all().count() == 7);
+    assert!(
+        replaced.all().all(|case| case.conditions.masses.body_kg == 24e3)
+            && replaced.all().count() == 7
+    );
     // Masses that are none, and nothing else: equal speeds of other masses are told apart.
     let found = ok_json(here, "db check all.h5");
     for finding in found["findings"].as_array().unwrap() {
@@ -506,8 +520,8 @@ fn copies_go_to_groups_and_databases() {
     studied.change("\"24t\"", "\"24.5t\"");
     studied.build();
     let database = read(here, "curves.h5");
-    assert!(database.cases("inner").iter().all(|case| case.masses.body_kg == 24e3));
-    assert!(database.cases(WALL).iter().all(|case| case.masses.body_kg == 24.5e3));
+    assert!(database.cases("inner").iter().all(|case| case.conditions.masses.body_kg == 24e3));
+    assert!(database.cases(WALL).iter().all(|case| case.conditions.masses.body_kg == 24.5e3));
     studied.is_settled();
     // In another database under its own group it is still the study's.
     ok(here, "db copy curves.h5 --group lead-car-wall --speed ..20km/h --to b.h5");
@@ -549,7 +563,7 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
     assert_eq!(Studied::outcomes(&studied.build()), BTreeSet::from(["built"]));
     let last = read(here, "curves.h5").cases(WALL)[6].clone();
     assert_eq!(
-        (last.tags, last.user_notes),
+        (last.provenance.tags, last.provenance.user_notes),
         (vec!["a".to_string(), "reviewed".into()], vec!["rides up, from 80 ms on".to_string()])
     );
     let shown = ok(here, "db show curves.h5 --case 72kmh");
@@ -562,15 +576,18 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
     ok(here, add);
     ok(here, "db tag curves.h5 --case t --add test");
     ok(here, &format!("{add} --replace"));
-    assert_eq!(read(here, "curves.h5").cases("tests")[0].tags, ["test"]);
+    assert_eq!(read(here, "curves.h5").cases("tests")[0].provenance.tags, ["test"]);
     ok(here, "db tag curves.h5 --case t --clear");
     ok(here, "db tag curves.h5 --group lead-car-wall --remove a --add b");
     ok(here, "db note curves.h5 --case 72kmh --clear");
     let database = read(here, "curves.h5");
     assert!(
-        database.cases(WALL).iter().all(|c| c.tags == ["b", "reviewed"] && c.user_notes.is_empty())
+        database
+            .cases(WALL)
+            .iter()
+            .all(|c| c.provenance.tags == ["b", "reviewed"] && c.provenance.user_notes.is_empty())
     );
-    assert_eq!(database.cases("tests")[0].tags, [""; 0]);
+    assert_eq!(database.cases("tests")[0].provenance.tags, [""; 0]);
     fails(
         here,
         "db tag curves.h5 --case 12kmh --remove c",
@@ -626,13 +643,13 @@ fn tables_hold_what_the_database_does() {
     assert_eq!(lines.len(), 12);
     for (case, line) in cases.iter().zip(&lines) {
         let cell = |name: &str| &line[heading.iter().position(|h| h == name).unwrap()];
-        assert_eq!((cell("group"), cell("case")), (&*case.group, &*case.name));
-        assert_eq!(cell("speed_m_per_s").parse::<f64>().unwrap(), case.speed.m_per_s);
-        assert_eq!(cell("work_J").parse::<f64>().unwrap(), case.audit.work_j);
-        assert_eq!(cell("other_mass_kg").parse().ok(), case.masses.other_kg);
+        assert_eq!((cell("group"), cell("case")), (&*case.id.group, &*case.id.name));
+        assert_eq!(cell("speed_m_per_s").parse::<f64>().unwrap(), case.conditions.speed.m_per_s);
+        assert_eq!(cell("work_J").parse::<f64>().unwrap(), case.quality.audit.work_j);
+        assert_eq!(cell("other_mass_kg").parse().ok(), case.conditions.masses.other_kg);
         assert_eq!(cell("truncated"), case.is_truncated().to_string());
-        assert_eq!(cell("tags"), case.tags.join(";"));
-        let is_ours = case.name == "x,y";
+        assert_eq!(cell("tags"), case.provenance.tags.join(";"));
+        let is_ours = case.id.name == "x,y";
         assert_eq!(cell("parameter_angle_deg"), if is_ours { "10.0" } else { "" });
         assert_eq!(cell("parameter_obstacle"), if is_ours { "a, b" } else { "" });
     }
@@ -640,16 +657,18 @@ fn tables_hold_what_the_database_does() {
         let (_, lines) = rows(name);
         let mut lines = lines.iter();
         for case in &cases {
-            let curve = if name == "curves.csv" { &case.sampled } else { &case.original };
+            let curve =
+                if name == "curves.csv" { &case.curves.sampled } else { &case.curves.original };
             let body = Hdf5::open(here.join("curves.h5")).unwrap();
-            let body = body.dataset(&format!("{}/{}/body_force_N", case.group, case.name)).unwrap();
+            let body =
+                body.dataset(&format!("{}/{}/body_force_N", case.id.group, case.id.name)).unwrap();
             let body = body.read_f64().unwrap();
             for (k, time_s) in curve.time_s().iter().enumerate() {
                 let line = lines.next().unwrap();
-                assert_eq!((&line[0], &line[1]), (&*case.group, &*case.name));
+                assert_eq!((&line[0], &line[1]), (&*case.id.group, &*case.id.name));
                 let mut expected = vec![*time_s, curve.deflection_m()[k], curve.force_n()[k]];
                 if name == "curves.csv" {
-                    expected.extend([body[k], case.closing_speed_m_per_s[k]]);
+                    expected.extend([body[k], case.curves.closing_speed_m_per_s[k]]);
                 }
                 let found: Vec<f64> = line.iter().skip(2).map(|v| v.parse().unwrap()).collect();
                 assert_eq!(found, expected);
@@ -677,9 +696,12 @@ fn cases_are_shown_beside_each_other() {
     let cases = document["cases"].as_array().unwrap();
     assert_eq!((document["reference"].as_str().unwrap(), cases.len()), ("lead-car-wall/36kmh", 3));
     let number = |name: &str| cases[1][name].as_f64().unwrap();
-    assert_eq!(number("speed_difference"), b.speed.m_per_s / a.speed.m_per_s - 1.0);
+    assert_eq!(
+        number("speed_difference"),
+        b.conditions.speed.m_per_s / a.conditions.speed.m_per_s - 1.0
+    );
     assert_eq!(number("peak_force_difference"), b.peak_force_n() / a.peak_force_n() - 1.0);
-    assert_eq!(number("work_difference"), b.audit.work_j / a.audit.work_j - 1.0);
+    assert_eq!(number("work_difference"), b.quality.audit.work_j / a.quality.audit.work_j - 1.0);
     assert_eq!(
         number("max_deflection_difference"),
         b.max_deflection_m() / a.max_deflection_m() - 1.0
@@ -735,7 +757,7 @@ fn databases_of_version_2_are_read_and_go_on() {
     let before = read(here, "old.h5");
     ok(here, "db rename old.h5 --case 36kmh --to reference");
     let after = read(here, "old.h5");
-    assert!(before.cases("old")[0].original == after.cases("old")[0].original);
+    assert!(before.cases("old")[0].curves.original == after.cases("old")[0].curves.original);
     let version = Hdf5::open(here.join("old.h5")).unwrap().root().attrs().unwrap();
     assert_eq!(version["layout_version"].as_i64(), Some(3));
     assert!(ok(here, "db check old.h5").contains("2 cases checked, 0 findings"));
@@ -816,7 +838,9 @@ fn what_others_put_into_a_case_moves_with_it() {
     there("nose", "reference");
     let now = read(here, "curves.h5");
     for (old, new) in expected.cases(WALL).iter().zip(now.cases("nose")) {
-        assert!(old.original == new.original && old.sampled == new.sampled);
+        assert!(
+            old.curves.original == new.curves.original && old.curves.sampled == new.curves.sampled
+        );
     }
     // It is not lost, and not taken along to where it does not belong.
     let would_lose = "would lose by writing it again: attribute nose/reference/reviewed_by, dataset nose/reference/photo";
@@ -850,18 +874,18 @@ fn builds_are_dated_and_reproducible() {
     let (a, b) = (build("a.h5", Some("1000000000")), build("b.h5", Some("1000000000")));
     assert!(a == b);
     let case = read(here, "a.h5").cases(WALL)[0].clone();
-    assert_eq!(case.built_utc.as_deref(), Some("2001-09-09T01:46:40Z"));
+    assert_eq!(case.provenance.built_utc.as_deref(), Some("2001-09-09T01:46:40Z"));
     build("c.h5", None);
-    let now = read(here, "c.h5").cases(WALL)[0].built_utc.clone().unwrap();
+    let now = read(here, "c.h5").cases(WALL)[0].provenance.built_utc.clone().unwrap();
     assert!(now.as_str() > "2026" && now.len() == 20 && now.ends_with('Z'), "{now}");
     // Nothing to do, nothing written.
     let before = build("a.h5", Some("2000000000"));
     assert!(before == a);
     // The sources as they were given, from the root on.
-    let source = &case.sources[0];
+    let source = &case.provenance.sources[0];
     let path = Path::new(source.absolute_path.as_ref().unwrap());
     assert!(path.is_absolute() && path.ends_with("12kmh/nodout") && path.is_file(), "{source:?}");
-    assert_eq!(case.origin.unwrap().manifest, studied.study.to_str().unwrap());
+    assert_eq!(case.provenance.origin.unwrap().manifest, studied.study.to_str().unwrap());
 }
 
 /// Commands that change a database, of the two databases `curves.h5` and `other.h5`, and the file
@@ -900,11 +924,11 @@ fn state(path: &Path) -> Vec<Said> {
     database
         .all()
         .map(|case| {
-            let force = case.original.force_n().to_vec();
+            let force = case.curves.original.force_n().to_vec();
             (
-                format!("{}/{}", case.group, case.name),
-                case.tags.clone(),
-                case.user_notes.clone(),
+                format!("{}/{}", case.id.group, case.id.name),
+                case.provenance.tags.clone(),
+                case.provenance.user_notes.clone(),
                 force,
             )
         })
@@ -1116,7 +1140,7 @@ fn a_second_writer_is_told() {
             }
         }
     }
-    let tags = read(here, "curves.h5").cases(WALL)[0].tags.clone();
+    let tags = read(here, "curves.h5").cases(WALL)[0].provenance.tags.clone();
     assert_eq!(tags.into_iter().collect::<BTreeSet<_>>(), expected);
     assert_eq!(entries(here), ["curves.h5", "new.h5", "other.h5", "t.csv"]);
 }

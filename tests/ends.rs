@@ -211,7 +211,7 @@ fn fes_contact_force_gives_fes_velocity() {
         let cases = database.group(Path::new("curves.h5"), group).unwrap();
         let mut inner = Vec::new();
         for (i, case) in cases.iter().enumerate() {
-            let v = case.speed.m_per_s * per_wall;
+            let v = case.conditions.speed.m_per_s * per_wall;
             let text = format!(
                 "{HEAD}[[train]]\nname = \"A\"\nspeed = \"{v}m/s\"\n\
                  vehicles = [{{ name = \"A1\", mass = \"{mass_t}t\", front = {{ curve = \"{curve}\" }} }}]\n\
@@ -223,11 +223,13 @@ fn fes_contact_force_gives_fes_velocity() {
                 run[name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
             };
             let (t, ours) = (column("time_s"), column("v_m_per_s[A1]"));
-            let d = case.sampled.deflection_m();
+            let d = case.curves.sampled.deflection_m();
             let end = (0..d.len()).max_by(|&a, &b| d[a].total_cmp(&d[b])).unwrap();
-            let until = case.sampled.time_s()[end] + 0.03;
+            let until = case.curves.sampled.time_s()[end] + 0.03;
             let (mut off, mut all) = (0.0, 0.0);
-            for (time, fe) in case.sampled.time_s().iter().zip(&case.closing_speed_m_per_s) {
+            for (time, fe) in
+                case.curves.sampled.time_s().iter().zip(&case.curves.closing_speed_m_per_s)
+            {
                 if *time > until || *time > t[t.len() - 1] {
                     break;
                 }
@@ -242,11 +244,11 @@ fn fes_contact_force_gives_fes_velocity() {
                 inner.push(error);
             }
             // Below, the whole crush is a few millimetres, and most of the time is rebound.
-            if case.speed.m_per_s * per_wall >= 1.25 {
+            if case.conditions.speed.m_per_s * per_wall >= 1.25 {
                 // Of the two slowest nearly half of the time is rebound; and the contact force swings in a way
                 // that does not reach the body.
                 let most = if v >= 2.0 { 0.008 } else { 0.012 };
-                assert!(error < most, "{group}/{}: {:.2} %", case.name, 100.0 * error);
+                assert!(error < most, "{group}/{}: {:.2} %", case.id.name, 100.0 * error);
                 held += 1;
             }
         }

@@ -61,7 +61,8 @@ fn recorded() -> ForceLaw {
     let folder = tempfile::tempdir().unwrap();
     let database = Database::read(&build_fixture(folder.path(), "lead-car-wall")).unwrap();
     let cases = database.cases("lead-car-wall");
-    let case = cases.iter().find(|c| (c.speed.m_per_s - SPEED_M_PER_S).abs() < 0.1).unwrap();
+    let case =
+        cases.iter().find(|c| (c.conditions.speed.m_per_s - SPEED_M_PER_S).abs() < 0.1).unwrap();
     let curve = DrivingCurve::recorded(case).unwrap();
     assert!(matches!(curve.unloading, CurveUnloading::Recorded { .. }));
     ForceLaw::of_curve(&curve, UnloadingChoice::Own, EnvelopeEnd::Hold)

@@ -102,13 +102,17 @@ fn like_shipped(source: &Path, files: &[&str], options: &[&str]) -> Vec<Case> {
     let (ours, shipped) = (cases("curves.h5"), cases("shipped.h5"));
     assert_eq!(ours.len(), shipped.len());
     for (ours, shipped) in ours.iter().zip(&shipped) {
-        assert_eq!(ours.name, shipped.name);
-        assert_eq!(ours.original, shipped.original, "{name}: the curve of {} in bits", ours.name);
-        let (a, b) = (ours.sampled.deflection_m(), shipped.sampled.deflection_m());
+        assert_eq!(ours.id.name, shipped.id.name);
+        assert_eq!(
+            ours.curves.original, shipped.curves.original,
+            "{name}: the curve of {} in bits",
+            ours.id.name
+        );
+        let (a, b) = (ours.curves.sampled.deflection_m(), shipped.curves.sampled.deflection_m());
         let both = a.len().min(b.len());
-        assert!(both >= 398, "{}", ours.name);
+        assert!(both >= 398, "{}", ours.id.name);
         assert_eq!(a[..both], b[..both]);
-        assert_eq!(ours.sampled.force_n()[..both], shipped.sampled.force_n()[..both]);
+        assert_eq!(ours.curves.sampled.force_n()[..both], shipped.curves.sampled.force_n()[..both]);
     }
     ours
 }
@@ -141,12 +145,12 @@ fn shared_runs_give_the_shipped_studies_from_text_and_from_t01() {
                 assert_eq!(a.len(), b.len());
                 a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
             };
-            let (a, b) = (&text.original, &binary.original);
+            let (a, b) = (&text.curves.original, &binary.curves.original);
             let peak = a.force_n().iter().copied().fold(0.0, f64::max);
             let deflection_m = far(a.deflection_m(), b.deflection_m());
-            assert!(deflection_m < 2e-5, "{name}/{}: {deflection_m}", text.name);
+            assert!(deflection_m < 2e-5, "{name}/{}: {deflection_m}", text.id.name);
             let force = far(a.force_n(), b.force_n()) / peak;
-            assert!(force < 1e-5, "{name}/{}: {force}", text.name);
+            assert!(force < 1e-5, "{name}/{}: {force}", text.id.name);
         }
     }
 }
@@ -506,7 +510,7 @@ fn a_pair_without_forces_is_guessed() {
     crumple_ok(&here, &["build", "both.toml", "-q"]);
     let cases = Database::read(&here.join("curves.h5")).unwrap();
     let case = &cases.cases("pair")[0];
-    assert!(case.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
+    assert!(case.curves.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
     // What the caller says of the bodies stands above it.
     crumple_ok(&here, &["init", "--node", "8", "--minus-node", "6", "-o", "turned.toml"]);
     let turned = study(&here, "turned.toml");

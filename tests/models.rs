@@ -7,7 +7,10 @@ use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::audit;
 use crumple::curve::unloading_stiffness;
-use crumple::curve::{Case, Curve, DrivingCurve, ForceKind, Masses, Parameter};
+use crumple::curve::{
+    Case, CaseId, Conditions, Curve, DrivingCurve, ForceKind, Masses, Parameter, Provenance,
+    Quality, RecordedCurves,
+};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::ForestOptions;
@@ -47,30 +50,30 @@ pub fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -
     let masses = Masses { body_kg: mass_kg, other_kg: None };
     let speed = Speed { m_per_s: v, kind: SpeedKind::Wall };
     Case {
-        study: "made".into(),
-        group: "made".into(),
-        name: name.into(),
-        speed,
-        masses,
-        parameters: BTreeMap::new(),
-        force_kind: ForceKind::Contact,
-        sampled: curve.clone(),
-        closing_speed_m_per_s: speeds,
-        contact_time_s: 0.0,
-        solver_wall_time_s: None,
-        unloading_stiffness_n_per_m: unloading_stiffness(&curve),
-        audit: audit(&curve, masses, speed),
-        original: curve,
-        recipe: "{}".into(),
-        fingerprint: format!("{name} {v}"),
-        sources: vec![],
-        notes: vec![],
-        warnings: vec![],
-        built_utc: None,
-        origin: None,
-        tags: vec![],
-        user_notes: vec![],
+        id: CaseId { study: "made".into(), group: "made".into(), name: name.into() },
+        conditions: Conditions { speed, masses, parameters: BTreeMap::new() },
+        curves: RecordedCurves {
+            force_kind: ForceKind::Contact,
+            sampled: curve.clone(),
+            closing_speed_m_per_s: speeds,
+            contact_time_s: 0.0,
+            unloading_stiffness_n_per_m: unloading_stiffness(&curve),
+            original: curve.clone(),
+        },
+        quality: Quality { audit: audit(&curve, masses, speed), notes: vec![], warnings: vec![] },
+        provenance: Provenance {
+            recipe: "{}".into(),
+            fingerprint: format!("{name} {v}"),
+            ..Provenance::default()
+        },
     }
+}
+
+/// The case in another group.
+pub fn in_group(case: &Case, group: &str) -> Case {
+    let mut case = case.clone();
+    case.id.group = group.into();
+    case
 }
 
 /// Rises in 0.1 m, then a hump; stronger at speed.
@@ -202,7 +205,9 @@ fn the_band_knows_where_it_is() {
         .enumerate()
         .map(|(i, c)| {
             let mut c = c.clone();
-            c.parameters.insert("angle_deg".into(), Parameter::Number((i % 2) as f64 * 10.0));
+            c.conditions
+                .parameters
+                .insert("angle_deg".into(), Parameter::Number((i % 2) as f64 * 10.0));
             c
         })
         .collect();
@@ -224,12 +229,14 @@ fn the_band_knows_where_it_is() {
 /// A family whose contact force has an error of its own at each speed, which the body does not feel.
 fn family_with_odd_contact(speeds: &[f64]) -> Vec<Case> {
     let odd = |mut made: Case| {
-        let factor = 1.0 + 0.2 * (made.speed.m_per_s * made.speed.m_per_s).sin();
+        let factor =
+            1.0 + 0.2 * (made.conditions.speed.m_per_s * made.conditions.speed.m_per_s).sin();
         let of = |curve: &Curve| {
             let force_n = curve.force_n().iter().map(|f| factor * f).collect();
             Curve::new(curve.time_s().to_vec(), curve.deflection_m().to_vec(), force_n).unwrap()
         };
-        (made.sampled, made.original) = (of(&made.sampled), of(&made.original));
+        (made.curves.sampled, made.curves.original) =
+            (of(&made.curves.sampled), of(&made.curves.original));
         made
     };
     family(speeds).into_iter().map(odd).collect()
@@ -275,11 +282,12 @@ fn student_t(n: usize) -> f64 {
 fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f64 {
     let set = TrainingSet::new("made", cases).unwrap();
     let inner = 1..cases.len() - 1;
-    let gap = |i: usize| cases[i + 1].speed.m_per_s - cases[i - 1].speed.m_per_s;
+    let gap =
+        |i: usize| cases[i + 1].conditions.speed.m_per_s - cases[i - 1].conditions.speed.m_per_s;
     let mean_gap = inner.clone().map(gap).sum::<f64>() / inner.len() as f64;
     let residuals = |i: usize| -> Vec<f64> {
         let mut others = cases.to_vec();
-        let v = others.remove(i).speed.m_per_s;
+        let v = others.remove(i).conditions.speed.m_per_s;
         let rest = TrainingSet::new("made", &others).unwrap();
         let model = Model::fit(&rest, ModelKind::linear()).unwrap();
         let curve = predict(&model, &Query::at(v).with_rule(rule)).unwrap();
@@ -359,7 +367,7 @@ fn the_body_force_has_a_band_of_its_own() {
 #[test]
 fn a_declared_body_force_has_one_band() {
     let mut cases = family(&[7.0, 10.0, 13.0, 17.0]);
-    cases.iter_mut().for_each(|case| case.force_kind = ForceKind::Body);
+    cases.iter_mut().for_each(|case| case.curves.force_kind = ForceKind::Body);
     let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
     let validation = model.leave_one_out.as_ref().unwrap();
     assert!(validation.band.is_some() && validation.body_band.is_none());
@@ -473,8 +481,12 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
 /// Exact case 8: midpoint thresholds jump at 48 km/h, random ones do not.
 #[test]
 fn forests_at_a_midpoint() {
-    let cases: Vec<Case> =
-        databases().cases("lead-car-wall").iter().filter(|c| c.name != "48kmh").cloned().collect();
+    let cases: Vec<Case> = databases()
+        .cases("lead-car-wall")
+        .iter()
+        .filter(|c| c.id.name != "48kmh")
+        .cloned()
+        .collect();
     let set = TrainingSet::new("lead-car-wall", &cases).unwrap();
     let d: Vec<f64> = (0..1_200).map(|i| f64::from(i) * 1e-3).collect();
     let step = |options: ModelKind| {
@@ -538,7 +550,7 @@ fn order_and_names_of_cases_change_nothing() {
     let mut other: Vec<Case> = cases.iter().rev().cloned().collect();
     other.swap(0, 2);
     for (i, case) in other.iter_mut().enumerate() {
-        case.name = format!("{i}");
+        case.id.name = format!("{i}");
     }
     for options in all_kinds() {
         let choice = Choice::Kind(options);
@@ -591,7 +603,7 @@ fn several_parameters() {
         let factor = (1.0 - 0.02 * angle) * if obstacle == "pole" { 0.7 } else { 1.0 };
         let mut made =
             case(&format!("{v} {angle} {obstacle}"), v, 24e3, &|d, u| factor * law(d, u));
-        made.parameters = BTreeMap::from([
+        made.conditions.parameters = BTreeMap::from([
             ("angle_deg".into(), Parameter::Number(angle)),
             ("obstacle".into(), Parameter::Category(obstacle.into())),
             ("temperature_K".into(), Parameter::Number(293.0)),
@@ -681,7 +693,7 @@ fn cases_that_are_no_training_set() {
     t(&[], "the group is empty");
     let two = || {
         let mut two = vec![case("a", 8.0, 24e3, &law), case("b", 8.0, 24e3, &law)];
-        two[1].recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
+        two[1].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
         two
     };
     t(
@@ -689,19 +701,19 @@ fn cases_that_are_no_training_set() {
         "cases \"a\" and \"b\" have the same speed 28.8 km/h, but different recipes, so that they are no replicates: keep one of them, or tell them apart by parameters",
     );
     let mut near = two();
-    near[1].speed.m_per_s *= 1.0005;
+    near[1].conditions.speed.m_per_s *= 1.0005;
     t(&near, "have the same speed");
     let mut same = two();
     let angle = || BTreeMap::from([("angle_deg".to_string(), Parameter::Number(3.0))]);
-    same[0].parameters = angle();
+    same[0].conditions.parameters = angle();
     t(&same, "case \"b\" has no parameter \"angle_deg\", which case \"a\" has");
-    same[1].parameters = angle();
+    same[1].conditions.parameters = angle();
     t(&same, "have the same speed 28.8 km/h, but different recipes");
     let name = || Parameter::Category("steep".into());
-    same[1].parameters = BTreeMap::from([("angle_deg".into(), name())]);
+    same[1].conditions.parameters = BTreeMap::from([("angle_deg".into(), name())]);
     t(&same, "\"angle_deg\" is a number in case \"a\" and a category in case \"b\"");
     let mut kinds = two();
-    kinds[1].speed.kind = SpeedKind::Closing;
+    kinds[1].conditions.speed.kind = SpeedKind::Closing;
     t(&kinds, "mix wall and closing speeds");
     // One state, or a number that is none, cannot even become a curve.
     let one = Curve::new(vec![0.0], vec![0.0], vec![0.0]).unwrap_err().to_string();
@@ -710,9 +722,9 @@ fn cases_that_are_no_training_set() {
     assert!(nan.to_string().contains("deflection of state 2 is NaN"));
     let mut still = two();
     let standing = Curve::new(vec![0.0, 1.0], vec![0.0, 0.0], vec![0.0, 1.0]).unwrap();
-    still[0].original = standing.clone();
-    still[0].sampled = standing;
-    still[0].closing_speed_m_per_s = vec![0.0; 2];
+    still[0].curves.original = standing.clone();
+    still[0].curves.sampled = standing;
+    still[0].curves.closing_speed_m_per_s = vec![0.0; 2];
     t(&still[..1], "case \"a\": ");
 }
 
@@ -742,8 +754,8 @@ fn pairs_of_unequal_masses() {
         .map(|(v, other_kg)| {
             let masses = Masses { body_kg: 24e3, other_kg: Some(other_kg) };
             let mut pair = case(&format!("{v}"), v, masses.effective_kg(), &law);
-            pair.masses = masses;
-            pair.speed.kind = SpeedKind::Closing;
+            pair.conditions.masses = masses;
+            pair.conditions.speed.kind = SpeedKind::Closing;
             pair
         })
         .to_vec();
@@ -831,7 +843,7 @@ fn parameters_through_the_commands() {
     crumple_ok(here, &["build", "study.toml", "-o", "more.h5"]);
     let database = Database::read(&here.join("more.h5")).unwrap();
     let first = &database.cases("lead-car-wall")[1];
-    assert!(first.parameters.contains_key("angle_deg"));
+    assert!(first.conditions.parameters.contains_key("angle_deg"));
     crumple_ok(
         here,
         &["train", "more.h5", "--group", "lead-car-wall", "--model", "extra", "-o", "m"],
@@ -953,7 +965,7 @@ fn coverage_with_replicates() -> [f64; 2] {
     let perturbed = Database::read(&path).unwrap();
     let group = "lead-car-wall";
     let mut cases = databases().cases(group).to_vec();
-    cases.extend(perturbed.all().map(|case| Case { group: group.into(), ..case.clone() }));
+    cases.extend(perturbed.all().map(|case| in_group(case, group)));
     let best = Selection::Best(Purpose::Vehicle);
     let found = validate(group, &cases, &ModelKind::candidates(0), best).unwrap();
     assert!(found.scatter.is_some(), "four runs at 48 km/h");
@@ -1007,7 +1019,7 @@ pub fn database_of(path: &std::path::Path, groups: &[(&str, Vec<Case>)]) {
     let mut database = Database::default();
     for (group, cases) in groups {
         for case in cases {
-            database.put(Case { group: (*group).into(), ..case.clone() }).unwrap();
+            database.put(in_group(case, group)).unwrap();
         }
     }
     database.write(path).unwrap();
@@ -1027,9 +1039,10 @@ fn a_speed_without_an_answer_is_named() {
     let mut missing = 0;
     for options in &options {
         for case in &cases {
-            let is_there =
-                |r: &crumple::surrogate::LeftOut| r.model == options.name() && r.case == case.name;
-            let speed = format!("{} km/h", (case.speed.m_per_s * 360.0).round() / 100.0);
+            let is_there = |r: &crumple::surrogate::LeftOut| {
+                r.model == options.name() && r.case == case.id.name
+            };
+            let speed = format!("{} km/h", (case.conditions.speed.m_per_s * 360.0).round() / 100.0);
             let said = format!("{} at {speed}: no row: ", options.name());
             let noted = found.notes.iter().any(|n| n.starts_with(&said));
             assert_ne!(found.rows.iter().any(is_there), noted, "{said}{:?}", found.notes);
@@ -1067,8 +1080,8 @@ fn kinds_of_speed_in_one_group_are_named_by_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let mut mixed = family(&[8.0, 12.0, 16.0]);
-    mixed[1].speed.kind = SpeedKind::Closing;
-    mixed[1].masses.other_kg = Some(24e3);
+    mixed[1].conditions.speed.kind = SpeedKind::Closing;
+    mixed[1].conditions.masses.other_kg = Some(24e3);
     database_of(&here.join("c.h5"), &[("good", family(&[8.0, 12.0, 16.0])), ("mixed", mixed)]);
     let said = "cases \"v8\" and \"v12\" mix wall and closing speeds: keep one kind per group";
     for command in [
@@ -1165,7 +1178,7 @@ fn contact_and_body_force_rebound_alike() {
     let cases = databases().cases("lead-car-wall");
     let model = train("lead-car-wall", cases, Choice::Kind(ModelKind::linear())).unwrap();
     for case in &cases[1..4] {
-        let curve = curve(&model, case.speed.m_per_s);
+        let curve = curve(&model, case.conditions.speed.m_per_s);
         let reference = crumple::assess::Reference::of(case).unwrap();
         let rebound = |force| {
             let run = reference.run(&curve.driving(force).unwrap()).unwrap();
@@ -1195,8 +1208,8 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
             let run =
                 reference.run(&crumple::curve::DrivingCurve::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
-            assert!(errors.velocity_l1 < 0.004, "{group} {}: {errors:?}", case.name);
-            assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.name);
+            assert!(errors.velocity_l1 < 0.004, "{group} {}: {errors:?}", case.id.name);
+            assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.id.name);
         }
     }
 }
@@ -1251,7 +1264,7 @@ fn the_next_run_is_nearly_the_best_of_two() {
                 let rest: Vec<Case> =
                     (0..cases.len()).filter(|&k| without(k)).map(|k| cases[k].clone()).collect();
                 let set = TrainingSet::new(group, &rest).unwrap();
-                let speed = |k: usize| cases[k].speed.m_per_s;
+                let speed = |k: usize| cases[k].conditions.speed.m_per_s;
                 // Advice between the two gaps that the two left.
                 let gaps = gaps(&set, &validated(&rest));
                 let of = |k: usize| {

@@ -54,19 +54,19 @@ fn cases() -> Vec<Case> {
 
 /// FE's body from contact to 30 ms after the largest deflection.
 fn window(case: &Case) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let end_s = case.original.time_s()[case.loading_end()] + 0.030;
-    let states = case.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
-    let time_s = case.sampled.time_s()[..states].to_vec();
-    let velocity = case.closing_speed_m_per_s[..states].to_vec();
+    let end_s = case.curves.original.time_s()[case.loading_end()] + 0.030;
+    let states = case.curves.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
+    let time_s = case.curves.sampled.time_s()[..states].to_vec();
+    let velocity = case.curves.closing_speed_m_per_s[..states].to_vec();
     let acceleration = derivative(&time_s, &velocity);
     (time_s, velocity, acceleration)
 }
 
 fn target_at(cases: &[Case], name: &str) -> Target {
-    let case = cases.iter().find(|case| case.name == name).unwrap();
+    let case = cases.iter().find(|case| case.id.name == name).unwrap();
     let (time_s, velocity, acceleration) = window(case);
-    let mass_kg = case.masses.effective_kg();
-    Target::new(mass_kg, case.speed.m_per_s, time_s, velocity, acceleration).unwrap()
+    let mass_kg = case.conditions.masses.effective_kg();
+    Target::new(mass_kg, case.conditions.speed.m_per_s, time_s, velocity, acceleration).unwrap()
 }
 
 #[test]
@@ -143,8 +143,8 @@ fn weight_on_the_velocity_improves_it() {
 fn errors_over_speeds(fit: &Fit, cases: &[Case]) -> Vec<(f64, f64, f64)> {
     let errors = |case: &Case| {
         let (time_s, velocity, acceleration) = window(case);
-        let speed = case.speed.m_per_s;
-        let motion = fit.model.run(case.masses.effective_kg(), speed, &time_s).unwrap();
+        let speed = case.conditions.speed.m_per_s;
+        let motion = fit.model.run(case.conditions.masses.effective_kg(), speed, &time_s).unwrap();
         let velocity_l1 = l1_ratio(&velocity, &motion.v_m_per_s);
         (3.6 * speed, velocity_l1, l1_ratio(&acceleration, &motion.a_m_per_s2))
     };
@@ -194,7 +194,7 @@ fn fe_motion_is_fitted_at_its_own_speed_and_missed_at_others() {
         );
         assert_eq!(fit.model.stiffness.values().len(), 11);
         assert_eq!(fit.model.damping.values().len(), 6);
-        assert_eq!(fit.model.damping.end(), cases[4].speed.m_per_s);
+        assert_eq!(fit.model.damping.end(), cases[4].conditions.speed.m_per_s);
         let largest = target.displacement_m().iter().copied().fold(0.0, f64::max);
         assert_eq!(fit.model.stiffness.end(), largest);
     }

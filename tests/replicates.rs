@@ -40,7 +40,11 @@ fn within(found: f64, expected: f64, share: f64) {
 
 /// Each of a family's runs and one of the same bytes.
 fn twice(cases: &[Case]) -> Vec<Case> {
-    let again = |c: &Case| Case { name: format!("{} again", c.name), ..c.clone() };
+    let again = |c: &Case| {
+        let mut case = c.clone();
+        case.id.name.push_str(" again");
+        case
+    };
     cases.iter().flat_map(|c| [c.clone(), again(c)]).collect()
 }
 
@@ -85,9 +89,9 @@ fn the_scatter_of_velocities_is_that_of_the_records() {
     cases.extend([flat("a", 12.0, -0.02), flat("b", 12.0, 0.02)]);
     let (a, b) = (&cases[2], &cases[3]);
     let mean = |of: fn(&Case, usize) -> f64, i: usize| 0.5 * (of(a, i) + of(b, i));
-    let states = a.sampled.time_s().len();
-    let deflection = |c: &Case, i: usize| c.sampled.deflection_m()[i];
-    let speed = |c: &Case, i: usize| c.closing_speed_m_per_s[i];
+    let states = a.curves.sampled.time_s().len();
+    let deflection = |c: &Case, i: usize| c.curves.sampled.deflection_m()[i];
+    let speed = |c: &Case, i: usize| c.curves.closing_speed_m_per_s[i];
     let end =
         (0..states).max_by(|&i, &k| mean(deflection, i).total_cmp(&mean(deflection, k))).unwrap();
     let (mut apart, mut whole) = (0.0, 0.0);
@@ -105,7 +109,7 @@ fn a_model_has_the_mean_of_equal_runs() {
     let of = |name: &str, factor: f64| case(name, 12.0, MASS_KG, &|d, u| factor * law(d, u));
     cases.extend([of("b", 1.01), of("a", 0.99), of("c", 1.0)]);
     // Speeds as they are measured.
-    cases[3].speed.m_per_s *= 1.0004;
+    cases[3].conditions.speed.m_per_s *= 1.0004;
     let set = TrainingSet::new("made", &cases).unwrap();
     let names: Vec<&str> = set.cases.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["v8", "a (mean of 3)", "v16", "v20"]);
@@ -123,14 +127,14 @@ fn a_model_has_the_mean_of_equal_runs() {
     let speed = mean.motion.closing_speed.force_at(0.3);
     within(0.5 * MASS_KG * (144.0 - speed * speed), own.work_to(0.3), 5e-3);
     let stiffness: f64 =
-        cases[3..].iter().map(|c| c.unloading_stiffness_n_per_m.unwrap()).sum::<f64>() / 3.0;
+        cases[3..].iter().map(|c| c.curves.unloading_stiffness_n_per_m.unwrap()).sum::<f64>() / 3.0;
     near(mean.unloading_stiffness_n_per_m.unwrap(), stiffness);
     // The order of the runs changes nothing; any of their bytes changes the hash.
     let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
     cases.reverse();
     let other = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
     assert!(model.to_json().unwrap() == other.to_json().unwrap());
-    cases[1].fingerprint += "!";
+    cases[1].provenance.fingerprint += "!";
     let other = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
     assert_ne!(model.training_hash, other.training_hash);
     // Left out are all runs of a speed at once.
@@ -202,17 +206,18 @@ fn replicates_agree_in_parameters() {
     let mut cases = twice(&family(&[8.0, 12.0, 16.0]));
     for (i, case) in cases.iter_mut().enumerate() {
         let angle = Parameter::Number(10.0 * (i % 2) as f64);
-        case.parameters = BTreeMap::from([("angle_deg".into(), angle)]);
+        case.conditions.parameters = BTreeMap::from([("angle_deg".into(), angle)]);
     }
     assert_eq!(TrainingSet::new("made", &cases).unwrap().cases.len(), 6);
-    let third = Case { name: "third".into(), ..cases[1].clone() };
+    let mut third = cases[1].clone();
+    third.id.name = "third".into();
     cases.push(third);
     let set = TrainingSet::new("made", &cases).unwrap();
     let runs: Vec<usize> = set.cases.iter().map(|c| c.runs.len()).collect();
     assert_eq!(runs, [1, 2, 1, 1, 1, 1]);
     // Masses are parameters by themselves.
     let mut heavy = twice(&family(&[8.0, 12.0]));
-    heavy[1].masses.body_kg *= 1.1;
+    heavy[1].conditions.masses.body_kg *= 1.1;
     let set = TrainingSet::new("made", &heavy).unwrap();
     assert_eq!((set.cases.len(), set.features[0].name().as_str()), (3, "mass_kg"));
 }
@@ -249,7 +254,7 @@ fn every_command_takes_replicates() {
     crumple_ok(here, &["report", "c.h5", "-o", "r.html"]);
     assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Equal runs lie apart"));
     // Another recipe is no replicate.
-    cases[4].recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
+    cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);
     crumple_fails(here, 1, &["validate", "d.h5"]);
     let found = crumple_ok(here, &["db", "check", "d.h5"]);

@@ -76,10 +76,10 @@ fn its_numbers_are_those_of_the_commands() {
     assert!(page.contains(&peak), "{peak}");
     let database = Database::read(&folder.path().join("curves.h5")).unwrap();
     for case in database.cases("lead-car-wall") {
-        for source in &case.sources {
+        for source in &case.provenance.sources {
             assert!(page.contains(&source.blake3), "{}", source.path);
         }
-        assert!(page.contains(&format!(">{:.3}<", case.audit.ratio())), "{}", case.name);
+        assert!(page.contains(&format!(">{:.3}<", case.quality.audit.ratio())), "{}", case.id.name);
     }
     assert!(!page.contains("vehicle-pair"), "only the group that was asked for");
 }
@@ -143,8 +143,8 @@ fn browser_shows_the_page() {
     let page = folder.path().join("report.html");
     let database = Database::read(&folder.path().join("curves.h5")).unwrap();
     // The largest force of a run, and where it is: what the pointer must find.
-    let case = database.cases("lead-car-wall").iter().find(|c| c.name == "48kmh").unwrap();
-    let samples = case.sampled.force_n().iter().zip(case.sampled.deflection_m());
+    let case = database.cases("lead-car-wall").iter().find(|c| c.id.name == "48kmh").unwrap();
+    let samples = case.curves.sampled.force_n().iter().zip(case.curves.sampled.deflection_m());
     let (force_n, deflection_m) =
         samples.max_by(|a, b| a.0.total_cmp(b.0)).map(|(f, d)| (*f, *d)).unwrap();
     let picture = match std::env::var_os("CRUMPLE_WRITE_DOCS") {

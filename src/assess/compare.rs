@@ -113,13 +113,14 @@ pub(crate) fn compare(
     let set = TrainingSet::new(group, cases)?;
     let left_out = left_out_at(speed_m_per_s, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
-    let speed = case.speed.m_per_s;
+    let speed = case.conditions.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
     let fixed_case: &Case = &fixed.case;
     let times = rest.cases.iter().map(TrainingCase::solver_time_s);
     let training_time_s: Option<f64> =
         times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
-    let rows = RowBuilder { reference, fe_time_s: case.solver_wall_time_s, training_time_s };
+    let rows =
+        RowBuilder { reference, fe_time_s: case.provenance.solver_wall_time_s, training_time_s };
 
     let mut compared = Vec::new();
     for method in methods::of_fe(&left_out) {
@@ -134,21 +135,21 @@ pub(crate) fn compare(
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
     compared.push(rows.row(methods::ddtcm(&left_out, settings.seed)?)?);
-    let is_other = |c: &&Case| !is_same_speed(c.speed.m_per_s, speed_m_per_s);
+    let is_other = |c: &&Case| !is_same_speed(c.conditions.speed.m_per_s, speed_m_per_s);
     let others: Vec<Case> = cases.iter().filter(is_other).cloned().collect();
     compared.push(rows.row(methods::best(&left_out, group, &others, settings.seed)?)?);
 
     Ok(Comparison {
         group: group.into(),
-        case: case.name.clone(),
+        case: case.id.name.clone(),
         speed_m_per_s: speed,
-        speed_kind: case.speed.kind,
+        speed_kind: case.conditions.speed.kind,
         inner: left_out.inner,
-        mass_kg: case.masses.effective_kg(),
+        mass_kg: case.conditions.masses.effective_kg(),
         window_s: reference.window_s(),
         reference_peak_force_n: case.peak_force_n(),
         reference_max_crush_m: case.max_deflection_m(),
-        fe_time_s: case.solver_wall_time_s,
+        fe_time_s: case.provenance.solver_wall_time_s,
         training_time_s,
         rows: compared,
         nsdm: report,
@@ -242,8 +243,8 @@ fn nsdm_report(
     }
     let all: Vec<nsdm::Fit> = fitted.fits.iter().map(|(fit, _)| fit.clone()).collect();
     Ok(NsdmReport {
-        fitted_to: fixed.name.clone(),
-        fitted_at_m_per_s: fixed.speed.m_per_s,
+        fitted_to: fixed.id.name.clone(),
+        fitted_at_m_per_s: fixed.conditions.speed.m_per_s,
         start: match settings.nsdm_start {
             Start::Random => "random".into(),
             Start::LeastSquares => "least squares".into(),

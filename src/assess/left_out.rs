@@ -22,18 +22,18 @@ const STEPS: usize = 400;
 
 /// What to ask a model of this group's so that it predicts the case.
 pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
-    let mut parameters = case.parameters.clone();
+    let mut parameters = case.conditions.parameters.clone();
     // What all training cases share is no parameter of the model.
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
-    if let Some(other) = case.masses.other_kg {
+    if let Some(other) = case.conditions.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
     Query {
-        mass_kg: Some(case.masses.body_kg),
+        mass_kg: Some(case.conditions.masses.body_kg),
         parameters,
         // Ends that are left out are judged however far away the others lie.
         extrapolate: true,
-        ..Query::at(case.speed.m_per_s)
+        ..Query::at(case.conditions.speed.m_per_s)
     }
 }
 

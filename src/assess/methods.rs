@@ -52,14 +52,14 @@ pub(super) fn of_fe(left_out: &LeftOutCase<'_>) -> Vec<Method> {
     let LeftOutCase { own, case, .. } = left_out;
     let method = |name, curve, truth: &Envelope| Method {
         name,
-        made_from: fe_at(case.speed.m_per_s),
+        made_from: fe_at(case.conditions.speed.m_per_s),
         curve,
         forces: (truth.clone(), truth.clone()),
         times: Times { training: false, ..Times::default() },
     };
-    let declared = of_recipe(own, case.force_kind);
+    let declared = of_recipe(own, case.curves.force_kind);
     let mut methods = vec![method("fe", declared, &own.envelope)];
-    if case.force_kind == ForceKind::Contact {
+    if case.curves.force_kind == ForceKind::Contact {
         let recorded = DrivingCurve::recorded(case);
         methods.extend(recorded.map(|curve| method("fe_body", curve, &own.motion.force)));
     }
@@ -76,7 +76,7 @@ pub(super) fn fdrm(left_out: &LeftOutCase<'_>, fixed: &TrainingCase, of: &Case) 
     Method {
         name: "fdrm",
         made_from: fe_at(fixed.speed_m_per_s),
-        curve: of_recipe(fixed, of.force_kind),
+        curve: of_recipe(fixed, of.curves.force_kind),
         forces: (left_out.own.envelope.clone(), fixed.envelope.clone()),
         times: Times { training_s: fixed.solver_time_s(), ..Times::default() },
     }
@@ -112,8 +112,8 @@ pub(super) fn fit_nsdm(fixed: &Case, settings: &ComparisonSettings) -> Result<Fi
         let fit = nsdm::fit(&target, &choices, seed)?;
         fits.push((fit, start.elapsed().as_secs_f64()));
     }
-    let made_from = format!("fit to {}", fe_at(fixed.speed.m_per_s));
-    Ok(FittedNsdm { made_from, reference, fits, training_s: fixed.solver_wall_time_s })
+    let made_from = format!("fit to {}", fe_at(fixed.conditions.speed.m_per_s));
+    Ok(FittedNsdm { made_from, reference, fits, training_s: fixed.provenance.solver_wall_time_s })
 }
 
 /// The motion of a case that a spring and damper are fitted to: to 30 ms after its largest

@@ -50,24 +50,25 @@ impl Reference {
     /// # Errors
     /// For a record of fewer than three states.
     pub fn of(case: &Case) -> Result<Self, Error> {
-        let end_s = case.original.time_s()[case.loading_end()] + AFTER_MAX_CRUSH_S;
-        let upto = |end_s: f64| case.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
+        let end_s = case.curves.original.time_s()[case.loading_end()] + AFTER_MAX_CRUSH_S;
+        let upto =
+            |end_s: f64| case.curves.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();
         let (inside, all) = (upto(end_s), upto(end_s + FOR_FILTER_S));
         if inside < 3 {
             return Err(error!(
                 Comparison,
                 "case \"{case}\": only {} in the window: at least 3 are needed",
                 crate::plural::counted(inside, "state"),
-                case = case.name
+                case = case.id.name
             ));
         }
-        let time_s = case.sampled.time_s()[..all].to_vec();
-        let velocity = case.closing_speed_m_per_s[..all].to_vec();
+        let time_s = case.curves.sampled.time_s()[..all].to_vec();
+        let velocity = case.curves.closing_speed_m_per_s[..all].to_vec();
         let acceleration = derivative(&time_s, &velocity);
         Ok(Self {
-            case: case.name.clone(),
-            mass_kg: case.masses.effective_kg(),
-            speed_m_per_s: case.speed.m_per_s,
+            case: case.id.name.clone(),
+            mass_kg: case.conditions.masses.effective_kg(),
+            speed_m_per_s: case.conditions.speed.m_per_s,
             acceleration_filtered: filtered(&time_s, acceleration.clone()),
             time_s,
             inside,

@@ -70,7 +70,7 @@ impl Squares {
 fn at_speed(mean: &TrainingCase, cases: &[Case]) -> Option<SpeedScatter> {
     let motion = Reference::of(&mean.case).ok()?;
     // In their own order, so that the order of the cases changes no sum.
-    let runs = mean.runs.iter().filter_map(|name| cases.iter().find(|case| case.name == *name));
+    let runs = mean.runs.iter().filter_map(|name| cases.iter().find(|case| case.id.name == *name));
     let apart: Vec<Apart> = runs.map(|run| apart(run, mean, &motion)).collect::<Option<_>>()?;
     let n = apart.len() as f64;
     let over = |of: &dyn Fn(&Apart) -> f64| apart.iter().map(of).sum::<f64>() / (n - 1.0);
@@ -99,7 +99,7 @@ fn apart(run: &Case, mean: &TrainingCase, motion: &Reference) -> Option<Apart> {
     let own = run.loading().ok()?.envelope;
     let along = grid(own.end_m(), STEPS);
     let (own_n, mean_n) = (forces_n(&own, &along), forces_n(&mean.envelope, &along));
-    let body = match run.force_kind {
+    let body = match run.curves.force_kind {
         ForceKind::Contact => {
             let own_n = forces_n(&body_motion(run)?.force, &along);
             Some(Squares::of(&own_n, &forces_n(&mean.motion.force, &along)))
@@ -107,7 +107,7 @@ fn apart(run: &Case, mean: &TrainingCase, motion: &Reference) -> Option<Apart> {
         ForceKind::Body => None,
     };
     let time_s = &motion.time_s()[..motion.inside()];
-    let own_v = at_times(run.sampled.time_s(), &run.closing_speed_m_per_s, time_s);
+    let own_v = at_times(run.curves.sampled.time_s(), &run.curves.closing_speed_m_per_s, time_s);
     Some(Apart {
         force_l1: l1_ratio(&mean_n, &own_n),
         velocity_l1: l1_ratio(&motion.velocity()[..motion.inside()], &own_v),

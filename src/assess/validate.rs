@@ -397,8 +397,11 @@ pub(crate) fn add_nested(
         .par_iter()
         .map(|held| {
             let v = held.own.speed_m_per_s;
-            let others: Vec<Case> =
-                cases.iter().filter(|c| !is_same_speed(c.speed.m_per_s, v)).cloned().collect();
+            let others: Vec<Case> = cases
+                .iter()
+                .filter(|c| !is_same_speed(c.conditions.speed.m_per_s, v))
+                .cloned()
+                .collect();
             let predicted = choose_and_fit(&group, &others, seed).and_then(|model| {
                 let curve = predict(&model, &query_of(held.case, &model))?;
                 let rule = curve.provenance.max_crush_rule;

@@ -78,7 +78,7 @@ pub struct BuildReport {
 impl BuildReport {
     /// The case of a run.
     pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
-        self.database.cases(&run.case.group).iter().find(|case| case.name == run.case.name)
+        self.database.cases(&run.case.group).iter().find(|case| case.id.name == run.case.name)
     }
 }
 
@@ -107,9 +107,9 @@ pub fn build(
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
     let previous = previous(&study, &located, &database);
     // A case that somebody has changed since is made again.
-    let unaltered = database.all().filter(|c| !database.is_altered(&c.group, &c.name));
+    let unaltered = database.all().filter(|c| !database.is_altered(&c.id.group, &c.id.name));
     let fingerprints: HashMap<CasePath, &str> =
-        unaltered.map(|case| (CasePath::of(case), &*case.fingerprint)).collect();
+        unaltered.map(|case| (CasePath::of(case), &*case.provenance.fingerprint)).collect();
     let results: Vec<(String, Result<Option<Case>, Error>)> = study
         .runs()
         .par_iter()
@@ -209,9 +209,9 @@ fn move_along(
     let (manifest, group) = (study.path(), study.group());
     database.change(|case| {
         if let Some(&run) = runs.get(&CasePath::of(case)) {
-            case.study = study.name().into();
+            case.id.study = study.name().into();
             let (manifest, group, run) = (manifest.clone(), group.into(), run.clone());
-            case.origin = Some(Origin { manifest, group, run });
+            case.provenance.origin = Some(Origin { manifest, group, run });
         }
     });
     Ok(moves.into_iter().collect())
@@ -226,7 +226,9 @@ fn put(
 ) -> Result<Vec<BuiltRun>, Error> {
     let now = clock::now_utc();
     // What users said of each.
-    let said = database.all().map(|c| (CasePath::of(c), (c.tags.clone(), c.user_notes.clone())));
+    let said = database
+        .all()
+        .map(|c| (CasePath::of(c), (c.provenance.tags.clone(), c.provenance.user_notes.clone())));
     let said: HashMap<CasePath, (Vec<String>, Vec<String>)> = said.collect();
     let (mut runs, mut built) = (Vec::new(), Vec::new());
     for (name, result) in results {
@@ -235,10 +237,10 @@ fn put(
         let path = before.cloned().unwrap_or_else(own);
         let outcome = match result {
             Ok(Some(mut case)) => {
-                (case.tags, case.user_notes) =
+                (case.provenance.tags, case.provenance.user_notes) =
                     before.and_then(|path| said.get(path)).cloned().unwrap_or_default();
-                (case.group, case.name) = (path.group.clone(), path.name.clone());
-                case.built_utc = Some(now.clone());
+                (case.id.group, case.id.name) = (path.group.clone(), path.name.clone());
+                case.provenance.built_utc = Some(now.clone());
                 built.push(case);
                 RunOutcome::Built
             }

@@ -47,8 +47,8 @@ pub(super) struct Previous {
 impl Named<'_> {
     /// Finds the study's cases.
     pub(super) fn previous(&self, database: &Database) -> Previous {
-        let built: Vec<&Case> = database.all().filter(|case| case.study != IMPORTED).collect();
-        let is_own = |case: &&&Case| case.study == self.study && group_of(case) == self.group;
+        let built: Vec<&Case> = database.all().filter(|case| case.id.study != IMPORTED).collect();
+        let is_own = |case: &&&Case| case.id.study == self.study && group_of(case) == self.group;
         let mut cases: Vec<&Case> = built.iter().filter(is_own).copied().collect();
         if cases.is_empty() {
             cases = self.renamed(&built);
@@ -61,7 +61,7 @@ impl Named<'_> {
                 true => {
                     let (run, place) = (run_of(case), self.place(case, run_of(case)));
                     // Of several, as after a merge, the one of the run's own name.
-                    if case.name == run || !previous.of_run.contains_key(run) {
+                    if case.id.name == run || !previous.of_run.contains_key(run) {
                         previous.of_run.insert(run.into(), (CasePath::of(case), place));
                     }
                 }
@@ -84,10 +84,13 @@ impl Named<'_> {
         }
         if previous.of_run.is_empty() {
             let is_ours = |case: &&&Case| {
-                case.origin.as_ref().is_some_and(|origin| origin.manifest == self.manifest)
-                    && case.group != self.group
+                case.provenance
+                    .origin
+                    .as_ref()
+                    .is_some_and(|origin| origin.manifest == self.manifest)
+                    && case.id.group != self.group
             };
-            previous.earlier = built.iter().filter(is_ours).map(|c| c.group.clone()).collect();
+            previous.earlier = built.iter().filter(is_ours).map(|c| c.id.group.clone()).collect();
         }
         previous.left = made_of.into_values().flatten().map(CasePath::of).collect();
         previous.left.sort();
@@ -101,8 +104,8 @@ impl Named<'_> {
         // Of one study and group, so that whoever has two under one path loses neither.
         let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
         for &case in built {
-            if let Some(origin) = &case.origin {
-                let key = (&*case.study, &*origin.group, &*origin.manifest);
+            if let Some(origin) = &case.provenance.origin {
+                let key = (&*case.id.study, &*origin.group, &*origin.manifest);
                 found.entry(key).or_default().push(case);
             }
         }
@@ -126,18 +129,18 @@ impl Named<'_> {
             false => said.into(),
         };
         CasePath {
-            group: now(group_of(case), self.group, &case.group),
-            name: now(run_of(case), run, &case.name),
+            group: now(group_of(case), self.group, &case.id.group),
+            name: now(run_of(case), run, &case.id.name),
         }
     }
 }
 
 /// The group that the manifest had for a case.
 fn group_of(case: &Case) -> &str {
-    case.origin.as_ref().map_or(&case.group, |origin| &origin.group)
+    case.provenance.origin.as_ref().map_or(&case.id.group, |origin| &origin.group)
 }
 
 /// The run that a case was built from.
 fn run_of(case: &Case) -> &str {
-    case.origin.as_ref().map_or(&case.name, |origin| &origin.run)
+    case.provenance.origin.as_ref().map_or(&case.id.name, |origin| &origin.run)
 }

@@ -19,8 +19,8 @@ fn largest(values: &[f64]) -> f64 {
 ///
 /// The body's force is that of its recorded speeds; `None` if the case has no such force.
 fn both_ways(case: &Case, force: ForceKind) -> Option<(Vec<f64>, Vec<f64>)> {
-    if force == case.force_kind {
-        let curve = &case.sampled;
+    if force == case.curves.force_kind {
+        let curve = &case.curves.sampled;
         let turn = (0..curve.force_n().len())
             .max_by(|&a, &b| curve.deflection_m()[a].total_cmp(&curve.deflection_m()[b]))?;
         // Where the force is gone, the bodies have parted.
@@ -43,11 +43,12 @@ fn both_ways(case: &Case, force: ForceKind) -> Option<(Vec<f64>, Vec<f64>)> {
 
 /// How runs of a group are called: by speed, and by name where speeds repeat.
 fn names(cases: &[Case]) -> Vec<String> {
-    let speeds: Vec<String> = cases.iter().map(|case| speed(case.speed.m_per_s)).collect();
+    let speeds: Vec<String> =
+        cases.iter().map(|case| speed(case.conditions.speed.m_per_s)).collect();
     let is_alone = |k: usize| speeds.iter().filter(|s| **s == speeds[k]).count() == 1;
     let name = |k: usize| match is_alone(k) {
         true => format!("FE at {}", speeds[k]),
-        false => format!("FE at {} ({})", speeds[k], cases[k].name),
+        false => format!("FE at {} ({})", speeds[k], cases[k].id.name),
     };
     (0..cases.len()).map(name).collect()
 }
@@ -69,7 +70,7 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
         }
     }
     let panel = Panel { series, ..axes(top) };
-    let kind = cases.first().map_or("speed", |case| case.speed.kind.name());
+    let kind = cases.first().map_or("speed", |case| case.conditions.speed.kind.name());
     let title = format!("{group}: {} force by {kind} speed", force.name());
     let mut chart = Chart::of(&title, panel);
     if !missing.is_empty() {
@@ -174,7 +175,7 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
     forces.title = format!("{} force", kind.name());
-    let fe = format!("FE at {}", speed(case.speed.m_per_s));
+    let fe = format!("FE at {}", speed(case.conditions.speed.m_per_s));
     if let Some((d, f)) = both_ways(case, kind) {
         forces.series.push(Series::line(&fe, 0, d, f));
     }
@@ -185,13 +186,13 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
             Panel::new(Axis::new("time", "ms", 1e3), Axis::new("closing speed", "m/s", 1.0));
         speeds.title = "one mass against a wall".into();
         let end = time_s.last().copied().unwrap_or_default();
-        let states = case.sampled.time_s().iter().take_while(|t| **t <= end).count();
-        let fe_time = case.sampled.time_s()[..states].to_vec();
+        let states = case.curves.sampled.time_s().iter().take_while(|t| **t <= end).count();
+        let fe_time = case.curves.sampled.time_s()[..states].to_vec();
         speeds.series.push(Series::line(
             &fe,
             0,
             fe_time,
-            case.closing_speed_m_per_s[..states].to_vec(),
+            case.curves.closing_speed_m_per_s[..states].to_vec(),
         ));
         let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
         let ours = Series::line(&name, PREDICTED, time_s.to_vec(), v_m_per_s.to_vec());
@@ -200,8 +201,8 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
     }
     let title = format!(
         "{}: {} left out and predicted by {}",
-        case.group,
-        speed(case.speed.m_per_s),
+        case.id.group,
+        speed(case.conditions.speed.m_per_s),
         curve.model
     );
     Chart::row(&title, panels)

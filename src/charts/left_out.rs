@@ -21,12 +21,13 @@ pub fn left_out_at(
     speed_m_per_s: f64,
     choice: Choice,
 ) -> Result<Chart, Error> {
-    let is_that = |case: &&Case| is_same_speed(case.speed.m_per_s, speed_m_per_s);
+    let is_that = |case: &&Case| is_same_speed(case.conditions.speed.m_per_s, speed_m_per_s);
     let set = TrainingSet::new(group, cases)?;
     // Several runs of that speed are one case, their mean.
     let mut own = set.cases.iter().map(|own| &*own.case);
     let Some(case) = own.find(is_that) else {
-        let speeds: Vec<String> = cases.iter().map(|c| km_per_h(c.speed.m_per_s)).collect();
+        let speeds: Vec<String> =
+            cases.iter().map(|c| km_per_h(c.conditions.speed.m_per_s)).collect();
         let known = speeds.join(", ");
         return Err(error!(
             Plot,
@@ -36,7 +37,8 @@ pub fn left_out_at(
     };
     let others: Vec<Case> = cases.iter().filter(|c| !is_that(c)).cloned().collect();
     let model = train(group, &others, choice)?;
-    let curve = predict(&model, &Query { extrapolate: true, ..Query::at(case.speed.m_per_s) })?;
+    let curve =
+        predict(&model, &Query { extrapolate: true, ..Query::at(case.conditions.speed.m_per_s) })?;
     let run = Reference::of(case)?.run(&curve.driving(moving_force(&curve))?)?;
     let motion = Some((&run.time_s[..], &run.bodies[0].v_m_per_s[..]));
     Ok(left_out(LeftOutPrediction { case, curve: &curve, motion }))

@@ -270,10 +270,10 @@ fn cases(database: &Database) -> impl Iterator<Item = (&str, &Case)> {
 fn case_line(group: &str, case: &Case) -> CaseLine {
     CaseLine {
         group: group.into(),
-        speed_m_per_s: case.speed.m_per_s,
+        speed_m_per_s: case.conditions.speed.m_per_s,
         peak_force_n: case.peak_force_n(),
         max_deflection_m: case.max_deflection_m(),
-        work_over_energy: case.audit.ratio(),
+        work_over_energy: case.quality.audit.ratio(),
     }
 }
 

@@ -299,18 +299,18 @@ fn export(
     if format.takes_case() {
         let cases = input.cases(&chosen, format.name)?;
         if let (Some(force), Some(case)) = (args.target.force, cases.first())
-            && force != case.force_kind
+            && force != case.curves.force_kind
         {
             return Err(Failure::Usage(format!(
                 "{} holds a case's histories, which are of the {} force: remove --force",
                 format.name,
-                case.force_kind.name()
+                case.curves.force_kind.name()
             )));
         }
         let mut exported = format.export_cases(&cases, &args.target.options(output))?;
         if let (Input::File(_), Some(case)) = (input, cases.into_iter().next()) {
-            exported.notes.splice(0..0, case.notes);
-            return Ok((exported, case.warnings));
+            exported.notes.splice(0..0, case.quality.notes);
+            return Ok((exported, case.quality.warnings));
         }
         return Ok((exported, Vec::new()));
     }

@@ -124,7 +124,11 @@ impl Input {
             Self::File(path) => {
                 let case = chosen.of_file(path)?;
                 let inputs = vec![of_case(&case)?];
-                return Ok(Curves { inputs, notes: case.notes, warnings: case.warnings });
+                return Ok(Curves {
+                    inputs,
+                    notes: case.quality.notes,
+                    warnings: case.quality.warnings,
+                });
             }
         };
         Ok(Curves { inputs, ..Curves::default() })
@@ -224,11 +228,12 @@ impl Chosen<'_> {
         for name in self.cases {
             database.case(path, group, name)?;
         }
-        let has_speed = |case: &Case, v: f64| is_same_speed(case.speed.m_per_s, v);
+        let has_speed = |case: &Case, v: f64| is_same_speed(case.conditions.speed.m_per_s, v);
         if let Some(&v) =
             self.speeds_m_per_s.iter().find(|&&v| !cases.iter().any(|c| has_speed(c, v)))
         {
-            let known: Vec<String> = cases.iter().map(|c| km_per_h(c.speed.m_per_s)).collect();
+            let known: Vec<String> =
+                cases.iter().map(|c| km_per_h(c.conditions.speed.m_per_s)).collect();
             return Err(Failure::Usage(format!(
                 "group {group} has no case at {}: it has {}; a model gives curves at other speeds",
                 km_per_h(v),
@@ -236,7 +241,7 @@ impl Chosen<'_> {
             )));
         }
         let is_chosen = |case: &&Case| {
-            let by_name = self.cases.is_empty() || self.cases.contains(&case.name);
+            let by_name = self.cases.is_empty() || self.cases.contains(&case.id.name);
             let speeds = self.speeds_m_per_s;
             by_name && (speeds.is_empty() || speeds.iter().any(|&v| has_speed(case, v)))
         };

@@ -278,7 +278,7 @@ fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
     let database = Database::read(&args.file)?;
     let (group, cases) = database.group_or_only(&args.file, args.group.as_deref())?;
     let Some(speed) = args.left_out else {
-        let own = cases.first().map_or(ForceKind::Contact, |case| case.force_kind);
+        let own = cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind);
         return Ok(charts::group_curves(group, cases, args.force.unwrap_or(own)));
     };
     let bar = Bar::new(options, "leaving the speed out");

@@ -71,7 +71,7 @@ pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
         .iter()
         .map(|case| Ok(difference(first, &reference, case, case.loading()?.envelope)))
         .collect();
-    let reference = format!("{}/{}", first.group, first.name);
+    let reference = format!("{}/{}", first.id.group, first.id.name);
     Ok(Some(Comparison { reference, cases: differences? }))
 }
 
@@ -82,19 +82,19 @@ fn difference(first: &Case, reference: &Envelope, case: &Case, envelope: Envelop
     let at = |e: &Envelope| -> Vec<f64> { along.iter().map(|&d| e.force_at(d)).collect() };
     let force_l1 = l1_ratio(&at(reference), &at(&envelope));
     Difference {
-        group: case.group.clone(),
-        case: case.name.clone(),
-        speed_m_per_s: case.speed.m_per_s,
-        speed_kind: case.speed.kind,
-        force_kind: case.force_kind,
-        mass_kg: case.masses.body_kg,
+        group: case.id.group.clone(),
+        case: case.id.name.clone(),
+        speed_m_per_s: case.conditions.speed.m_per_s,
+        speed_kind: case.conditions.speed.kind,
+        force_kind: case.curves.force_kind,
+        mass_kg: case.conditions.masses.body_kg,
         max_deflection_m: case.max_deflection_m(),
-        work_j: case.audit.work_j,
+        work_j: case.quality.audit.work_j,
         peak_force_n: case.peak_force_n(),
-        speed_difference: share(|c| c.speed.m_per_s),
-        mass_difference: share(|c| c.masses.body_kg),
+        speed_difference: share(|c| c.conditions.speed.m_per_s),
+        mass_difference: share(|c| c.conditions.masses.body_kg),
         max_deflection_difference: share(Case::max_deflection_m),
-        work_difference: share(|c| c.audit.work_j),
+        work_difference: share(|c| c.quality.audit.work_j),
         peak_force_difference: share(Case::peak_force_n),
         common_deflection_m,
         force_l1: Some(force_l1).filter(|l1| l1.is_finite()),

@@ -115,9 +115,9 @@ pub(crate) fn copy(
             continue;
         }
         let mut new = Incoming::of(case, hashes);
-        if let Some(group) = target.group.as_ref().filter(|group| **group != new.case.group) {
-            new.case.group.clone_from(group);
-            new.case.origin = None;
+        if let Some(group) = target.group.as_ref().filter(|group| **group != new.case.id.group) {
+            new.case.id.group.clone_from(group);
+            new.case.provenance.origin = None;
         } else if is_itself {
             let case = new.from;
             return Err(error!(
@@ -174,15 +174,17 @@ impl Join {
             .database
             .all()
             .map(|case| {
-                Ok(((case.group.clone(), database::record_hash(case)?), CasePath::of(case)))
+                Ok(((case.id.group.clone(), database::record_hash(case)?), CasePath::of(case)))
             })
             .collect::<Result<_, Error>>()?;
         let mut names: HashSet<CasePath> = self.database.all().map(CasePath::of).collect();
         let (mut conflicts, mut doubles, mut new) = (Vec::new(), HashMap::new(), Vec::new());
         for Incoming { mut case, from, altered } in incoming {
-            if let Some(there) = records.get(&(case.group.clone(), database::record_hash(&case)?)) {
+            if let Some(there) =
+                records.get(&(case.id.group.clone(), database::record_hash(&case)?))
+            {
                 self.joined.equal.push((path.into(), from, there.clone()));
-                doubles.insert(there.clone(), (case.tags, case.user_notes));
+                doubles.insert(there.clone(), (case.provenance.tags, case.provenance.user_notes));
                 continue;
             }
             self.check_kinds(path, &case)?;
@@ -193,7 +195,7 @@ impl Join {
                 (true, OnConflict::Replace) => self.joined.replaced.push((path.into(), own)),
                 (true, OnConflict::Rename) => {
                     database::remember_origin(&mut case);
-                    case.name = free_name(&own, &names);
+                    case.id.name = free_name(&own, &names);
                     self.joined.renamed.push((path.into(), from, CasePath::of(&case)));
                 }
             }
@@ -218,13 +220,14 @@ impl Join {
 
     /// Whether a case is of the kinds of its group.
     fn check_kinds(&self, path: &Path, case: &Case) -> Result<(), Error> {
-        let replaces =
-            |other: &&Case| other.name == case.name && self.on_conflict == OnConflict::Replace;
-        let mut there = self.database.cases(&case.group).iter().filter(|c| !replaces(c));
+        let replaces = |other: &&Case| {
+            other.id.name == case.id.name && self.on_conflict == OnConflict::Replace
+        };
+        let mut there = self.database.cases(&case.id.group).iter().filter(|c| !replaces(c));
         let Some(other) = there.next() else { return Ok(()) };
         let kinds = [
-            ("speed", case.speed.kind.name(), other.speed.kind.name()),
-            ("force", case.force_kind.name(), other.force_kind.name()),
+            ("speed", case.conditions.speed.kind.name(), other.conditions.speed.kind.name()),
+            ("force", case.curves.force_kind.name(), other.curves.force_kind.name()),
         ];
         match kinds.into_iter().find(|(_, found, expected)| found != expected) {
             None => Ok(()),
@@ -250,12 +253,12 @@ fn free_name(path: &CasePath, taken: &HashSet<CasePath>) -> String {
 
 /// Gives a case the tags and notes of its double.
 fn unite(case: &mut Case, tags: Vec<String>, notes: Vec<String>) {
-    case.tags.extend(tags);
-    case.tags.sort();
-    case.tags.dedup();
+    case.provenance.tags.extend(tags);
+    case.provenance.tags.sort();
+    case.provenance.tags.dedup();
     for note in notes {
-        if !case.user_notes.contains(&note) {
-            case.user_notes.push(note);
+        if !case.provenance.user_notes.contains(&note) {
+            case.provenance.user_notes.push(note);
         }
     }
 }

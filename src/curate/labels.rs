@@ -68,9 +68,10 @@ impl Labels {
     /// Whether every tag and note that is to be taken away is that of a case.
     fn check_removed(&self, path: &Path, cases: &[&Case]) -> Result<(), Error> {
         type Texts = fn(&Case) -> &Vec<String>;
-        let of_tags: (&'static str, &[String], Texts) = ("tag", &self.remove_tags, |c| &c.tags);
+        let of_tags: (&'static str, &[String], Texts) =
+            ("tag", &self.remove_tags, |c| &c.provenance.tags);
         let of_notes: (&'static str, &[String], Texts) =
-            ("note", &self.remove_notes, |c| &c.user_notes);
+            ("note", &self.remove_notes, |c| &c.provenance.user_notes);
         for (what, removed, texts) in [of_tags, of_notes] {
             let there: BTreeSet<&String> = cases.iter().flat_map(|case| texts(case)).collect();
             if let Some(text) = removed.iter().find(|text| !there.contains(text)) {
@@ -87,14 +88,16 @@ impl Labels {
     }
 
     fn apply(&self, case: &mut Case) {
-        case.tags.retain(|tag| !self.clear_tags && !self.remove_tags.contains(tag));
-        case.tags.extend(self.add_tags.iter().cloned());
-        case.tags.sort();
-        case.tags.dedup();
-        case.user_notes.retain(|note| !self.clear_notes && !self.remove_notes.contains(note));
+        case.provenance.tags.retain(|tag| !self.clear_tags && !self.remove_tags.contains(tag));
+        case.provenance.tags.extend(self.add_tags.iter().cloned());
+        case.provenance.tags.sort();
+        case.provenance.tags.dedup();
+        case.provenance
+            .user_notes
+            .retain(|note| !self.clear_notes && !self.remove_notes.contains(note));
         for note in &self.add_notes {
-            if !case.user_notes.contains(note) {
-                case.user_notes.push(note.clone());
+            if !case.provenance.user_notes.contains(note) {
+                case.provenance.user_notes.push(note.clone());
             }
         }
     }
@@ -120,9 +123,9 @@ pub(crate) fn label(
     let (mut changed, mut cases) = (false, Vec::new());
     database.change(|case| {
         if chosen.contains(&CasePath::of(case)) {
-            let before = (case.tags.clone(), case.user_notes.clone());
+            let before = (case.provenance.tags.clone(), case.provenance.user_notes.clone());
             labels.apply(case);
-            changed |= before != (case.tags.clone(), case.user_notes.clone());
+            changed |= before != (case.provenance.tags.clone(), case.provenance.user_notes.clone());
             cases.push(case.clone());
         }
     });

@@ -107,7 +107,7 @@ impl Selection {
         }
         let of_groups: Vec<&Case> = database
             .all()
-            .filter(|case| self.groups.is_empty() || self.groups.contains(&case.group))
+            .filter(|case| self.groups.is_empty() || self.groups.contains(&case.id.group))
             .collect();
         let mut named: Vec<&Case> = Vec::new();
         for name in &self.cases {
@@ -115,8 +115,9 @@ impl Selection {
         }
         let is_chosen = |case: &&Case| {
             (self.cases.is_empty() || named.iter().any(|c| CasePath::of(c) == CasePath::of(case)))
-                && self.speed.is_none_or(|range| range.holds(case.speed.m_per_s))
-                && (self.tags.is_empty() || self.tags.iter().any(|tag| case.tags.contains(tag)))
+                && self.speed.is_none_or(|range| range.holds(case.conditions.speed.m_per_s))
+                && (self.tags.is_empty()
+                    || self.tags.iter().any(|tag| case.provenance.tags.contains(tag)))
         };
         let chosen: Vec<&Case> = of_groups.iter().copied().filter(is_chosen).collect();
         if chosen.is_empty() {
@@ -149,8 +150,8 @@ impl Selection {
 /// The case of this name, or of this group and name.
 fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case, Error> {
     let is_named = |case: &&&Case| match name.split_once('/') {
-        Some((group, name)) => case.group == group && case.name == name,
-        None => case.name == name,
+        Some((group, name)) => case.id.group == group && case.id.name == name,
+        None => case.id.name == name,
     };
     let found: Vec<&Case> = cases.iter().filter(is_named).copied().collect();
     match found[..] {
@@ -173,11 +174,11 @@ fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case
 /// Cases with their speeds and tags, for a message.
 fn listed(cases: &[&Case]) -> String {
     let shown = |case: &&Case| {
-        let tags = match case.tags.is_empty() {
+        let tags = match case.provenance.tags.is_empty() {
             true => String::new(),
-            false => format!(", {}", case.tags.join(", ")),
+            false => format!(", {}", case.provenance.tags.join(", ")),
         };
-        format!("{} ({}{tags})", CasePath::of(case), km_per_h(case.speed.m_per_s))
+        format!("{} ({}{tags})", CasePath::of(case), km_per_h(case.conditions.speed.m_per_s))
     };
     let names: Vec<String> = cases.iter().take(LISTED).map(shown).collect();
     match cases.len() - names.len() {

@@ -81,12 +81,13 @@ const COLUMNS: [&str; 25] = [
 ];
 
 fn write_cases(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
-    let parameters: BTreeSet<&String> = cases.iter().flat_map(|c| c.parameters.keys()).collect();
+    let parameters: BTreeSet<&String> =
+        cases.iter().flat_map(|c| c.conditions.parameters.keys()).collect();
     let mut table = csv::Writer::from_writer(out);
     let named = parameters.iter().map(|name| format!("parameter_{name}"));
     table.write_record(COLUMNS.iter().map(ToString::to_string).chain(named))?;
     for case in cases {
-        let values = parameters.iter().map(|name| match case.parameters.get(*name) {
+        let values = parameters.iter().map(|name| match case.conditions.parameters.get(*name) {
             Some(Parameter::Number(number)) => shown(*number),
             Some(Parameter::Category(category)) => category.clone(),
             None => String::new(),
@@ -98,36 +99,37 @@ fn write_cases(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
 
 fn row(case: &Case) -> [String; COLUMNS.len()] {
     let optional = |value: Option<f64>| value.map_or(String::new(), shown);
-    let sources = case.sources.iter().map(|s| s.absolute_path.clone().unwrap_or(s.path.clone()));
-    let solver = case.sources.iter().find_map(|source| {
+    let sources =
+        case.provenance.sources.iter().map(|s| s.absolute_path.clone().unwrap_or(s.path.clone()));
+    let solver = case.provenance.sources.iter().find_map(|source| {
         Some([source.solver.as_deref()?, source.version.as_deref().unwrap_or("")].join(" "))
     });
     [
-        case.group.clone(),
-        case.name.clone(),
-        case.study.clone(),
-        shown(case.speed.m_per_s),
-        case.speed.kind.name().into(),
-        shown(case.masses.body_kg),
-        optional(case.masses.other_kg),
-        case.force_kind.name().into(),
+        case.id.group.clone(),
+        case.id.name.clone(),
+        case.id.study.clone(),
+        shown(case.conditions.speed.m_per_s),
+        case.conditions.speed.kind.name().into(),
+        shown(case.conditions.masses.body_kg),
+        optional(case.conditions.masses.other_kg),
+        case.curves.force_kind.name().into(),
         shown(case.max_deflection_m()),
         shown(case.peak_force_n()),
-        shown(case.audit.work_j),
-        shown(case.audit.kinetic_j),
-        shown(case.audit.ratio()),
-        optional(case.unloading_stiffness_n_per_m),
+        shown(case.quality.audit.work_j),
+        shown(case.quality.audit.kinetic_j),
+        shown(case.quality.audit.ratio()),
+        optional(case.curves.unloading_stiffness_n_per_m),
         case.is_truncated().to_string(),
-        shown(case.contact_time_s),
-        optional(case.solver_wall_time_s),
-        case.sampled.time_s().len().to_string(),
-        case.tags.join(";"),
-        case.user_notes.join("\n"),
-        case.warnings.join("\n"),
+        shown(case.curves.contact_time_s),
+        optional(case.provenance.solver_wall_time_s),
+        case.curves.sampled.time_s().len().to_string(),
+        case.provenance.tags.join(";"),
+        case.provenance.user_notes.join("\n"),
+        case.quality.warnings.join("\n"),
         sources.collect::<Vec<_>>().join(";"),
         solver.map(|s| s.trim().into()).unwrap_or_default(),
-        case.built_utc.clone().unwrap_or_default(),
-        case.fingerprint.clone(),
+        case.provenance.built_utc.clone().unwrap_or_default(),
+        case.provenance.fingerprint.clone(),
     ]
 }
 
@@ -136,13 +138,13 @@ fn write_sampled(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
     writeln!(out, "{heading}")?;
     for case in cases {
         let body = body_force_n(case);
-        let curve = &case.sampled;
+        let curve = &case.curves.sampled;
         let columns = [
             curve.time_s(),
             curve.deflection_m(),
             curve.force_n(),
             &body,
-            &case.closing_speed_m_per_s,
+            &case.curves.closing_speed_m_per_s,
         ];
         write_samples(out, case, &columns)?;
     }
@@ -152,7 +154,7 @@ fn write_sampled(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
 fn write_originals(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
     writeln!(out, "group,case,time_s,deflection_m,force_N")?;
     for case in cases {
-        let curve = &case.original;
+        let curve = &case.curves.original;
         write_samples(out, case, &[curve.time_s(), curve.deflection_m(), curve.force_n()])?;
     }
     Ok(())
@@ -161,7 +163,7 @@ fn write_originals(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
 /// A line for each sample of a case: its names, which may hold commas and quotes, then numbers.
 fn write_samples(out: &mut dyn Write, case: &Case, columns: &[&[f64]]) -> io::Result<()> {
     let mut names = csv::Writer::from_writer(Vec::new());
-    names.write_record([&case.group, &case.name])?;
+    names.write_record([&case.id.group, &case.id.name])?;
     let names = names.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
     let names = names.strip_suffix(b"\n").unwrap_or(&names);
     let mut digits = zmij::Buffer::new();

@@ -33,9 +33,9 @@ pub(crate) fn rebound_stiffness_n_per_m(
 /// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, with the case's
 /// effective mass, as [`body_motion`] filters it.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
-    let time_s = case.sampled.time_s();
-    let mass = case.masses.effective_kg();
-    let accelerations = derivative(time_s, &case.closing_speed_m_per_s);
+    let time_s = case.curves.sampled.time_s();
+    let mass = case.conditions.masses.effective_kg();
+    let accelerations = derivative(time_s, &case.curves.closing_speed_m_per_s);
     let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
     let mut force_n = filtered(time_s, raw);
     // The body does not yet feel the contact.
@@ -49,8 +49,8 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
 /// (an impact's first spike is the nose being stopped). Filtered with CFC 60 unless the
 /// sampling is too coarse for it. `None` if the sampled states make no loading branch.
 pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
-    let sampled = &case.sampled;
-    let speeds = &case.closing_speed_m_per_s;
+    let sampled = &case.curves.sampled;
+    let speeds = &case.curves.closing_speed_m_per_s;
     let force_n = body_force_n(case);
     let end = loading_end(sampled);
     let over_deflection = |values: Vec<f64>| {
@@ -100,10 +100,10 @@ const LAST_SHARE: f64 = 0.005;
 /// deflection, `−m Δ(v²)/2Δd`: a body that runs on it has the recorded speeds at the recorded
 /// deflections. `None` if the sampled states make no loading branch.
 pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
-    let (t, d) = (case.sampled.time_s(), case.sampled.deflection_m());
-    let v = &case.closing_speed_m_per_s;
-    let mass = case.masses.effective_kg();
-    let end = loading_end(&case.sampled);
+    let (t, d) = (case.curves.sampled.time_s(), case.curves.sampled.deflection_m());
+    let v = &case.curves.closing_speed_m_per_s;
+    let mass = case.conditions.masses.effective_kg();
+    let end = loading_end(&case.curves.sampled);
     let states = advancing_states(d, end);
     let mean = |i: usize, j: usize| -0.5 * mass * (v[j] * v[j] - v[i] * v[i]) / (d[j] - d[i]);
     // The mean forces between them.

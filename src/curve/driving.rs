@@ -81,13 +81,13 @@ impl DrivingCurve {
                 deflection_m: recorded.unloading_deflection_m,
                 force_n: recorded.unloading_force_n,
             },
-            None => CurveUnloading::of(case.unloading_stiffness_n_per_m),
+            None => CurveUnloading::of(case.curves.unloading_stiffness_n_per_m),
         };
         Some(Self {
             unloading,
             force: Some(ForceKind::Body),
-            speed_kind: Some(case.speed.kind),
-            speed_m_per_s: Some(case.speed.m_per_s),
+            speed_kind: Some(case.conditions.speed.kind),
+            speed_m_per_s: Some(case.conditions.speed.m_per_s),
             ..Self::bare(recorded.loading)
         })
     }
@@ -98,15 +98,15 @@ impl DrivingCurve {
     /// # Errors
     /// [`NoDrivingCurve`] if the case has no such curve.
     pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
-        let is_other = force == ForceKind::Body && case.force_kind == ForceKind::Contact;
+        let is_other = force == ForceKind::Body && case.curves.force_kind == ForceKind::Contact;
         if is_other && !case.moves_by_its_force() {
             return Self::recorded(case).ok_or(NoDrivingCurve::NoMotion);
         }
         Ok(Self {
-            unloading: CurveUnloading::of(case.unloading_stiffness_n_per_m),
+            unloading: CurveUnloading::of(case.curves.unloading_stiffness_n_per_m),
             force: Some(force),
-            speed_kind: Some(case.speed.kind),
-            speed_m_per_s: Some(case.speed.m_per_s),
+            speed_kind: Some(case.conditions.speed.kind),
+            speed_m_per_s: Some(case.conditions.speed.m_per_s),
             ..Self::bare(case.loading()?.envelope)
         })
     }

@@ -8,7 +8,10 @@ impl Case {
     /// Hash over the recipe without names and paths, and over the bytes of the sources: equal for
     /// a run and for its case under an earlier name. `None` if the case is of no run.
     pub(crate) fn made_of(&self) -> Option<String> {
-        made_of(&self.recipe, self.sources.iter().map(|source| source.blake3.as_str()))
+        made_of(
+            &self.provenance.recipe,
+            self.provenance.sources.iter().map(|source| source.blake3.as_str()),
+        )
     }
 }
 

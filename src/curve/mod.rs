@@ -241,48 +241,68 @@ pub struct Origin {
     pub run: String,
 }
 
-/// One FE run as the database keeps it.
+/// What a case is called: its name is unique in its group.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Case {
+pub struct CaseId {
     /// Name of the study that it comes from.
     pub study: String,
     /// Group of cases that differ in speed and parameters alone.
     pub group: String,
-    /// Name of the case, unique in its group.
+    /// Name of the case.
     pub name: String,
+}
+
+/// How the bodies of a case met.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Conditions {
     /// Speed before contact, and what it is measured against.
     pub speed: Speed,
     /// The masses that meet.
     pub masses: Masses,
     /// What else distinguishes the case from others of its group, by name.
     pub parameters: BTreeMap<String, Parameter>,
+}
+
+/// What a case's run recorded, from contact on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCurves {
     /// Which force the curves hold.
     pub force_kind: ForceKind,
-    /// At the common interval, from contact on.
+    /// At the common interval.
     pub sampled: Curve,
     /// Rate of the deflection at the sampled times, in m/s.
     pub closing_speed_m_per_s: Vec<f64>,
-    /// At the solver's rate, from contact on (filtered if the recipe says so).
+    /// At the solver's rate (filtered if the recipe says so).
     pub original: Curve,
     /// Solver's time of the first contact, in s; curves count from it.
     pub contact_time_s: f64,
-    /// Time by the clock that the solver took for the run, in s, if the run's folder tells.
-    pub solver_wall_time_s: Option<f64>,
     /// Secant of the unloading branch between 90 % and 10 % of its force, in N/m;
     /// `None` if the record ends before.
     pub unloading_stiffness_n_per_m: Option<f64>,
+}
+
+/// How far a case can be trusted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quality {
     /// Work of the force against the kinetic energy.
     pub audit: EnergyAudit,
+    /// What the extraction did that the manifest does not say.
+    pub notes: Vec<String>,
+    /// What the user should look at before trusting the case.
+    pub warnings: Vec<String>,
+}
+
+/// Where a case comes from, and the words that users gave it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance {
     /// The recipe and the run's entry, as JSON.
     pub recipe: String,
     /// Hash over recipe, entry and sources: equal hashes need no new extraction.
     pub fingerprint: String,
     /// Files that it was made from.
     pub sources: Vec<SourceFile>,
-    /// What the extraction did that the manifest does not say.
-    pub notes: Vec<String>,
-    /// What the user should look at before trusting the case.
-    pub warnings: Vec<String>,
+    /// Time by the clock that the solver took for the run, in s, if the run's folder has it.
+    pub solver_wall_time_s: Option<f64>,
     /// When it was built, in UTC as ISO 8601 has it (`2026-05-04T13:37:00Z`); `None` in databases
     /// before version 3.
     pub built_utc: Option<String>,
@@ -294,43 +314,58 @@ pub struct Case {
     pub user_notes: Vec<String>,
 }
 
+/// One FE run as the database keeps it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Study, group and name.
+    pub id: CaseId,
+    /// Speed, masses and parameters.
+    pub conditions: Conditions,
+    /// Force over deflection, sampled and as recorded.
+    pub curves: RecordedCurves,
+    /// Energy audit, notes and warnings.
+    pub quality: Quality,
+    /// Recipe, sources, history and labels.
+    pub provenance: Provenance,
+}
+
 impl Case {
     /// The loading branch at the solver's rate, with its share of dropped samples.
     pub fn loading(&self) -> Result<loading::Loading, Error> {
-        loading::loading_branch(&self.original)
+        loading::loading_branch(&self.curves.original)
     }
 
     /// Index of the largest deflection in the original curve.
     pub fn loading_end(&self) -> usize {
-        loading::loading_end(&self.original)
+        loading::loading_end(&self.curves.original)
     }
 
     /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
     /// versions.
     pub(crate) fn units(&self) -> Option<UnitSystem> {
-        let recipe: serde_json::Value = serde_json::from_str(&self.recipe).ok()?;
+        let recipe: serde_json::Value = serde_json::from_str(&self.provenance.recipe).ok()?;
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
     /// Whether its motion was made of its own force, as of an imported table without times: then
     /// that force is also the one that moves the body.
     pub(crate) fn moves_by_its_force(&self) -> bool {
-        let recipe: Option<serde_json::Value> = serde_json::from_str(&self.recipe).ok();
+        let recipe: Option<serde_json::Value> = serde_json::from_str(&self.provenance.recipe).ok();
         recipe.is_some_and(|r| r["imported"]["moves_by_its_force"] == true)
     }
 
     /// Largest deflection, in m.
     pub fn max_deflection_m(&self) -> f64 {
-        self.original.deflection_m[self.loading_end()]
+        self.curves.original.deflection_m[self.loading_end()]
     }
 
     /// Largest force of the original states, in N: contact or body force, as the recipe has it.
     pub fn peak_force_n(&self) -> f64 {
-        self.original.force_n.iter().copied().fold(0.0, f64::max)
+        self.curves.original.force_n.iter().copied().fold(0.0, f64::max)
     }
 
     /// Whether the run ended before the bodies moved apart again.
     pub fn is_truncated(&self) -> bool {
-        self.loading_end() + 1 == self.original.time_s.len()
+        self.loading_end() + 1 == self.curves.original.time_s.len()
     }
 }

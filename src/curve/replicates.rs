@@ -13,7 +13,7 @@ impl Case {
     /// Whether both were measured by one recipe, so that a difference of their curves is scatter:
     /// recipes are compared without names, files and what belongs to the one run.
     pub(crate) fn is_measured_as(&self, other: &Self) -> bool {
-        measured(&self.recipe) == measured(&other.recipe)
+        measured(&self.provenance.recipe) == measured(&other.provenance.recipe)
     }
 }
 
@@ -39,34 +39,39 @@ pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, Error> {
     let runs: Vec<&Case> = [first].into_iter().chain(others.iter().copied()).collect();
     let mean =
         |of: fn(&Case) -> f64| runs.iter().map(|run| of(run)).sum::<f64>() / runs.len() as f64;
-    let known: Vec<f64> = runs.iter().filter_map(|run| run.unloading_stiffness_n_per_m).collect();
-    let sampled = mean_curve(&runs, |run| &run.sampled)?;
-    let speeds: Vec<_> =
-        runs.iter().map(|run| (run.sampled.time_s(), &run.closing_speed_m_per_s[..])).collect();
+    let known: Vec<f64> =
+        runs.iter().filter_map(|run| run.curves.unloading_stiffness_n_per_m).collect();
+    let sampled = mean_curve(&runs, |run| &run.curves.sampled)?;
+    let speeds: Vec<_> = runs
+        .iter()
+        .map(|run| (run.curves.sampled.time_s(), &run.curves.closing_speed_m_per_s[..]))
+        .collect();
     let mut fingerprint = blake3::Hasher::new();
     for run in &runs {
-        fingerprint.update(run.fingerprint.as_bytes());
+        fingerprint.update(run.provenance.fingerprint.as_bytes());
     }
-    let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+    let names: Vec<&str> = runs.iter().map(|run| run.id.name.as_str()).collect();
     let mut of = first.clone();
-    of.name = format!("{} (mean of {})", first.name, runs.len());
-    of.speed.m_per_s = mean(|run| run.speed.m_per_s);
-    of.closing_speed_m_per_s = mean_over_time(&speeds, sampled.time_s());
-    of.sampled = sampled;
-    of.original = mean_curve(&runs, |run| &run.original)?;
-    let times: Option<f64> = runs.iter().map(|run| run.solver_wall_time_s).sum();
-    of.solver_wall_time_s = times.map(|sum| sum / runs.len() as f64);
-    of.unloading_stiffness_n_per_m =
+    of.id.name = format!("{} (mean of {})", first.id.name, runs.len());
+    of.conditions.speed.m_per_s = mean(|run| run.conditions.speed.m_per_s);
+    of.curves.closing_speed_m_per_s = mean_over_time(&speeds, sampled.time_s());
+    of.curves.sampled = sampled;
+    of.curves.original = mean_curve(&runs, |run| &run.curves.original)?;
+    let times: Option<f64> = runs.iter().map(|run| run.provenance.solver_wall_time_s).sum();
+    of.provenance.solver_wall_time_s = times.map(|sum| sum / runs.len() as f64);
+    of.curves.unloading_stiffness_n_per_m =
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
-    of.audit = EnergyAudit {
-        work_j: mean(|run| run.audit.work_j),
-        kinetic_j: mean(|run| run.audit.kinetic_j),
+    of.quality.audit = EnergyAudit {
+        work_j: mean(|run| run.quality.audit.work_j),
+        kinetic_j: mean(|run| run.quality.audit.kinetic_j),
     };
-    of.fingerprint = fingerprint.finalize().to_hex().to_string();
-    of.sources = runs.iter().flat_map(|run| run.sources.clone()).collect();
-    of.notes = vec![format!("mean of {}: {}", counted(runs.len(), "run"), names.join(", "))];
-    of.warnings = runs.iter().flat_map(|run| run.warnings.clone()).collect();
-    (of.origin, of.tags, of.user_notes) = (None, Vec::new(), Vec::new());
+    of.provenance.fingerprint = fingerprint.finalize().to_hex().to_string();
+    of.provenance.sources = runs.iter().flat_map(|run| run.provenance.sources.clone()).collect();
+    of.quality.notes =
+        vec![format!("mean of {}: {}", counted(runs.len(), "run"), names.join(", "))];
+    of.quality.warnings = runs.iter().flat_map(|run| run.quality.warnings.clone()).collect();
+    (of.provenance.origin, of.provenance.tags, of.provenance.user_notes) =
+        (None, Vec::new(), Vec::new());
     Ok(of)
 }
 

@@ -200,8 +200,8 @@ impl Findings<'_> {
         }
         self.attributes(&content, attributes);
         self.audit(case);
-        let stiffness = loading::unloading_stiffness(&case.original);
-        let stored = case.unloading_stiffness_n_per_m;
+        let stiffness = loading::unloading_stiffness(&case.curves.original);
+        let stored = case.curves.unloading_stiffness_n_per_m;
         if stored.is_some() != stiffness.is_some()
             || stored.zip(stiffness).is_some_and(|(a, b)| !is_same(a, b))
         {
@@ -215,7 +215,9 @@ impl Findings<'_> {
         }
         self.sampled("deflection_m", case, Curve::deflection_m);
         self.sampled("force_N", case, Curve::force_n);
-        for (path, curve) in [("time_s", &case.sampled), ("original/time_s", &case.original)] {
+        for (path, curve) in
+            [("time_s", &case.curves.sampled), ("original/time_s", &case.curves.original)]
+        {
             for gap in time_gaps(curve.time_s()) {
                 self.add("time_gap", Some(path), Some(gap.state), format!("{path}: {gap}"));
             }
@@ -227,7 +229,7 @@ impl Findings<'_> {
             let message = "the record does not hold the unloading branch".into();
             self.add("no_unloading", None, None, message);
         }
-        for warning in &case.warnings {
+        for warning in &case.quality.warnings {
             self.add("extraction", None, None, warning.clone());
         }
         Ok(())
@@ -252,7 +254,8 @@ impl Findings<'_> {
     }
 
     fn audit(&mut self, case: &Case) {
-        let audit = energy::audit(&case.original, case.masses, case.speed);
+        let audit =
+            energy::audit(&case.curves.original, case.conditions.masses, case.conditions.speed);
         let ratio = audit.ratio();
         let (least, most) = energy::POSSIBLE;
         // A run that ended while loading has not stopped its body yet.
@@ -266,8 +269,8 @@ impl Findings<'_> {
             self.add("energy_mismatch", None, None, message);
         }
         let pairs = [
-            ("work", case.audit.work_j, audit.work_j),
-            ("kinetic energy", case.audit.kinetic_j, audit.kinetic_j),
+            ("work", case.quality.audit.work_j, audit.work_j),
+            ("kinetic energy", case.quality.audit.kinetic_j, audit.kinetic_j),
         ];
         for (what, stored, own) in pairs {
             if !is_same(stored, own) {
@@ -279,7 +282,7 @@ impl Findings<'_> {
 
     /// The curve at the common interval is the original one, interpolated.
     fn sampled(&mut self, name: &str, case: &Case, column: fn(&Curve) -> &[f64]) {
-        let (sampled, original) = (&case.sampled, &case.original);
+        let (sampled, original) = (&case.curves.sampled, &case.curves.original);
         let values = column(sampled);
         let expected = interpolate(original.time_s(), column(original), sampled.time_s());
         let Ok(expected) = expected else {
@@ -356,24 +359,26 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     };
     for pair in cases.windows(2) {
         let (one, other) = (&pair[0], &pair[1]);
-        let is_like = one.speed == other.speed
-            && one.masses == other.masses
-            && one.parameters == other.parameters;
+        let is_like = one.conditions.speed == other.conditions.speed
+            && one.conditions.masses == other.conditions.masses
+            && one.conditions.parameters == other.conditions.parameters;
         // Equal runs of one recipe are replicates.
         if is_like && !one.is_measured_as(other) {
-            let message = format!("has the same speed as {}, but another recipe", one.name);
-            add(&pair[1].name, "equal_speeds", message);
+            let message = format!("has the same speed as {}, but another recipe", one.id.name);
+            add(&pair[1].id.name, "equal_speeds", message);
         }
     }
     if let Some(first) = cases.first() {
-        for case in cases.iter().filter(|case| case.speed.kind != first.speed.kind) {
+        for case in
+            cases.iter().filter(|case| case.conditions.speed.kind != first.conditions.speed.kind)
+        {
             let message = format!(
                 "has a {} speed, {} a {} speed: no model can be trained on both",
-                case.speed.kind.name(),
-                first.name,
-                first.speed.kind.name()
+                case.conditions.speed.kind.name(),
+                first.id.name,
+                first.conditions.speed.kind.name()
             );
-            add(&case.name, "speed_kinds", message);
+            add(&case.id.name, "speed_kinds", message);
         }
     }
     let in_list: Vec<&str> = found.listed.iter().flatten().map(String::as_str).collect();
@@ -386,7 +391,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     for name in there.iter().filter(|name| !is_listed.contains(*name)) {
         add(name, "case_list", "is not listed in the group's cases".into());
     }
-    let by_speed: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+    let by_speed: Vec<&str> = cases.iter().map(|case| case.id.name.as_str()).collect();
     if in_list.len() == by_speed.len() && in_list != by_speed {
         let message = format!(
             "the group's cases are listed as {}, by speed they are {}",
@@ -411,7 +416,7 @@ fn of_stopped_mass(
         let message = format!(
             "the group's {attribute} is not that of its cases ({why}): the next change of the group by crumple writes it anew"
         );
-        Findings { group: name, case: &first.name, list }.add(
+        Findings { group: name, case: &first.id.name, list }.add(
             "stopped_mass_differs",
             None,
             None,

@@ -233,10 +233,10 @@ impl Edit<'_> {
                 false => with_attributes(root.create_group(name)?, attributes)?,
             };
             let before: HashMap<&str, &Case> =
-                self.old.cases(name).iter().map(|case| (case.name.as_str(), case)).collect();
+                self.old.cases(name).iter().map(|case| (case.id.name.as_str(), case)).collect();
             for case in self.new.cases(name) {
                 let content = || layout::with_hashes(self.new, case);
-                let Some(before) = before.get(&*case.name) else {
+                let Some(before) = before.get(&*case.id.name) else {
                     add(&group, case, content()?, dimensions)?;
                     continue;
                 };
@@ -244,7 +244,7 @@ impl Edit<'_> {
                 if *before == case && is_in_place {
                     continue;
                 }
-                let found = group.group(&case.name)?;
+                let found = group.group(&case.id.name)?;
                 let content = content()?;
                 if !(has_same_curves(before, case) && is_in_place) {
                     replace_curves(&found, &content, dimensions)?;
@@ -262,7 +262,7 @@ fn add(
     content: Content<'_>,
     dimensions: &mut Dimensions,
 ) -> Result<(), EditError> {
-    group.create_group_with(&case.name, |group| {
+    group.create_group_with(&case.id.name, |group| {
         for (name, value) in content.attributes {
             group.set_attr(name, value);
         }
@@ -277,10 +277,10 @@ fn add(
 
 /// Whether all datasets of two cases hold the same values.
 fn has_same_curves(a: &Case, b: &Case) -> bool {
-    a.sampled == b.sampled
-        && a.original == b.original
-        && a.closing_speed_m_per_s == b.closing_speed_m_per_s
-        && a.masses == b.masses
+    a.curves.sampled == b.curves.sampled
+        && a.curves.original == b.curves.original
+        && a.curves.closing_speed_m_per_s == b.curves.closing_speed_m_per_s
+        && a.conditions.masses == b.conditions.masses
 }
 
 fn with_attributes(

@@ -30,8 +30,11 @@ pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrV
 pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
     let first = cases.first()?;
     // Looked at before anything is filtered: a group may have thousands of cases.
-    let may_tell = first.force_kind == ForceKind::Contact
-        && cases.iter().all(|c| c.masses == first.masses && c.parameters == first.parameters);
+    let may_tell = first.curves.force_kind == ForceKind::Contact
+        && cases.iter().all(|c| {
+            c.conditions.masses == first.conditions.masses
+                && c.conditions.parameters == first.conditions.parameters
+        });
     let set = may_tell.then(|| TrainingSet::new(name, cases).ok())??;
     set.stopped_mass().filter(StoppedMass::is_told)
 }

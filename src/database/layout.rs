@@ -10,7 +10,10 @@ use std::path::Path;
 use super::group::{self, CASES};
 use super::{CasePath, Database, damaged_curve};
 use crate::curve::body::body_force_n;
-use crate::curve::{Case, Curve, EnergyAudit, ForceKind, Masses, SourceFile};
+use crate::curve::{
+    Case, CaseId, Conditions, Curve, EnergyAudit, ForceKind, Masses, Provenance, Quality,
+    RecordedCurves, SourceFile,
+};
 use crate::file;
 use crate::hdf5::dimensions::{DimensionError, Dimensions, Scale};
 use crate::hdf5::{
@@ -81,10 +84,10 @@ impl<'a> Content<'a> {
     pub(crate) fn of(case: &'a Case) -> Result<Self, Error> {
         let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
         content.describe(case)?;
-        content.curve("", &case.sampled);
-        content.dataset("closing_speed_m_per_s", Cow::Borrowed(&case.closing_speed_m_per_s));
+        content.curve("", &case.curves.sampled);
+        content.dataset("closing_speed_m_per_s", Cow::Borrowed(&case.curves.closing_speed_m_per_s));
         content.dataset(BODY_FORCE, Cow::Owned(body_force_n(case)));
-        content.curve("original/", &case.original);
+        content.curve("original/", &case.curves.original);
         Ok(content)
     }
 
@@ -94,45 +97,45 @@ impl<'a> Content<'a> {
             let value = value.map_err(not_encoded);
             value.map(AttrValue::VarLenString)
         };
-        self.attr("study", text(&case.study));
-        self.attr("speed_m_per_s", AttrValue::F64(case.speed.m_per_s));
-        self.attr("speed_kind", text(case.speed.kind.name()));
-        self.attr("mass_kg", AttrValue::F64(case.masses.body_kg));
-        if let Some(other) = case.masses.other_kg {
+        self.attr("study", text(&case.id.study));
+        self.attr("speed_m_per_s", AttrValue::F64(case.conditions.speed.m_per_s));
+        self.attr("speed_kind", text(case.conditions.speed.kind.name()));
+        self.attr("mass_kg", AttrValue::F64(case.conditions.masses.body_kg));
+        if let Some(other) = case.conditions.masses.other_kg {
             self.attr("other_mass_kg", AttrValue::F64(other));
         }
-        self.attr("parameters", json(serde_json::to_string(&case.parameters))?);
-        self.attr("force_kind", text(case.force_kind.name()));
-        self.attr("contact_time_s", AttrValue::F64(case.contact_time_s));
-        if let Some(time_s) = case.solver_wall_time_s {
+        self.attr("parameters", json(serde_json::to_string(&case.conditions.parameters))?);
+        self.attr("force_kind", text(case.curves.force_kind.name()));
+        self.attr("contact_time_s", AttrValue::F64(case.curves.contact_time_s));
+        if let Some(time_s) = case.provenance.solver_wall_time_s {
             self.attr("solver_wall_time_s", AttrValue::F64(time_s));
         }
         self.attr("loading_end", AttrValue::I64(case.loading_end() as i64));
         self.attr("max_deflection_m", AttrValue::F64(case.max_deflection_m()));
         self.attr("truncated", AttrValue::U8(case.is_truncated().into()));
-        if let Some(stiffness) = case.unloading_stiffness_n_per_m {
+        if let Some(stiffness) = case.curves.unloading_stiffness_n_per_m {
             self.attr("unloading_stiffness_N_per_m", AttrValue::F64(stiffness));
         }
-        self.attr("work_J", AttrValue::F64(case.audit.work_j));
-        self.attr("kinetic_energy_J", AttrValue::F64(case.audit.kinetic_j));
-        self.attr("work_over_energy", AttrValue::F64(case.audit.ratio()));
-        self.attr("recipe", text(&case.recipe));
-        self.attr("fingerprint", text(&case.fingerprint));
-        self.attr("sources", json(serde_json::to_string(&case.sources))?);
-        self.attr("notes", json(serde_json::to_string(&case.notes))?);
-        self.attr("warnings", json(serde_json::to_string(&case.warnings))?);
+        self.attr("work_J", AttrValue::F64(case.quality.audit.work_j));
+        self.attr("kinetic_energy_J", AttrValue::F64(case.quality.audit.kinetic_j));
+        self.attr("work_over_energy", AttrValue::F64(case.quality.audit.ratio()));
+        self.attr("recipe", text(&case.provenance.recipe));
+        self.attr("fingerprint", text(&case.provenance.fingerprint));
+        self.attr("sources", json(serde_json::to_string(&case.provenance.sources))?);
+        self.attr("notes", json(serde_json::to_string(&case.quality.notes))?);
+        self.attr("warnings", json(serde_json::to_string(&case.quality.warnings))?);
         // Absent where version 2 had nothing either, so that the hash of such a case stays.
-        if let Some(built) = &case.built_utc {
+        if let Some(built) = &case.provenance.built_utc {
             self.attr("built_utc", text(built));
         }
-        if let Some(origin) = &case.origin {
+        if let Some(origin) = &case.provenance.origin {
             self.attr("origin", json(serde_json::to_string(origin))?);
         }
-        if !case.tags.is_empty() {
-            self.attr("tags", json(serde_json::to_string(&case.tags))?);
+        if !case.provenance.tags.is_empty() {
+            self.attr("tags", json(serde_json::to_string(&case.provenance.tags))?);
         }
-        if !case.user_notes.is_empty() {
-            self.attr("user_notes", json(serde_json::to_string(&case.user_notes))?);
+        if !case.provenance.user_notes.is_empty() {
+            self.attr("user_notes", json(serde_json::to_string(&case.provenance.user_notes))?);
         }
         Ok(())
     }
@@ -227,7 +230,7 @@ pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
 
 /// The value of a group's attribute `cases`.
 pub(crate) fn case_names(cases: &[Case]) -> AttrValue {
-    AttrValue::VarLenStringArray(cases.iter().map(|c| c.name.clone()).collect())
+    AttrValue::VarLenStringArray(cases.iter().map(|c| c.id.name.clone()).collect())
 }
 
 /// Attributes that the header of a dataset itself holds.
@@ -286,7 +289,7 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
         }
         for case in cases {
             let content = with_hashes(database, case)?;
-            let mut builder = group.create_group(&case.name);
+            let mut builder = group.create_group(&case.id.name);
             for (name, value) in content.attributes {
                 builder.set_attr(name, value);
             }
@@ -598,43 +601,53 @@ fn decode_case(
         Location { opened: place.opened, name: format!("{}/{ORIGINAL}", place.name) };
     let original = decode_curve(&place.check(group.group(ORIGINAL))?, &original_place)?;
     let sources: Vec<SourceFile> = attrs.json("sources")?;
-    let case = Case {
-        study: attrs.text("study")?.into(),
-        group: group_name.into(),
-        name: name.into(),
+    let id =
+        CaseId { study: attrs.text("study")?.into(), group: group_name.into(), name: name.into() };
+    let optional_number = |name: &str| {
+        if attrs.map.contains_key(name) { attrs.positive(name).map(Some) } else { Ok(None) }
+    };
+    let optional_text = |name: &str| {
+        if attrs.map.contains_key(name) {
+            attrs.text(name).map(|t| Some(t.into()))
+        } else {
+            Ok(None)
+        }
+    };
+    let conditions = Conditions {
         speed: Speed { m_per_s: attrs.positive("speed_m_per_s")?, kind },
         masses: Masses {
             body_kg: attrs.positive("mass_kg")?,
-            other_kg: match attrs.map.contains_key("other_mass_kg") {
-                true => Some(attrs.positive("other_mass_kg")?),
-                false => None,
-            },
+            other_kg: optional_number("other_mass_kg")?,
         },
         parameters: attrs.json("parameters")?,
+    };
+    let curves = RecordedCurves {
         force_kind,
         sampled,
         closing_speed_m_per_s,
         original,
         contact_time_s: attrs.number("contact_time_s")?,
-        solver_wall_time_s: attrs.optional_number("solver_wall_time_s")?,
         unloading_stiffness_n_per_m: attrs.optional_number("unloading_stiffness_N_per_m")?,
+    };
+    let quality = Quality {
         audit: EnergyAudit {
             work_j: attrs.number("work_J")?,
             kinetic_j: attrs.positive("kinetic_energy_J")?,
         },
+        notes: attrs.json("notes")?,
+        warnings: attrs.json("warnings")?,
+    };
+    let provenance = Provenance {
         recipe: attrs.text("recipe")?.into(),
         fingerprint: attrs.text("fingerprint")?.into(),
         sources,
-        notes: attrs.json("notes")?,
-        warnings: attrs.json("warnings")?,
-        built_utc: match attrs.map.contains_key("built_utc") {
-            true => Some(attrs.text("built_utc")?.into()),
-            false => None,
-        },
+        solver_wall_time_s: attrs.optional_number("solver_wall_time_s")?,
+        built_utc: optional_text("built_utc")?,
         origin: attrs.optional_json("origin")?,
         tags: attrs.optional_json("tags")?.unwrap_or_default(),
         user_notes: attrs.optional_json("user_notes")?.unwrap_or_default(),
     };
+    let case = Case { id, conditions, curves, quality, provenance };
     let hashes = attrs.json(HASHES)?;
     Ok(FoundCase { case, attributes: attrs.map, hashes })
 }
@@ -717,29 +730,26 @@ mod tests {
     fn case(name: String) -> Case {
         let curve = |d: f64| Curve::new(vec![0.0, 0.1], vec![0.0, d], vec![0.0, 1e6]).unwrap();
         Case {
-            study: "s".into(),
-            group: "g".into(),
-            name,
-            speed: Speed { m_per_s: 10.0, kind: SpeedKind::Wall },
-            masses: Masses { body_kg: 24e3, other_kg: None },
-            parameters: BTreeMap::new(),
-            force_kind: ForceKind::Contact,
-            sampled: curve(0.5),
-            closing_speed_m_per_s: vec![10.0, 0.0],
-            original: curve(0.5),
-            contact_time_s: 0.0,
-            solver_wall_time_s: None,
-            unloading_stiffness_n_per_m: None,
-            audit: EnergyAudit { work_j: 1.0, kinetic_j: 1.0 },
-            recipe: "{}".into(),
-            fingerprint: "f".into(),
-            sources: Vec::new(),
-            notes: Vec::new(),
-            warnings: Vec::new(),
-            built_utc: None,
-            origin: None,
-            tags: Vec::new(),
-            user_notes: Vec::new(),
+            id: CaseId { study: "s".into(), group: "g".into(), name },
+            conditions: Conditions {
+                speed: Speed { m_per_s: 10.0, kind: SpeedKind::Wall },
+                masses: Masses { body_kg: 24e3, other_kg: None },
+                parameters: BTreeMap::new(),
+            },
+            curves: RecordedCurves {
+                force_kind: ForceKind::Contact,
+                sampled: curve(0.5),
+                closing_speed_m_per_s: vec![10.0, 0.0],
+                original: curve(0.5),
+                contact_time_s: 0.0,
+                unloading_stiffness_n_per_m: None,
+            },
+            quality: Quality {
+                audit: EnergyAudit { work_j: 1.0, kinetic_j: 1.0 },
+                notes: Vec::new(),
+                warnings: Vec::new(),
+            },
+            provenance: Provenance { recipe: "{}".into(), ..Provenance::default() },
         }
     }
 

@@ -35,7 +35,7 @@ use std::fmt;
 use std::path::Path;
 
 use crate::curve::from_table::IMPORTED;
-use crate::curve::{Case, Origin, StoppedMass};
+use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::file::write_whole;
 
 /// The cases of one database file.
@@ -62,7 +62,7 @@ pub struct CasePath {
 impl CasePath {
     /// The names of a case.
     pub(crate) fn of(case: &Case) -> Self {
-        Self { group: case.group.clone(), name: case.name.clone() }
+        Self { group: case.id.group.clone(), name: case.id.name.clone() }
     }
 }
 
@@ -181,10 +181,10 @@ impl Database {
     /// If one of them is not there, with the names there are.
     pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, Error> {
         let cases = self.group(path, group)?;
-        cases.iter().find(|c| c.name == name).ok_or_else(|| {
+        cases.iter().find(|c| c.id.name == name).ok_or_else(|| {
             let path = path.display();
             error!(Database at "case", "{path}: group \"{group}\" has no case \"{name}\": it has")
-                .names(name, cases.iter().map(|c| c.name.as_str()))
+                .names(name, cases.iter().map(|c| c.id.name.as_str()))
         })
     }
 
@@ -205,17 +205,17 @@ impl Database {
     pub(crate) fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), Error> {
         let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
         for case in cases {
-            let there = self.groups.entry(case.group.clone()).or_default();
-            let places = places.entry(case.group.clone()).or_insert_with(|| {
-                there.iter().enumerate().map(|(k, case)| (case.name.clone(), k)).collect()
+            let there = self.groups.entry(case.id.group.clone()).or_default();
+            let places = places.entry(case.id.group.clone()).or_insert_with(|| {
+                there.iter().enumerate().map(|(k, case)| (case.id.name.clone(), k)).collect()
             });
-            let Some(&k) = places.get(&case.name) else {
-                places.insert(case.name.clone(), there.len());
+            let Some(&k) = places.get(&case.id.name) else {
+                places.insert(case.id.name.clone(), there.len());
                 there.push(case);
                 continue;
             };
-            if there[k].study != case.study {
-                let (Case { group, name, .. }, other) = (&case, &there[k].study);
+            if there[k].id.study != case.id.study {
+                let (CaseId { group, name, .. }, other) = (&case.id, &there[k].id.study);
                 return Err(error!(
                     Database,
                     "case \"{name}\" of group \"{group}\" belongs to the study \"{other}\": name this run or group differently, or remove that case (crumple db rm)"
@@ -263,7 +263,7 @@ impl Database {
         for case in &mut cases {
             if let Some(to) = moves.get(&CasePath::of(case)) {
                 remember_origin(case);
-                (case.group, case.name) = (to.group.clone(), to.name.clone());
+                (case.id.group, case.id.name) = (to.group.clone(), to.name.clone());
             }
         }
         self.insert(cases);
@@ -281,7 +281,7 @@ impl Database {
 
     fn insert(&mut self, cases: Vec<Case>) {
         for case in cases {
-            self.groups.entry(case.group.clone()).or_default().push(case);
+            self.groups.entry(case.id.group.clone()).or_default().push(case);
         }
         self.groups.values_mut().for_each(|cases| sort(cases));
     }
@@ -333,9 +333,9 @@ impl Database {
 /// Lets a case of an earlier version, which does not tell what it was built from, remember its names
 /// before it gets others: a build of its study knows it by them.
 pub(crate) fn remember_origin(case: &mut Case) {
-    if case.origin.is_none() && case.study != IMPORTED {
-        let (group, run) = (case.group.clone(), case.name.clone());
-        case.origin = Some(Origin { manifest: String::new(), group, run });
+    if case.provenance.origin.is_none() && case.id.study != IMPORTED {
+        let (group, run) = (case.id.group.clone(), case.id.name.clone());
+        case.provenance.origin = Some(Origin { manifest: String::new(), group, run });
     }
 }
 
@@ -354,7 +354,11 @@ pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
 /// Puts the cases of a group into their order: by speed, then name.
 fn sort(cases: &mut [Case]) {
     cases.sort_by(|a, b| {
-        a.speed.m_per_s.total_cmp(&b.speed.m_per_s).then_with(|| a.name.cmp(&b.name))
+        a.conditions
+            .speed
+            .m_per_s
+            .total_cmp(&b.conditions.speed.m_per_s)
+            .then_with(|| a.id.name.cmp(&b.id.name))
     });
 }
 

@@ -148,9 +148,9 @@ pub(crate) fn feature_values(
 
 /// The case's parameters, its masses among them.
 fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
-    let mut parameters = case.parameters.clone();
-    parameters.insert(MASS.into(), Parameter::Number(case.masses.body_kg));
-    if let Some(other) = case.masses.other_kg {
+    let mut parameters = case.conditions.parameters.clone();
+    parameters.insert(MASS.into(), Parameter::Number(case.conditions.masses.body_kg));
+    if let Some(other) = case.conditions.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
     parameters
@@ -159,7 +159,7 @@ fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
 /// The columns that tell the cases apart: parameters that all share are left out.
 fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
     let of: Vec<(&str, BTreeMap<String, Parameter>)> =
-        cases.iter().map(|c| (c.name.as_str(), parameters(c))).collect();
+        cases.iter().map(|c| (c.id.name.as_str(), parameters(c))).collect();
     let names: BTreeSet<&String> = of.iter().flat_map(|(_, p)| p.keys()).collect();
     let mut features = Vec::new();
     for name in names {
@@ -215,12 +215,13 @@ type Runs<'a> = (Vec<f64>, Vec<&'a Case>);
 /// within 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
 fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, Error> {
     let mut cases = cases.to_vec();
-    cases.sort_by(|a, b| a.speed.m_per_s.total_cmp(&b.speed.m_per_s));
+    cases.sort_by(|a, b| a.conditions.speed.m_per_s.total_cmp(&b.conditions.speed.m_per_s));
     let mut found: Vec<Runs<'a>> = Vec::new();
     for case in cases {
         let values = feature_values(features, &parameters(case))?;
         let is_like = |(of, runs): &&mut Runs<'a>| {
-            *of == values && is_same_speed(case.speed.m_per_s, runs[0].speed.m_per_s)
+            *of == values
+                && is_same_speed(case.conditions.speed.m_per_s, runs[0].conditions.speed.m_per_s)
         };
         match found.iter_mut().rev().find(is_like) {
             None => found.push((values, vec![case])),
@@ -232,14 +233,14 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
                 return Err(error!(
                     Dataset,
                     "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}",
-                    first = runs[0].name,
-                    second = case.name,
-                    speed = km_per_h(case.speed.m_per_s)
+                    first = runs[0].id.name,
+                    second = case.id.name,
+                    speed = km_per_h(case.conditions.speed.m_per_s)
                 ));
             }
         }
     }
-    found.iter_mut().for_each(|(_, runs)| runs.sort_by(|a, b| a.name.cmp(&b.name)));
+    found.iter_mut().for_each(|(_, runs)| runs.sort_by(|a, b| a.id.name.cmp(&b.id.name)));
     Ok(found)
 }
 
@@ -292,14 +293,14 @@ pub(crate) fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Resu
     let mut cases = cases.into_iter();
     let Some(first) = cases.next() else { return Ok(()) };
     for other in cases {
-        let what = if first.speed.kind != other.speed.kind {
+        let what = if first.conditions.speed.kind != other.conditions.speed.kind {
             "wall and closing speeds"
-        } else if first.force_kind != other.force_kind {
+        } else if first.curves.force_kind != other.curves.force_kind {
             "contact and body forces"
         } else {
             continue;
         };
-        let (first, second) = (first.name.clone(), other.name.clone());
+        let (first, second) = (first.id.name.clone(), other.id.name.clone());
         return Err(error!(
             Dataset,
             "cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group"
@@ -317,7 +318,7 @@ impl TrainingSet {
         let mut cases: Vec<&Case> = cases.into_iter().collect();
         let first = *cases.first().ok_or(error!(Dataset, "the group is empty: build it first"))?;
         of_one_kind(cases.iter().copied())?;
-        cases.sort_by(|a, b| a.name.cmp(&b.name));
+        cases.sort_by(|a, b| a.id.name.cmp(&b.id.name));
         let features = features(&cases)?;
         let mut training = replicates(&cases, &features)?
             .into_iter()
@@ -327,9 +328,9 @@ impl TrainingSet {
         training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
         Ok(Self {
             group: group.into(),
-            speed_kind: first.speed.kind,
-            force_kind: first.force_kind,
-            masses: training[0].case.masses,
+            speed_kind: first.conditions.speed.kind,
+            force_kind: first.curves.force_kind,
+            masses: training[0].case.conditions.masses,
             units: first.units().filter(|u| cases.iter().all(|c| c.units() == Some(*u))),
             features,
             cases: training,
@@ -340,7 +341,7 @@ impl TrainingSet {
     pub(crate) fn hash(&self) -> String {
         let mut hash = blake3::Hasher::new();
         for case in &self.cases {
-            hash.update(case.case.fingerprint.as_bytes());
+            hash.update(case.case.provenance.fingerprint.as_bytes());
         }
         hash.finalize().to_hex().to_string()
     }
@@ -388,32 +389,32 @@ impl TrainingCase {
             error!(
                 Dataset,
                 "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval",
-                name = runs[0].name
+                name = runs[0].id.name
             )
         };
         let case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
         let named = |source| {
-            error!(Dataset, "case \"{name}\": {source}", name = case.name).caused_by(source)
+            error!(Dataset, "case \"{name}\": {source}", name = case.id.name).caused_by(source)
         };
         let motion = body_motion(&case).ok_or_else(no_motion)?;
         Ok(Self {
-            name: case.name.clone(),
-            runs: runs.iter().map(|run| run.name.clone()).collect(),
-            speed_m_per_s: case.speed.m_per_s,
+            name: case.id.name.clone(),
+            runs: runs.iter().map(|run| run.id.name.clone()).collect(),
+            speed_m_per_s: case.conditions.speed.m_per_s,
             features,
-            effective_mass_kg: case.masses.effective_kg(),
+            effective_mass_kg: case.conditions.masses.effective_kg(),
             motion,
-            envelope: loading_branch(&case.original).map_err(named)?.envelope,
-            sampled: loading_branch(&case.sampled).map_err(named)?.envelope,
+            envelope: loading_branch(&case.curves.original).map_err(named)?.envelope,
+            sampled: loading_branch(&case.curves.sampled).map_err(named)?.envelope,
             truncated: case.is_truncated(),
-            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
+            unloading_stiffness_n_per_m: case.curves.unloading_stiffness_n_per_m,
             case: Arc::new(case),
         })
     }
 
     /// Time by the clock that the solver took for all of its runs, in s.
     pub(crate) fn solver_time_s(&self) -> Option<f64> {
-        Some(self.case.solver_wall_time_s? * self.runs.len() as f64)
+        Some(self.case.provenance.solver_wall_time_s? * self.runs.len() as f64)
     }
 
     /// What cases are ordered by.

@@ -58,37 +58,47 @@ pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Err
             format = "iso-mme"
         ));
     }
-    let sampled = &case.sampled;
+    let sampled = &case.curves.sampled;
     let channel = |code: &str, name: &str, unit, values: &[f64]| Channel {
         code: code.into(),
         name: name.into(),
         unit,
         values: values.to_vec(),
     };
-    let force = match case.force_kind {
+    let force = match case.curves.force_kind {
         ForceKind::Contact => "contact force",
         ForceKind::Body => "force of the body's motion",
     };
     let channels = [
         channel("11VEHC000000DSXP", "deflection", "m", sampled.deflection_m()),
-        channel("11VEHC000000VEXP", "closing speed", "m/s", &case.closing_speed_m_per_s),
+        channel("11VEHC000000VEXP", "closing speed", "m/s", &case.curves.closing_speed_m_per_s),
         channel("11VEHC000000FOXP", force, "N", sampled.force_n()),
     ];
-    let speed = km_per_h(case.speed.m_per_s);
-    let title = format!("{} {} {speed} ({})", case.group, case.name, case.speed.kind.name());
+    let speed = km_per_h(case.conditions.speed.m_per_s);
+    let title = format!(
+        "{} {} {speed} ({})",
+        case.id.group,
+        case.id.name,
+        case.conditions.speed.kind.name()
+    );
     let times = sampled.time_s();
-    let name: String =
-        format!("{}-{}", case.group, case.name).chars().map(super::export_curve::plain).collect();
-    let bodies = [(case.masses.body_kg, case.speed.m_per_s)];
+    let name: String = format!("{}-{}", case.id.group, case.id.name)
+        .chars()
+        .map(super::export_curve::plain)
+        .collect();
+    let bodies = [(case.conditions.masses.body_kg, case.conditions.speed.m_per_s)];
     let test = Test {
         name: &name,
         title: &title,
-        bodies: bodies.into_iter().chain(case.masses.other_kg.map(|m| (m, 0.0))).collect(),
+        bodies: bodies
+            .into_iter()
+            .chain(case.conditions.masses.other_kg.map(|m| (m, 0.0)))
+            .collect(),
         start_s: times[0],
         interval_s: interval_s(times)?,
         remarks: vec![
             "deflection and force positive in compression; time 0 is the first contact".into(),
-            format!("recipe {}", case.recipe),
+            format!("recipe {}", case.provenance.recipe),
         ],
     };
     folder(&test, &channels)

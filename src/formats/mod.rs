@@ -308,7 +308,7 @@ impl Format {
         if let [_, _, ..] = &all[..] {
             // Each test has a folder of its own.
             for (exported, case) in all.iter_mut().zip(cases) {
-                let folder: String = case.name.chars().map(export_curve::plain).collect();
+                let folder: String = case.id.name.chars().map(export_curve::plain).collect();
                 exported.files.iter_mut().for_each(|f| f.0 = format!("{folder}/{}", f.0));
             }
         }

@@ -9,7 +9,9 @@ use super::said::Said;
 use super::{Item, Settings};
 use crate::curve::from_table::{FromTable, IMPORTED, Impact, Table, from_table};
 use crate::curve::recipe::{Filter, Sampling};
-use crate::curve::{Case, ForceKind, Parameter, SourceFile};
+use crate::curve::{
+    Case, CaseId, Conditions, ForceKind, Parameter, Provenance, Quality, RecordedCurves, SourceFile,
+};
 use crate::database::names;
 use crate::formats::read::{self, ReadCurve};
 use crate::unit::{SpeedKind, UnitSystem};
@@ -73,29 +75,31 @@ fn assembled(
     });
     let notes = curve.notes.iter().cloned().chain(said.notes).chain(made.notes);
     Case {
-        study: IMPORTED.into(),
-        group: settings.group.clone(),
-        name,
-        speed: said.speed,
-        masses: said.masses,
-        parameters: settings.parameters.clone(),
-        force_kind: said.force,
-        sampled: made.sampled,
-        closing_speed_m_per_s: made.closing_speed_m_per_s,
-        original: made.original,
-        contact_time_s: made.contact_time_s,
-        solver_wall_time_s: None,
-        unloading_stiffness_n_per_m: made.unloading_stiffness_n_per_m,
-        audit: made.audit,
-        fingerprint: hash.finalize().to_hex().to_string(),
-        recipe,
-        sources: sources.collect(),
-        notes: notes.collect(),
-        warnings: said.warnings.into_iter().chain(made.warnings).collect(),
-        built_utc: None,
-        origin: None,
-        tags: Vec::new(),
-        user_notes: Vec::new(),
+        id: CaseId { study: IMPORTED.into(), group: settings.group.clone(), name },
+        conditions: Conditions {
+            speed: said.speed,
+            masses: said.masses,
+            parameters: settings.parameters.clone(),
+        },
+        curves: RecordedCurves {
+            force_kind: said.force,
+            sampled: made.sampled,
+            closing_speed_m_per_s: made.closing_speed_m_per_s,
+            original: made.original,
+            contact_time_s: made.contact_time_s,
+            unloading_stiffness_n_per_m: made.unloading_stiffness_n_per_m,
+        },
+        quality: Quality {
+            audit: made.audit,
+            notes: notes.collect(),
+            warnings: said.warnings.into_iter().chain(made.warnings).collect(),
+        },
+        provenance: Provenance {
+            fingerprint: hash.finalize().to_hex().to_string(),
+            recipe,
+            sources: sources.collect(),
+            ..Provenance::default()
+        },
     }
 }
 

@@ -67,14 +67,14 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
     let now = clock::now_utc();
     for item in items {
         let mut case = case::of(item, settings, database.cases(&settings.group).first())?;
-        case.built_utc = Some(now.clone());
-        if let Some(k) = cases.iter().position(|c| c.name == case.name) {
+        case.provenance.built_utc = Some(now.clone());
+        if let Some(k) = cases.iter().position(|c| c.id.name == case.id.name) {
             let (first, second) = (items[k].path.clone(), item.path.clone());
             return Err(error!(
                 Import,
                 "{first} and {second} would both be case \"{name}\": name them with --case",
                 first = first.display(),
-                name = case.name,
+                name = case.id.name,
                 second = second.display()
             ));
         }
@@ -84,7 +84,8 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
         }
         if let Some(before) = there(&database, &case) {
             // What users said of it is of the one that takes its place, too.
-            (case.tags, case.user_notes) = (before.tags.clone(), before.user_notes.clone());
+            (case.provenance.tags, case.provenance.user_notes) =
+                (before.provenance.tags.clone(), before.provenance.user_notes.clone());
         }
         cases.push(case);
     }
@@ -103,19 +104,19 @@ pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Err
 
 /// The case of the same names that the database has.
 fn there<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
-    database.cases(&case.group).iter().find(|c| c.name == case.name)
+    database.cases(&case.id.group).iter().find(|c| c.id.name == case.id.name)
 }
 
 /// Whether the case may take its place in the database.
 fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> Result<(), Error> {
-    let (path, group, name) = (item.path.clone(), case.group.clone(), case.name.clone());
+    let (path, group, name) = (item.path.clone(), case.id.group.clone(), case.id.name.clone());
     match there(database, case) {
-        Some(other) if other.study != IMPORTED => {
+        Some(other) if other.id.study != IMPORTED => {
             return Err(error!(
                 Import,
                 "{path}: case \"{name}\" of group \"{group}\" is of the study \"{study}\", which builds it: give another name with --case",
                 path = path.display(),
-                study = other.study
+                study = other.id.study
             ));
         }
         Some(_) if !replace => {
@@ -128,7 +129,7 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
         _ => {}
     }
     // A case that is replaced binds nobody.
-    match database.cases(&case.group).iter().find(|c| c.name != case.name) {
+    match database.cases(&case.id.group).iter().find(|c| c.id.name != case.id.name) {
         Some(other) => check_kinds(item, case, other),
         None => Ok(()),
     }
@@ -137,15 +138,15 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
 /// Whether two cases of a group are of one kind.
 fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), Error> {
     let kinds = [
-        ("speed", case.speed.kind.name(), other.speed.kind.name()),
-        ("force", case.force_kind.name(), other.force_kind.name()),
+        ("speed", case.conditions.speed.kind.name(), other.conditions.speed.kind.name()),
+        ("force", case.curves.force_kind.name(), other.curves.force_kind.name()),
     ];
     match kinds.into_iter().find(|(_, found, there)| found != there) {
         None => Ok(()),
         Some((what, found, there)) => Err(error!(
             Import,
             "{path}: this curve has a {found} {what}, the cases of group \"{group}\" have a {there} one: no model can be trained on both; give another --group",
-            group = case.group,
+            group = case.id.group,
             path = item.path.display()
         )),
     }

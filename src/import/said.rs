@@ -91,8 +91,9 @@ impl Both<'_> {
         match (self.settings.kind, self.facts.speed_kind, group) {
             (Some(kind), ..) | (None, Some(kind), _) => Ok(kind),
             (None, None, Some(case)) => {
-                self.notes.push(format!("speed: {} as in the group", case.speed.kind.name()));
-                Ok(case.speed.kind)
+                self.notes
+                    .push(format!("speed: {} as in the group", case.conditions.speed.kind.name()));
+                Ok(case.conditions.speed.kind)
             }
             (None, None, None) => Err(self.missing(
                 "what its speed is measured against",

@@ -36,8 +36,8 @@ pub(super) fn add(
         Part::Table(runs(group, cases)),
     ];
     for case in cases {
-        for warning in &case.warnings {
-            content.warn(format!("{group}, {}: {warning}", case.name));
+        for warning in &case.quality.warnings {
+            content.warn(format!("{group}, {}: {warning}", case.id.name));
         }
     }
     match known_or_new(group, cases, models, settings) {
@@ -75,12 +75,12 @@ fn known_or_new(
 }
 
 fn own_force(cases: &[Case]) -> ForceKind {
-    cases.first().map_or(ForceKind::Contact, |case| case.force_kind)
+    cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind)
 }
 
 /// Speed, mass, peak, crush and audit of every run.
 fn runs(group: &str, cases: &[Case]) -> Table {
-    let kind = cases.first().map_or("impact", |case| case.speed.kind.name());
+    let kind = cases.first().map_or("impact", |case| case.conditions.speed.kind.name());
     let heading = [
         "run",
         &format!("{kind} speed"),
@@ -92,18 +92,18 @@ fn runs(group: &str, cases: &[Case]) -> Table {
         "warnings",
     ];
     let rows = cases.iter().map(|case| {
-        let warnings = case.warnings.len();
+        let warnings = case.quality.warnings.len();
         vec![
-            case.name.as_str().into(),
-            km_per_h(case.speed.m_per_s).into(),
+            case.id.name.as_str().into(),
+            km_per_h(case.conditions.speed.m_per_s).into(),
             masses(case).into(),
             mega_newton(case.peak_force_n()).into(),
             metres(case.max_deflection_m()).into(),
-            energy(case.audit.work_j).into(),
-            format!("{:.3}", case.audit.ratio()).into(),
+            energy(case.quality.audit.work_j).into(),
+            format!("{:.3}", case.quality.audit.ratio()).into(),
             Cell {
                 text: if warnings == 0 { "none".into() } else { warnings.to_string() },
-                title: case.warnings.join("; "),
+                title: case.quality.warnings.join("; "),
                 is_chosen: false,
             },
         ]
@@ -116,8 +116,8 @@ fn runs(group: &str, cases: &[Case]) -> Table {
 }
 
 fn masses(case: &Case) -> String {
-    let body = tonnes(case.masses.body_kg);
-    match case.masses.other_kg {
+    let body = tonnes(case.conditions.masses.body_kg);
+    match case.conditions.masses.other_kg {
         Some(other) => format!("{body} on {}", tonnes(other)),
         None => body,
     }
@@ -360,7 +360,7 @@ fn methods_explained(nsdm_seeds: u64) -> String {
 
 /// The middle between the two neighbouring speeds that lie farthest apart.
 fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
-    let mut speeds: Vec<f64> = cases.iter().map(|case| case.speed.m_per_s).collect();
+    let mut speeds: Vec<f64> = cases.iter().map(|case| case.conditions.speed.m_per_s).collect();
     speeds.sort_by(f64::total_cmp);
     let gaps = speeds.windows(2).map(|pair| (pair[1] - pair[0], 0.5 * (pair[0] + pair[1])));
     gaps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|gap| gap.0 > 0.0).map(|gap| gap.1)
@@ -373,11 +373,11 @@ const HASH: usize = 12;
 pub(super) fn add_sources<'a>(content: &mut Content, cases: impl Iterator<Item = &'a Case>) {
     let mut rows = Vec::new();
     for case in cases {
-        for source in &case.sources {
+        for source in &case.provenance.sources {
             let solver = [&source.solver, &source.version].into_iter().flatten();
             let solver: Vec<&str> = solver.map(String::as_str).collect();
             rows.push(vec![
-                format!("{}, {}", case.group, case.name).into(),
+                format!("{}, {}", case.id.group, case.id.name).into(),
                 source.path.as_str().into(),
                 source.format.as_str().into(),
                 solver.join(" ").into(),

@@ -43,7 +43,9 @@ pub(super) fn spring(
         CurveSource::Predicted(curve) => {
             (Some(curve.provenance.force_kind), curve.body_force_n.is_some())
         }
-        CurveSource::Case(case) => (Some(case.force_kind), case.force_kind == ForceKind::Contact),
+        CurveSource::Case(case) => {
+            (Some(case.curves.force_kind), case.curves.force_kind == ForceKind::Contact)
+        }
         CurveSource::Curve(curve) => (curve.force, curve.force == Some(ForceKind::Body)),
         CurveSource::Stages(_) => (None, false),
     };
@@ -68,7 +70,7 @@ pub(super) fn spring(
         }
         CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
-            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.force_kind));
+            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
             let curve = curve.map_err(|error| match error {
                 NoDrivingCurve::Envelope(error) => envelope_error(error),
                 NoDrivingCurve::NoMotion => {

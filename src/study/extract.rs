@@ -7,7 +7,9 @@ use super::twin::compare_twin;
 use super::{RunError, absolute};
 use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
 use crate::curve::recipe::ForceSource;
-use crate::curve::{Case, Origin, SourceFile};
+use crate::curve::{
+    Case, CaseId, Conditions, Origin, Provenance, Quality, RecordedCurves, SourceFile,
+};
 use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
@@ -127,33 +129,41 @@ impl LocatedRun<'_> {
         let head = &self.study.manifest.study;
         let read = files.each().into_iter().map(|read| self.source(read));
         Case {
-            study: head.name.clone(),
-            group: head.group.clone(),
-            name: self.entry.case_name(),
-            speed: extracted.speed,
-            masses: self.study.masses(self.entry),
-            parameters: self.entry.parameters.clone(),
-            force_kind: files.force_kind(),
-            sampled: extracted.sampled,
-            closing_speed_m_per_s: extracted.closing_speed_m_per_s,
-            original: extracted.original,
-            contact_time_s: extracted.contact_time_s,
-            solver_wall_time_s: self.solver_wall_time_s(),
-            unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
-            audit: extracted.audit,
-            recipe: self.recipe_in(units),
-            fingerprint: self.fingerprint.clone(),
-            sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
-            notes: remarks.notes,
-            warnings: remarks.warnings,
-            built_utc: None,
-            origin: Some(Origin {
-                manifest: self.study.path(),
+            id: CaseId {
+                study: head.name.clone(),
                 group: head.group.clone(),
-                run: self.entry.case_name(),
-            }),
-            tags: Vec::new(),
-            user_notes: Vec::new(),
+                name: self.entry.case_name(),
+            },
+            conditions: Conditions {
+                speed: extracted.speed,
+                masses: self.study.masses(self.entry),
+                parameters: self.entry.parameters.clone(),
+            },
+            curves: RecordedCurves {
+                force_kind: files.force_kind(),
+                sampled: extracted.sampled,
+                closing_speed_m_per_s: extracted.closing_speed_m_per_s,
+                original: extracted.original,
+                contact_time_s: extracted.contact_time_s,
+                unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
+            },
+            quality: Quality {
+                audit: extracted.audit,
+                notes: remarks.notes,
+                warnings: remarks.warnings,
+            },
+            provenance: Provenance {
+                recipe: self.recipe_in(units),
+                fingerprint: self.fingerprint.clone(),
+                sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
+                solver_wall_time_s: self.solver_wall_time_s(),
+                origin: Some(Origin {
+                    manifest: self.study.path(),
+                    group: head.group.clone(),
+                    run: self.entry.case_name(),
+                }),
+                ..Provenance::default()
+            },
         }
     }
 

@@ -47,7 +47,7 @@ struct OfCrushLaw {
 
 fn interval_s(set: &TrainingSet) -> f64 {
     let of = |case: &TrainingCase| {
-        let time_s = case.case.sampled.time_s();
+        let time_s = case.case.curves.sampled.time_s();
         (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64
     };
     set.cases.iter().map(of).sum::<f64>() / set.cases.len() as f64

@@ -22,7 +22,8 @@ impl PredictedCurve {
     /// # Errors
     /// If the case's states make no loading branch.
     pub fn of_case(case: &Case) -> Result<Self, Error> {
-        let no_curve = |e: NoDrivingCurve| error!(Prediction, "{}", format!("{}: {e}", case.name));
+        let no_curve =
+            |e: NoDrivingCurve| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
         let of_case = |force: ForceKind| {
             let mut curve = DrivingCurve::of_case(case, force)?;
             if case.moves_by_its_force() {
@@ -30,8 +31,8 @@ impl PredictedCurve {
             }
             Ok(curve)
         };
-        let declared = of_case(case.force_kind).map_err(no_curve)?;
-        let body = match case.force_kind {
+        let declared = of_case(case.curves.force_kind).map_err(no_curve)?;
+        let body = match case.curves.force_kind {
             ForceKind::Contact => of_case(ForceKind::Body).ok(),
             ForceKind::Body => None,
         };
@@ -46,30 +47,34 @@ impl PredictedCurve {
         let driving = body.as_ref().unwrap_or(&declared);
         let top_n = driving.loading.force_at(driving.loading.end_m());
         let rebound = driving.unloading.stiffness_n_per_m().map(|stiffness_n_per_m| Rebound {
-            speed_m_per_s: top_n / (stiffness_n_per_m * case.masses.effective_kg()).sqrt(),
+            speed_m_per_s: top_n
+                / (stiffness_n_per_m * case.conditions.masses.effective_kg()).sqrt(),
             stiffness_n_per_m,
         });
         let mut curve = Self {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
             body_unloading_stiffness_n_per_m: None,
-            unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m.unwrap_or(steepest),
+            unloading_stiffness_n_per_m: case
+                .curves
+                .unloading_stiffness_n_per_m
+                .unwrap_or(steepest),
             force_low_n: None,
             force_high_n: None,
             body_force_low_n: None,
             body_force_high_n: None,
             forest_quantiles: None,
-            drives: case.force_kind.drives().into(),
+            drives: case.curves.force_kind.drives().into(),
             rebound,
             max_deflection_m: loading.end_m(),
-            speed_m_per_s: case.speed.m_per_s,
-            speed_kind: case.speed.kind,
-            mass_kg: case.masses.body_kg,
+            speed_m_per_s: case.conditions.speed.m_per_s,
+            speed_kind: case.conditions.speed.kind,
+            mass_kg: case.conditions.masses.body_kg,
             energy_j: loading.work(),
             model: RECORDED.into(),
             warnings: case
                 .is_truncated()
-                .then(|| Warning::truncated_training_run(&case.name))
+                .then(|| Warning::truncated_training_run(&case.id.name))
                 .into_iter()
                 .collect(),
             provenance: provenance(case, loading.work(), body.as_ref().map(|b| b.loading.work())),
@@ -113,17 +118,17 @@ fn corners(curve: Envelope) -> Result<Envelope, Error> {
 
 /// Where a case comes from; the works are those of its declared force and of the body's, in J.
 fn provenance(case: &Case, work_j: f64, body_work_j: Option<f64>) -> Provenance {
-    let kinetic_energy_j = case.masses.kinetic_energy_j(case.speed);
-    let speed = case.speed.m_per_s;
-    let mut parameters: BTreeMap<String, Parameter> = case.parameters.clone();
-    if let Some(other) = case.masses.other_kg {
+    let kinetic_energy_j = case.conditions.masses.kinetic_energy_j(case.conditions.speed);
+    let speed = case.conditions.speed.m_per_s;
+    let mut parameters: BTreeMap<String, Parameter> = case.conditions.parameters.clone();
+    if let Some(other) = case.conditions.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
     }
     Provenance {
         written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
-        group: case.group.clone(),
-        force_kind: case.force_kind,
-        training_hash: case.fingerprint.clone(),
+        group: case.id.group.clone(),
+        force_kind: case.curves.force_kind,
+        training_hash: case.provenance.fingerprint.clone(),
         study_units: case.units(),
         training_speeds_m_per_s: vec![speed],
         in_range: true,

@@ -66,7 +66,7 @@ pub(super) fn methods(
     let with_declared = || {
         let mut scenario = scenario.clone();
         for (name, table) in &mut scenario.curves {
-            table.force = groups.get(name).map(|(case, _)| case.force_kind);
+            table.force = groups.get(name).map(|(case, _)| case.curves.force_kind);
         }
         scenario
     };
@@ -194,7 +194,7 @@ fn with_models(
 ) -> Result<Sources, Error> {
     let mut models = sources.clone();
     for (name, (case, cases)) in groups {
-        models.replace(name, CurveSource::Model(Box::new(fit(&case.group, cases)?)));
+        models.replace(name, CurveSource::Model(Box::new(fit(&case.id.group, cases)?)));
     }
     Ok(models)
 }

@@ -108,7 +108,7 @@ fn report(cases: &[Case], database: &str, group: &str, options: GlobalOptions) -
     let mut outcome = Outcome::Clean;
     for (case, row) in cases.iter().zip(&rows) {
         for warning in &row.warnings {
-            options.warn(&format!("{}: {warning}", case.name));
+            options.warn(&format!("{}: {warning}", case.id.name));
             outcome = Outcome::Warned;
         }
     }
@@ -121,7 +121,7 @@ fn report(cases: &[Case], database: &str, group: &str, options: GlobalOptions) -
         print_group(out, "case", &rows)?;
         for (case, row) in cases.iter().zip(&rows) {
             for note in &row.notes {
-                writeln!(out, "note: {}: {note}", case.name)?;
+                writeln!(out, "note: {}: {note}", case.id.name)?;
             }
         }
         writeln!(out, "wrote {database} (group {group})")

@@ -93,19 +93,23 @@ fn run(
     let database = database.display().to_string();
     if options.json {
         let labelled = cases.into_iter().map(|case| Labelled {
-            group: case.group,
-            case: case.name,
-            tags: case.tags,
-            user_notes: case.user_notes,
+            group: case.id.group,
+            case: case.id.name,
+            tags: case.provenance.tags,
+            user_notes: case.provenance.user_notes,
         });
         output::print_json(&Document { database, cases: labelled.collect() })?;
         return Ok(Outcome::Clean);
     }
     output::print(|out| {
         for case in &cases {
-            let tags = if case.tags.is_empty() { "no tags".into() } else { case.tags.join(", ") };
+            let tags = if case.provenance.tags.is_empty() {
+                "no tags".into()
+            } else {
+                case.provenance.tags.join(", ")
+            };
             writeln!(out, "{}: {tags}", CasePath::of(case))?;
-            for note in &case.user_notes {
+            for note in &case.provenance.user_notes {
                 writeln!(out, "  note: {note}")?;
             }
         }

@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let mut groups: BTreeMap<String, Vec<CaseRow>> = BTreeMap::new();
     for case in cases {
-        groups.entry(case.group.clone()).or_default().push(CaseRow::of(case));
+        groups.entry(case.id.group.clone()).or_default().push(CaseRow::of(case));
     }
     let mixed =
         |g: &String| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             groups.iter().try_for_each(|(group, rows)| {
                 print_group(out, group, rows)?;
                 if let Some(stopped) = stopped_mass.get(group) {
-                    let kind = database.cases(group)[0].speed.kind;
+                    let kind = database.cases(group)[0].conditions.speed.kind;
                     writeln!(out, "{}", said(stopped, kind))?;
                 }
                 writeln!(out)

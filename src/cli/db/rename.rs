@@ -42,15 +42,16 @@ pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult
     let cases = curate::remove(&args.database, &selection, effect)?;
     let database = args.database.display().to_string();
     if options.json {
-        let removed = cases.iter().map(|c| Named { group: c.group.clone(), row: CaseRow::of(c) });
+        let removed =
+            cases.iter().map(|c| Named { group: c.id.group.clone(), row: CaseRow::of(c) });
         let (removed, dry_run) = (removed.collect(), args.dry_run);
         output::print_json(&Removed { database, removed, dry_run })?;
         return Ok(Outcome::Clean);
     }
     output::print(|out| {
-        for cases in cases.chunk_by(|a, b| a.group == b.group) {
+        for cases in cases.chunk_by(|a, b| a.id.group == b.id.group) {
             let rows: Vec<CaseRow> = cases.iter().map(CaseRow::of).collect();
-            print_group(out, &cases[0].group, &rows)?;
+            print_group(out, &cases[0].id.group, &rows)?;
         }
         let did = if args.dry_run { "would remove" } else { "removed" };
         writeln!(out, "{did} {} from {database}", output::counted(cases.len(), "case"))

@@ -77,7 +77,7 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
     if options.json {
         let mut groups: BTreeMap<String, Vec<FullCase<'_>>> = BTreeMap::new();
         for case in cases {
-            groups.entry(case.group.clone()).or_default().push(FullCase::of(case)?);
+            groups.entry(case.id.group.clone()).or_default().push(FullCase::of(case)?);
         }
         output::print_json(&Groups {
             groups,
@@ -91,12 +91,12 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
 }
 
 fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
-    print_group(out, &case.group, &[CaseRow::of(case)])?;
+    print_group(out, &case.id.group, &[CaseRow::of(case)])?;
     writeln!(out)?;
-    if let Some(built) = &case.built_utc {
+    if let Some(built) = &case.provenance.built_utc {
         writeln!(out, "built {built}")?;
     }
-    for source in &case.sources {
+    for source in &case.provenance.sources {
         writeln!(
             out,
             "from {} ({} bytes, blake3 {}…, {} {})",
@@ -107,23 +107,23 @@ fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
             source.version.as_deref().unwrap_or("")
         )?;
     }
-    for (name, value) in &case.parameters {
+    for (name, value) in &case.conditions.parameters {
         match value {
             Parameter::Number(value) => writeln!(out, "parameter: {name} = {value}")?,
             Parameter::Category(value) => writeln!(out, "parameter: {name} = {value}")?,
         }
     }
-    for note in &case.notes {
+    for note in &case.quality.notes {
         writeln!(out, "note: {note}")?;
     }
-    for warning in &case.warnings {
+    for warning in &case.quality.warnings {
         writeln!(out, "warning: {warning}")?;
     }
-    for note in &case.user_notes {
+    for note in &case.provenance.user_notes {
         writeln!(out, "user's note: {note}")?;
     }
     writeln!(out, "\nforce [MN] over deflection [m]")?;
-    let (d, f) = (case.original.deflection_m(), case.original.force_n());
+    let (d, f) = (case.curves.original.deflection_m(), case.curves.original.force_n());
     braille::curve(out, d, f)?;
     writeln!(out)
 }
@@ -139,13 +139,13 @@ fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
         output::print_json(&comparison)?;
         return Ok(Outcome::Clean);
     }
-    let is_one_group = cases.iter().all(|case| case.group == cases[0].group);
+    let is_one_group = cases.iter().all(|case| case.id.group == cases[0].id.group);
     let name = |case: &Difference| match is_one_group {
         true => case.case.clone(),
         false => format!("{}/{}", case.group, case.case),
     };
     let names: Vec<String> = comparison.cases.iter().map(name).collect();
-    let heading: Vec<&str> = [if is_one_group { cases[0].group.as_str() } else { "" }]
+    let heading: Vec<&str> = [if is_one_group { cases[0].id.group.as_str() } else { "" }]
         .into_iter()
         .chain(names.iter().map(String::as_str))
         .collect();
