@@ -131,7 +131,7 @@ const CONTACT_RECIPE: &str = r#"
 "#;
 
 fn crush(extracted: &Extracted) -> f64 {
-    extracted.original.deflection_m().iter().copied().fold(0.0, f64::max)
+    extracted.curves.original.deflection_m().iter().copied().fold(0.0, f64::max)
 }
 
 #[test]
@@ -147,10 +147,14 @@ fn a_noisy_state_before_the_impact_does_not_move_the_contact() {
                 // Too near to be told from a bouncing nose plate: taken, or said.
                 continue;
             }
-            assert_eq!(found.contact_time_s, expected.contact_time_s, "{speed}, {early} early");
+            assert_eq!(
+                found.curves.contact_time_s, expected.curves.contact_time_s,
+                "{speed}, {early} early"
+            );
             assert_eq!(crush(&found), crush(&expected));
-            let said = found.warnings.iter().any(|w| w.starts_with("contact: not the force of"));
-            assert!(said, "{:?}", found.warnings);
+            let said =
+                found.quality.warnings.iter().any(|w| w.starts_with("contact: not the force of"));
+            assert!(said, "{:?}", found.quality.warnings);
         }
     }
 }
@@ -175,9 +179,13 @@ fn the_crush_counts_from_the_crossing_and_not_from_the_next_state() {
                 error.abs() < most.unwrap().1,
                 "{speed} km/h, each {every}: crush is {error:+.4} off"
             );
-            let said = found.warnings.iter().any(|w| w.contains("the crush is uncertain by up to"));
+            let said = found
+                .quality
+                .warnings
+                .iter()
+                .any(|w| w.contains("the crush is uncertain by up to"));
             let step = f64::from(every as u32) * INTERVAL_S * f64::from(speed) / 3.6;
-            assert_eq!(said, step > 0.01 * crush(&found), "{:?}", found.warnings);
+            assert_eq!(said, step > 0.01 * crush(&found), "{:?}", found.quality.warnings);
         }
     }
 }
@@ -195,10 +203,10 @@ fn body_forces_find_the_contact_by_the_contact_force_or_say_that_they_cannot() {
         let run = Run::read(speed).after_flight(40);
         let contact = run.extract();
         let told = run.extract_with(&with_contact, Stated::default()).unwrap();
-        assert_eq!(told.contact_time_s, contact.contact_time_s);
+        assert_eq!(told.curves.contact_time_s, contact.curves.contact_time_s);
         let alone = run.extract_with(body, Stated::default()).unwrap();
-        let said = alone.warnings.iter().any(|w| w.contains("where the body slows down"));
-        assert!(said, "{:?}", alone.warnings);
+        let said = alone.quality.warnings.iter().any(|w| w.contains("where the body slows down"));
+        assert!(said, "{:?}", alone.quality.warnings);
     }
 }
 
@@ -208,12 +216,15 @@ fn a_long_weak_beginning_is_said() {
         let mut run = Run::read(48).after_flight(80);
         run.force.values[80 - states..80].fill(force_n);
         let found = run.extract();
-        let said =
-            found.warnings.iter().any(|w| w.contains("bring less than 0.3 % of the impulse"));
-        assert!(said, "{force_n} N over {states} states: {:?}", found.warnings);
+        let said = found
+            .quality
+            .warnings
+            .iter()
+            .any(|w| w.contains("bring less than 0.3 % of the impulse"));
+        assert!(said, "{force_n} N over {states} states: {:?}", found.quality.warnings);
     }
     for speed in [12, 18, 25, 36, 48, 60, 72] {
-        assert_eq!(Run::read(speed).extract().warnings, [""; 0], "{speed} km/h");
+        assert_eq!(Run::read(speed).extract().quality.warnings, [""; 0], "{speed} km/h");
     }
 }
 

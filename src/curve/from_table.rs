@@ -20,7 +20,7 @@ use super::recipe::{
     DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
 };
 use super::retrace::retrace;
-use super::{Curve, EnergyAudit, Masses, energy, loading};
+use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
 use crate::history::{EntityId, History};
 use crate::signal::resample::interpolate;
 use crate::unit::{Speed, UnitSystem};
@@ -44,6 +44,8 @@ pub struct Table<'a> {
 /// The impact that a table belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
+    /// Which force the table holds.
+    pub force_kind: ForceKind,
     /// Speed at contact.
     pub speed: Speed,
     /// Of the body, or of both bodies.
@@ -56,27 +58,6 @@ pub struct Impact {
     pub units: UnitSystem,
     /// Take the table whatever its energy says.
     pub accept_energy: bool,
-}
-
-/// What a case needs of a table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FromTable {
-    /// At the common interval, from contact on.
-    pub sampled: Curve,
-    /// Rate of the deflection at the sampled times, in m/s.
-    pub closing_speed_m_per_s: Vec<f64>,
-    /// With every point of the table.
-    pub original: Curve,
-    /// Time of the table at which the curve begins, in s.
-    pub contact_time_s: f64,
-    /// In N/m; `None` if the record ends before the force has fallen.
-    pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Work of the loading branch against the kinetic energy.
-    pub audit: EnergyAudit,
-    /// What was done.
-    pub notes: Vec<String>,
-    /// What the user should look at.
-    pub warnings: Vec<String>,
 }
 
 fn impossible_table(impossible: energy::Impossible) -> Error {
@@ -108,7 +89,7 @@ fn of_table(error: ExtractError) -> Error {
 ///
 /// # Errors
 /// It says what cannot be, and what to change.
-pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error> {
+pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     // As many of everything as there are deflections, so that no index is out of bounds.
     let deflection = table.deflection_m.len();
     let (force, time) = (table.force_n.len(), table.time_s.map_or(deflection, <[f64]>::len));
@@ -137,7 +118,7 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error
 const MOST_STATES: usize = 20_000;
 
 /// The motion that the table asks for.
-fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error> {
+fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     let interval_s = Sampling::default().interval_s;
     let motion = retrace(table, impact, interval_s)?;
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
@@ -187,20 +168,23 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<FromTable, Error> {
             counted(branch.dropped, "state")
         ));
     }
-    Ok(FromTable {
+    let curves = RecordedCurves {
+        force_kind: impact.force_kind,
         sampled: Curve::new(times, sampled.0, sampled.1)?,
         closing_speed_m_per_s,
         contact_time_s: 0.0,
         unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
-        audit,
         original,
-        notes,
-        warnings,
-    })
+    };
+    Ok((curves, Quality { audit, notes, warnings }))
 }
 
 /// A record over time is extracted as that of an FE run, without a filter.
-fn recorded(table: &Table<'_>, time_s: &[f64], impact: &Impact) -> Result<FromTable, Error> {
+fn recorded(
+    table: &Table<'_>,
+    time_s: &[f64],
+    impact: &Impact,
+) -> Result<(RecordedCurves, Quality), Error> {
     let recipe = recipe();
     let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
     // In the units that were given, so that a mistaken unit is found as in a build.
@@ -236,26 +220,20 @@ fn recorded(table: &Table<'_>, time_s: &[f64], impact: &Impact) -> Result<FromTa
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
         others: &[],
     };
-    let extracted = extract::extract(&measured, &setup).map_err(of_table)?;
-    let (of_unloading, warnings) = remarks(&extracted, impact)?;
+    let Extracted { curves, quality, .. } =
+        extract::extract(&measured, &setup).map_err(of_table)?;
+    let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
+    let (of_unloading, mut warnings) = remarks(&curves, impact)?;
+    warnings.splice(0..0, quality.warnings);
     notes.extend(of_unloading);
-    notes.extend(extracted.notes);
-    Ok(FromTable {
-        sampled: extracted.sampled,
-        closing_speed_m_per_s: extracted.closing_speed_m_per_s,
-        original: extracted.original,
-        contact_time_s: extracted.contact_time_s,
-        unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
-        audit: extracted.audit,
-        notes,
-        warnings,
-    })
+    notes.extend(quality.notes);
+    Ok((curves, Quality { audit: quality.audit, notes, warnings }))
 }
 
 /// What is said of a record under an impact: notes and warnings.
-fn remarks(extracted: &Extracted, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
-    let (mut notes, mut warnings) = (Vec::new(), extracted.warnings.clone());
-    if let Some(found) = other_speed(&extracted.closing_speed_m_per_s, impact.speed.m_per_s) {
+fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
+    let (mut notes, mut warnings) = (Vec::new(), Vec::new());
+    if let Some(found) = other_speed(&curves.closing_speed_m_per_s, impact.speed.m_per_s) {
         if !impact.accept_energy {
             let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
             return Err(error!(
@@ -266,7 +244,7 @@ fn remarks(extracted: &Extracted, impact: &Impact) -> Result<(Vec<String>, Vec<S
         warnings.push(format!("accept_energy: {found}"));
     }
     if let Some(stated) = impact.unloading_stiffness_n_per_m {
-        match unloading_of_record(extracted.unloading_stiffness_n_per_m, stated) {
+        match unloading_of_record(curves.unloading_stiffness_n_per_m, stated) {
             Ok(note) => notes.push(note),
             Err(warning) => warnings.push(warning),
         }
@@ -338,6 +316,7 @@ mod tests {
 
     fn impact(v: f64, m: f64) -> Impact {
         Impact {
+            force_kind: ForceKind::Contact,
             speed: Speed { m_per_s: v, kind: SpeedKind::Wall },
             masses: Masses { body_kg: m, other_kg: None },
             unloading_stiffness_n_per_m: None,
@@ -357,28 +336,28 @@ mod tests {
         let d: Vec<f64> = (0..=4).map(|i| end * f64::from(i) / 4.0).collect();
         let f: Vec<f64> = d.iter().map(|d| k * d).collect();
         let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
-        let case = from_table(&table, &impact(v, m)).unwrap();
-        assert!((case.audit.ratio() - 1.0).abs() < 1e-12);
-        let stiffness = case.unloading_stiffness_n_per_m.unwrap();
+        let (curves, quality) = from_table(&table, &impact(v, m)).unwrap();
+        assert!((quality.audit.ratio() - 1.0).abs() < 1e-12);
+        let stiffness = curves.unloading_stiffness_n_per_m.unwrap();
         assert!((stiffness / k - 1.0).abs() < 1e-9, "{stiffness}");
-        assert_eq!(case.warnings.len(), 1, "the steepest rise stands for the unloading");
+        assert_eq!(quality.warnings.len(), 1, "the steepest rise stands for the unloading");
         let half = std::f64::consts::PI / omega;
-        for ((t, d), v_is) in case
+        for ((t, d), v_is) in curves
             .sampled
             .time_s()
             .iter()
-            .zip(case.sampled.deflection_m())
-            .zip(&case.closing_speed_m_per_s)
+            .zip(curves.sampled.deflection_m())
+            .zip(&curves.closing_speed_m_per_s)
             .filter(|((t, _), _)| **t < half)
         {
             assert!((d - end * (omega * t).sin()).abs() < 2e-5 * end, "{d} at {t}");
             assert!((v_is - v * (omega * t).cos()).abs() < 2e-4 * v, "{v_is} at {t}");
         }
-        let last = case.closing_speed_m_per_s.last().unwrap();
+        let last = curves.closing_speed_m_per_s.last().unwrap();
         assert!((last + v).abs() < 1e-9 * v, "thrown back at {last}");
         // Every point of the table is a state.
         for point in &d {
-            assert!(case.original.deflection_m().contains(point), "{point}");
+            assert!(curves.original.deflection_m().contains(point), "{point}");
         }
     }
 
@@ -391,11 +370,11 @@ mod tests {
         let error = from_table(&table, &impact).unwrap_err().to_string();
         assert!(error.contains("never rises, so its unloading stiffness must be given"), "{error}");
         impact.unloading_stiffness_n_per_m = Some(1e8);
-        let case = from_table(&table, &impact).unwrap();
-        let end = loading::loading_end(&case.original);
-        assert!((case.original.time_s()[end] - 0.1).abs() < 1e-12);
-        assert!((case.unloading_stiffness_n_per_m.unwrap() - 1e8).abs() < 1.0);
-        assert_eq!(case.warnings, [""; 0]);
+        let (curves, quality) = from_table(&table, &impact).unwrap();
+        let end = loading::loading_end(&curves.original);
+        assert!((curves.original.time_s()[end] - 0.1).abs() < 1e-12);
+        assert!((curves.unloading_stiffness_n_per_m.unwrap() - 1e8).abs() < 1.0);
+        assert_eq!(quality.warnings, [""; 0]);
     }
 
     /// An unloading branch of the table is followed; its area is what comes back.
@@ -404,10 +383,10 @@ mod tests {
         let (d, f) = ([0.0, 0.5, 1.0, 0.99, 0.98], [2.4e6, 2.4e6, 2.4e6, 1.2e6, 0.0]);
         let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
         let v = (2.0 * 2.4e6 / 24e3_f64).sqrt();
-        let case = from_table(&table, &impact(v, 24e3)).unwrap();
-        let back = case.closing_speed_m_per_s.last().unwrap();
+        let (curves, _) = from_table(&table, &impact(v, 24e3)).unwrap();
+        let back = curves.closing_speed_m_per_s.last().unwrap();
         assert!((back + (2.0 * 2.4e4 / 24e3_f64).sqrt()).abs() < 1e-9, "{back}");
-        assert!((case.unloading_stiffness_n_per_m.unwrap() / 1.2e8 - 1.0).abs() < 1e-9);
+        assert!((curves.unloading_stiffness_n_per_m.unwrap() / 1.2e8 - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -416,12 +395,13 @@ mod tests {
         let body = [0.0, 3e6, 3e6, 3e6];
         let table =
             Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: Some(&body) };
-        let case = from_table(&table, &impact(10.0, 24e3)).unwrap();
-        let at = case.original.deflection_m().iter().position(|d| *d == 0.3).unwrap();
+        let (curves, _) = from_table(&table, &impact(10.0, 24e3)).unwrap();
+        let at = curves.original.deflection_m().iter().position(|d| *d == 0.3).unwrap();
         let work = 0.15e6 + 0.6e6;
         let expected = 10.0 * (1.0_f64 - work / (work + 0.6e6)).sqrt();
-        let t = case.original.time_s();
-        let rate = (case.original.deflection_m()[at + 1] - case.original.deflection_m()[at - 1])
+        let t = curves.original.time_s();
+        let rate = (curves.original.deflection_m()[at + 1]
+            - curves.original.deflection_m()[at - 1])
             / (t[at + 1] - t[at - 1]);
         assert!((rate / expected - 1.0).abs() < 1e-2, "{rate} instead of {expected}");
     }
@@ -434,7 +414,7 @@ mod tests {
         assert!(error.contains("the curve takes up 0.5417 times the kinetic energy"), "{error}");
         assert!(error.contains("--accept-energy"), "{error}");
         let accepted = Impact { accept_energy: true, ..impact(10.0, 24e3) };
-        assert!(from_table(&table, &accepted).unwrap().warnings[1].starts_with("accept_energy"));
+        assert!(from_table(&table, &accepted).unwrap().1.warnings[1].starts_with("accept_energy"));
         let ends = Table { force_n: &[0.0, 1e6, 2e6, 0.0], ..table };
         let error = from_table(&ends, &accepted).unwrap_err().to_string();
         assert!(error.contains("the force at the largest deflection is 0"), "{error}");

@@ -32,7 +32,6 @@ pub use envelope::Envelope;
 pub use extract::input::DeckSpeed;
 pub use extract::input::StatedContact;
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
-pub use from_table::FromTable;
 pub use from_table::{Impact, Table, from_table};
 pub use loading::Loading;
 pub use loading::unloading_stiffness;

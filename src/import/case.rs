@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::said::Said;
 use super::{Item, Settings};
-use crate::curve::from_table::{FromTable, IMPORTED, Impact, Table, from_table};
+use crate::curve::from_table::{IMPORTED, Impact, Table, from_table};
 use crate::curve::recipe::{Filter, Sampling};
 use crate::curve::{
     Case, CaseId, Conditions, ForceKind, Parameter, Provenance, Quality, RecordedCurves, SourceFile,
@@ -25,6 +25,7 @@ pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Resu
     let said = Said::of(item, settings, &curve, group)?;
     let stiffness = settings.unloading_stiffness_n_per_m;
     let impact = Impact {
+        force_kind: said.force,
         speed: said.speed,
         masses: said.masses,
         unloading_stiffness_n_per_m: stiffness.or(curve.facts.unloading_stiffness_n_per_m),
@@ -42,10 +43,10 @@ pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Resu
         time_s: curve.time_s.as_deref(),
         body_force_n: curve.body_force_n.as_deref(),
     };
-    let made = from_table(&table, &impact)
+    let (curves, made) = from_table(&table, &impact)
         .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
     let recipe = recipe(item, settings, &curve, reader.name, &said);
-    Ok(assembled(name, settings, &curve, reader.name, said, made, recipe))
+    Ok(assembled(name, settings, &curve, reader.name, said, curves, made, recipe))
 }
 
 fn assembled(
@@ -54,7 +55,8 @@ fn assembled(
     curve: &ReadCurve,
     format: &str,
     said: Said,
-    made: FromTable,
+    curves: RecordedCurves,
+    made: Quality,
     recipe: String,
 ) -> Case {
     let mut hash = blake3::Hasher::new();
@@ -81,14 +83,7 @@ fn assembled(
             masses: said.masses,
             parameters: settings.parameters.clone(),
         },
-        curves: RecordedCurves {
-            force_kind: said.force,
-            sampled: made.sampled,
-            closing_speed_m_per_s: made.closing_speed_m_per_s,
-            original: made.original,
-            contact_time_s: made.contact_time_s,
-            unloading_stiffness_n_per_m: made.unloading_stiffness_n_per_m,
-        },
+        curves,
         quality: Quality {
             audit: made.audit,
             notes: notes.collect(),

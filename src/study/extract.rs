@@ -7,9 +7,7 @@ use super::twin::compare_twin;
 use super::{RunError, absolute};
 use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
 use crate::curve::recipe::ForceSource;
-use crate::curve::{
-    Case, CaseId, Conditions, Origin, Provenance, Quality, RecordedCurves, SourceFile,
-};
+use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
@@ -26,8 +24,8 @@ impl LocatedRun<'_> {
             // What could not be read of it may have changed what was taken from it.
             remarks.warnings.extend(self.deck_problems());
         }
-        remarks.notes.extend_from_slice(&extracted.notes);
-        remarks.warnings.extend_from_slice(&extracted.warnings);
+        remarks.notes.extend_from_slice(&extracted.quality.notes);
+        remarks.warnings.extend_from_slice(&extracted.quality.warnings);
         remarks.append(self.of_files(&files)?);
         Ok(self.case(&files, units, extracted, remarks))
     }
@@ -139,16 +137,9 @@ impl LocatedRun<'_> {
                 masses: self.study.masses(self.entry),
                 parameters: self.entry.parameters.clone(),
             },
-            curves: RecordedCurves {
-                force_kind: files.force_kind(),
-                sampled: extracted.sampled,
-                closing_speed_m_per_s: extracted.closing_speed_m_per_s,
-                original: extracted.original,
-                contact_time_s: extracted.contact_time_s,
-                unloading_stiffness_n_per_m: extracted.unloading_stiffness_n_per_m,
-            },
+            curves: extracted.curves,
             quality: Quality {
-                audit: extracted.audit,
+                audit: extracted.quality.audit,
                 notes: remarks.notes,
                 warnings: remarks.warnings,
             },

@@ -2,7 +2,6 @@
 
 use super::files::{Located, force_file};
 use super::locate::LocatedRun;
-use crate::curve::ForceKind;
 use crate::curve::extract::{Measured, MeasuredForce};
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
 use crate::history::{EntityId, History, Side};
@@ -67,13 +66,6 @@ impl<'a> RunFiles<'a> {
     /// The history that the force is, or is made of.
     pub(crate) fn force_history(&self) -> Result<&History, ReadError> {
         self.force.force_history(&self.recipe.force)
-    }
-
-    pub(crate) fn force_kind(&self) -> ForceKind {
-        match self.recipe.force {
-            ForceSource::Contact { .. } => ForceKind::Contact,
-            ForceSource::Body { .. } => ForceKind::Body,
-        }
     }
 
     /// Each file once.

@@ -17,7 +17,7 @@ mod speed;
 mod start;
 
 use super::recipe::Filter;
-use super::{Curve, EnergyAudit, energy, loading};
+use super::{Curve, EnergyAudit, ForceKind, Quality, RecordedCurves, energy, loading};
 use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::Speed;
@@ -40,24 +40,12 @@ use start::Start;
 pub struct Extracted {
     /// Impact speed.
     pub speed: Speed,
-    /// At the common interval, from contact on.
-    pub sampled: Curve,
-    /// Rate of the deflection at the sampled times, in m/s.
-    pub closing_speed_m_per_s: Vec<f64>,
-    /// At the solver's rate, from contact on.
-    pub original: Curve,
-    /// Solver's time at which the curve begins, in s.
-    pub contact_time_s: f64,
+    /// Force over deflection, sampled and as recorded.
+    pub curves: RecordedCurves,
+    /// Energy audit, notes and warnings.
+    pub quality: Quality,
     /// Whether the speed is the deck's, so that damage of the deck matters.
     pub speed_is_decks: bool,
-    /// In N/m; `None` if the record ends before the force has fallen.
-    pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Work of the loading branch against the kinetic energy.
-    pub audit: EnergyAudit,
-    /// Choices made, for the record.
-    pub notes: Vec<String>,
-    /// What the user should look at.
-    pub warnings: Vec<String>,
 }
 
 /// Extracts the curve of one run.
@@ -103,15 +91,23 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
     remarks.append(audited(&original, balance));
     Ok(Extracted {
         speed,
-        sampled,
-        closing_speed_m_per_s,
-        unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
-        audit: energy::audit(&original, setup.masses, speed),
-        original,
-        contact_time_s: contact.time_s,
+        quality: Quality {
+            audit: energy::audit(&original, setup.masses, speed),
+            notes: remarks.notes,
+            warnings: remarks.warnings,
+        },
+        curves: RecordedCurves {
+            force_kind: match measured.force {
+                MeasuredForce::Contact(_) => ForceKind::Contact,
+                MeasuredForce::Body(..) => ForceKind::Body,
+            },
+            sampled,
+            closing_speed_m_per_s,
+            unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
+            original,
+            contact_time_s: contact.time_s,
+        },
         speed_is_decks: by == SpeedBy::Deck,
-        notes: remarks.notes,
-        warnings: remarks.warnings,
     })
 }
 
