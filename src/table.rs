@@ -110,9 +110,10 @@ impl Row {
     /// [`NoNumber`] with its place.
     pub(crate) fn number(&self, field: usize) -> Result<f64, NoNumber> {
         let found = self.field(field);
-        let parsed = match self.decimal_comma && !found.contains('.') {
-            true => found.replacen(',', ".", 1).parse::<f64>(),
-            false => found.parse::<f64>(),
+        let parsed = if self.decimal_comma && !found.contains('.') {
+            found.replacen(',', ".", 1).parse::<f64>()
+        } else {
+            found.parse::<f64>()
         };
         match parsed {
             Ok(number) if number.is_finite() => Ok(number),

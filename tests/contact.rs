@@ -100,9 +100,10 @@ impl Run {
             minus_displacement: None,
             velocity: Some(&self.velocity),
             minus_velocity: None,
-            force: match is_body {
-                true => MeasuredForce::Body(&self.acceleration, RecordedMotion::Acceleration),
-                false => MeasuredForce::Contact(&self.force),
+            force: if is_body {
+                MeasuredForce::Body(&self.acceleration, RecordedMotion::Acceleration)
+            } else {
+                MeasuredForce::Contact(&self.force)
             },
             contact: recipe.contact.as_ref().map(|_| &self.force),
         };

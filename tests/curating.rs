@@ -992,15 +992,13 @@ fn kill_at_many_moments(look: &mut dyn FnMut(&Path)) {
                 .unwrap();
             aim.wait(moment);
             let _ = child.kill();
-            let found = match child.wait().unwrap().success() {
-                // Whoever was told that it is done finds it.
-                true => {
-                    acknowledged += 1;
-                    aim.ended();
-                    assert!(state(&path) == new, "{line}");
-                    continue;
-                }
-                false => state(&path),
+            let found = if child.wait().unwrap().success() {
+                acknowledged += 1;
+                aim.ended();
+                assert!(state(&path) == new, "{line}");
+                continue;
+            } else {
+                state(&path)
             };
             killed += 1;
             aim.killed();
@@ -1080,15 +1078,12 @@ fn every_acknowledged_case_is_there() {
         asked.insert(format!("g/{k}"));
         aim.wait(moment);
         let _ = child.kill();
-        match child.wait().unwrap().success() {
-            true => {
-                acknowledged.insert(format!("g/{k}"));
-                aim.ended();
-            }
-            false => {
-                killed += 1;
-                aim.killed();
-            }
+        if child.wait().unwrap().success() {
+            acknowledged.insert(format!("g/{k}"));
+            aim.ended();
+        } else {
+            killed += 1;
+            aim.killed();
         }
         let there: BTreeSet<String> = names(here, "c.h5").into_iter().collect();
         assert!(acknowledged.is_subset(&there) && there.is_subset(&asked), "{there:?}");

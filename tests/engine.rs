@@ -66,9 +66,10 @@ fn law(random: &mut Stream, kind: Kind, meets: bool) -> ForceLaw {
         return ForceLaw::new(envelope, Unloading::Elastic, end);
     }
     let unloading = Unloading::Memory { stiffness_n_per_m: random.gen_range(5e6..200e6) };
-    match kind.shapes && random.gen_bool(0.5) {
-        true => ForceLaw::shaped(envelope, unloading, shape(random), end),
-        false => ForceLaw::new(envelope, unloading, end),
+    if kind.shapes && random.gen_bool(0.5) {
+        ForceLaw::shaped(envelope, unloading, shape(random), end)
+    } else {
+        ForceLaw::new(envelope, unloading, end)
     }
 }
 

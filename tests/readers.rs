@@ -565,13 +565,14 @@ fn rigid_bodies() {
 
 fn node_force(mark: &str, id: u32, sum: bool) -> String {
     let number = format!("{:>13}", "-1.5000E+00");
-    match sum {
-        true => format!(
+    if sum {
+        format!(
             "              xtotal={number}   ytotal={number}  ztotal={number}   etotal={number}\n"
-        ),
-        false => format!(
+        )
+    } else {
+        format!(
             " {mark}{id:>8}  xforce={number}   yforce={number}  zforce={number}   energy={number}\n"
-        ),
+        )
     }
 }
 

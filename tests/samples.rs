@@ -362,10 +362,8 @@ fn swforc_values_are_the_files() {
             let mut right = right.split_whitespace();
             let id = right.next().unwrap();
             push_time(&mut theirs, numbers(left[3])[0]);
-            let failure = match left[4].contains('+') {
-                true => numbers(left[4])[0],
-                false => left[4].parse().unwrap(),
-            };
+            let failure =
+                if left[4].contains('+') { numbers(left[4])[0] } else { left[4].parse().unwrap() };
             let first = [numbers(left[1])[0], numbers(left[2])[0], failure];
             push_all(&mut theirs, &["axial", "shear", "failure"], id, &first);
             let rest: Vec<f64> = right.map(|word| numbers(word)[0]).collect();

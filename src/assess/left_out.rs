@@ -75,9 +75,10 @@ impl<'a> LeftOutCase<'a> {
         let others = rest.speeds_m_per_s();
         let inner = others.first().is_some_and(|&low| low < v)
             && others.last().is_some_and(|&high| v < high);
-        let span_m_per_s = match inner {
-            true => band::gap_m_per_s(&others, v).ok_or(NotLeftOut::TooFew { case: name() })?,
-            false => band::distance_outside_m_per_s(&others, v),
+        let span_m_per_s = if inner {
+            band::gap_m_per_s(&others, v).ok_or(NotLeftOut::TooFew { case: name() })?
+        } else {
+            band::distance_outside_m_per_s(&others, v)
         };
         Ok(Self { own, case, rest, inner, span_m_per_s, reference })
     }
@@ -147,9 +148,10 @@ impl<'a> LeftOutCase<'a> {
             max_crush_error: curve.max_deflection_m / fe.end_m() - 1.0,
             curve,
         };
-        match answer.energy_error.is_finite() && answer.max_crush_error.is_finite() {
-            true => Ok(answer),
-            false => Err(error!(Validation, "its errors against FE are no finite numbers")),
+        if answer.energy_error.is_finite() && answer.max_crush_error.is_finite() {
+            Ok(answer)
+        } else {
+            Err(error!(Validation, "its errors against FE are no finite numbers"))
         }
     }
 

@@ -134,10 +134,8 @@ pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, Error> {
 pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, Error> {
     let options = ForestOptions { seed, ..ForestOptions::paper() };
     let mut model = Model::fit_curves(set, ModelKind::forest(options))?;
-    model.max_crush_rule = match model.features.is_empty() {
-        true => MaxCrushRule::Spline,
-        false => MaxCrushRule::Motion,
-    };
+    model.max_crush_rule =
+        if model.features.is_empty() { MaxCrushRule::Spline } else { MaxCrushRule::Motion };
     Ok(model)
 }
 

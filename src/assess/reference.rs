@@ -105,9 +105,10 @@ impl Reference {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
         let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];
-        match all.iter().all(|e| e.is_finite()) {
-            true => Ok(errors),
-            false => Err(error!(Comparison, "its errors against FE are no finite numbers")),
+        if all.iter().all(|e| e.is_finite()) {
+            Ok(errors)
+        } else {
+            Err(error!(Comparison, "its errors against FE are no finite numbers"))
         }
     }
 

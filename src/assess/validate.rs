@@ -468,9 +468,10 @@ fn best_rule(kind: &ModelKind, trials: &[&Trial<'_>]) -> Option<MaxCrushRule> {
             .filter(|rule| *rule != MaxCrushRule::Spline)
             .min_by(|&a, &b| missing(a).cmp(&missing(b)).then(mean(a).total_cmp(&mean(b))))
     })?;
-    match kind.is_reference_method() && missing(MaxCrushRule::Spline).0 <= missing(best).0 {
-        true => Some(MaxCrushRule::Spline),
-        false => Some(best),
+    if kind.is_reference_method() && missing(MaxCrushRule::Spline).0 <= missing(best).0 {
+        Some(MaxCrushRule::Spline)
+    } else {
+        Some(best)
     }
 }
 

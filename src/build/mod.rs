@@ -99,10 +99,7 @@ pub fn build(
 ) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
-    let mut database = match path.is_file() {
-        true => Database::read(path)?,
-        false => Database::default(),
-    };
+    let mut database = if path.is_file() { Database::read(path)? } else { Database::default() };
     let located: Vec<Result<LocatedRun<'_>, RunError>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
     let previous = previous(&study, &located, &database);

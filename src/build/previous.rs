@@ -57,15 +57,14 @@ impl Named<'_> {
         let mut previous = Previous::default();
         let mut without: Vec<&Case> = Vec::new();
         for case in cases {
-            match names.contains(run_of(case)) {
-                true => {
-                    let (run, place) = (run_of(case), self.place(case, run_of(case)));
-                    // Of several, as after a merge, the one of the run's own name.
-                    if case.id.name == run || !previous.of_run.contains_key(run) {
-                        previous.of_run.insert(run.into(), (CasePath::of(case), place));
-                    }
+            if names.contains(run_of(case)) {
+                let (run, place) = (run_of(case), self.place(case, run_of(case)));
+                // Of several, as after a merge, the one of the run's own name.
+                if case.id.name == run || !previous.of_run.contains_key(run) {
+                    previous.of_run.insert(run.into(), (CasePath::of(case), place));
                 }
-                false => without.push(case),
+            } else {
+                without.push(case)
             }
         }
         // Made of each, for runs that have no case of their name.
@@ -124,9 +123,8 @@ impl Named<'_> {
 
     /// Where a case belongs that is of the run of this name.
     fn place(&self, case: &Case, run: &str) -> CasePath {
-        let now = |then: &str, said: &str, is: &String| match then == said {
-            true => is.clone(),
-            false => said.into(),
+        let now = |then: &str, said: &str, is: &String| {
+            if then == said { is.clone() } else { said.into() }
         };
         CasePath {
             group: now(group_of(case), self.group, &case.id.group),

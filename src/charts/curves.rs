@@ -46,9 +46,12 @@ fn names(cases: &[Case]) -> Vec<String> {
     let speeds: Vec<String> =
         cases.iter().map(|case| speed(case.conditions.speed.m_per_s)).collect();
     let is_alone = |k: usize| speeds.iter().filter(|s| **s == speeds[k]).count() == 1;
-    let name = |k: usize| match is_alone(k) {
-        true => format!("FE at {}", speeds[k]),
-        false => format!("FE at {} ({})", speeds[k], cases[k].id.name),
+    let name = |k: usize| {
+        if is_alone(k) {
+            format!("FE at {}", speeds[k])
+        } else {
+            format!("FE at {} ({})", speeds[k], cases[k].id.name)
+        }
     };
     (0..cases.len()).map(name).collect()
 }

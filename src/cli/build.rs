@@ -114,18 +114,18 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     let database = output.display().to_string();
-    match options.json {
-        true => output::print_json(&Document::of(report, database, runs))?,
-        false => output::print(|out| print(out, &Document::of(report, database, runs)))?,
+    if options.json {
+        output::print_json(&Document::of(report, database, runs))?
+    } else {
+        output::print(|out| print(out, &Document::of(report, database, runs)))?
     }
     Ok(outcome)
 }
 
 impl Document {
     fn of(report: BuildReport, database: String, runs: Vec<RunReport>) -> Self {
-        let shown = |path: &CasePath| match path.group == report.group {
-            true => path.name.clone(),
-            false => path.to_string(),
+        let shown = |path: &CasePath| {
+            if path.group == report.group { path.name.clone() } else { path.to_string() }
         };
         let moved = |(from, to): &(CasePath, CasePath)| Moved {
             from: from.to_string(),
@@ -177,9 +177,10 @@ fn moved_lines(moved: &[Moved]) -> Vec<String> {
     let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     let mut lines = Vec::new();
     for Moved { paths: (from, to), .. } in moved {
-        match from.name == to.name {
-            true => *groups.entry((&from.group, &to.group)).or_default() += 1,
-            false => lines.push(format!("{from}: renamed since it was built, is {to} now")),
+        if from.name == to.name {
+            *groups.entry((&from.group, &to.group)).or_default() += 1
+        } else {
+            lines.push(format!("{from}: renamed since it was built, is {to} now"))
         }
     }
     let group = |((from, to), count): (&(&str, &str), &usize)| {

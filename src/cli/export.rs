@@ -232,13 +232,14 @@ impl Target {
     fn check_for_model(&self, format: &Format) -> Result<(), Failure> {
         let of_curves = self.units.is_some() || self.soften;
         let forced = self.force.is_some() && format.name == "onnx";
-        match of_curves || forced {
-            true => Err(Failure::Usage(format!(
+        if of_curves || forced {
+            Err(Failure::Usage(format!(
                 "{} holds a whole model in SI: remove --units and --soften{}",
                 format.name,
                 if forced { " and --force: it is of the recipe's force" } else { "" }
-            ))),
-            false => Ok(()),
+            )))
+        } else {
+            Ok(())
         }
     }
 }

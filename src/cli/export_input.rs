@@ -141,11 +141,12 @@ impl Chosen<'_> {
             || self.asks_a_model()
             || self.group.is_some()
             || !self.cases.is_empty();
-        match is_asked {
-            true => Err(Failure::Usage(format!(
+        if is_asked {
+            Err(Failure::Usage(format!(
                 "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
-            ))),
-            false => Ok(()),
+            )))
+        } else {
+            Ok(())
         }
     }
 

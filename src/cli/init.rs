@@ -101,10 +101,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !to_stdout {
         init::refuse_existing(&output)?;
     }
-    match args.scenario {
-        true => scenario(args, &output, options),
-        false => study(args, &output, options),
-    }
+    if args.scenario { scenario(args, &output, options) } else { study(args, &output, options) }
 }
 
 #[derive(Serialize)]
@@ -126,14 +123,15 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
     } else {
         write_whole(output, text.as_bytes())?;
         let scenario = output.display().to_string();
-        match options.json {
-            true => output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?,
-            false => output::print(|out| {
+        if options.json {
+            output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?
+        } else {
+            output::print(|out| {
                 writeln!(
                     out,
                     "wrote {scenario}: put your trains in, then crumple simulate {scenario}"
                 )
-            })?,
+            })?
         }
     }
     Ok(if proposal.missing.is_empty() { Outcome::Clean } else { Outcome::Warned })
@@ -141,10 +139,8 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
 
 fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let known = &args.given;
-    let folders = match args.inputs.is_empty() {
-        true => vec![PathBuf::from(".")],
-        false => args.inputs.clone(),
-    };
+    let folders =
+        if args.inputs.is_empty() { vec![PathBuf::from(".")] } else { args.inputs.clone() };
     let request = Request {
         folders,
         study: if is_stdout(output) { "study.toml".into() } else { output.into() },
@@ -236,9 +232,12 @@ fn chosen(proposal: &Proposal) -> Vec<(&'static str, String, &'static str)> {
             Proposed::Missing { .. } => ("?".into(), "fill in"),
         }
     }
-    let kind = |kind: &StudyKind| match proposal.half_model {
-        true => format!("{} (half model)", kind.name()),
-        false => kind.name().to_string(),
+    let kind = |kind: &StudyKind| {
+        if proposal.half_model {
+            format!("{} (half model)", kind.name())
+        } else {
+            kind.name().to_string()
+        }
     };
     let all = [
         ("group", said(&proposal.group, String::clone)),

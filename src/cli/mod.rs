@@ -132,12 +132,13 @@ pub type CommandResult = Result<Outcome, Failure>;
 
 /// Refuses to write over what is read.
 fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
-    match is_same(input, output) {
-        true => Err(Failure::Usage(format!(
+    if is_same(input, output) {
+        Err(Failure::Usage(format!(
             "-o {} names the input itself: name another file",
             output.display()
-        ))),
-        false => Ok(()),
+        )))
+    } else {
+        Ok(())
     }
 }
 
@@ -223,17 +224,19 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
         Err(Failure::Usage(message)) => {
-            match options.json {
-                true => print_document(&ErrorDocument::usage(&message)),
-                false => output::say(&format!("error: {message}")),
+            if options.json {
+                print_document(&ErrorDocument::usage(&message))
+            } else {
+                output::say(&format!("error: {message}"))
             }
             USAGE
         }
         Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
         Err(Failure::Failed(error)) => {
-            match options.json {
-                true => print_document(&ErrorDocument::new(&*error)),
-                false => print_error(&*error),
+            if options.json {
+                print_document(&ErrorDocument::new(&*error))
+            } else {
+                print_error(&*error)
             }
             FAILED
         }

@@ -93,9 +93,10 @@ pub(super) fn say_excerpt(place: Option<&Place>) {
 /// A text without control characters but line ends and tabs.
 pub(super) fn plain(text: &str) -> Cow<'_, str> {
     let is_control = |c: char| c.is_control() && c != '\n' && c != '\t';
-    match text.contains(is_control) {
-        true => Cow::Owned(text.replace(is_control, REPLACED)),
-        false => Cow::Borrowed(text),
+    if text.contains(is_control) {
+        Cow::Owned(text.replace(is_control, REPLACED))
+    } else {
+        Cow::Borrowed(text)
     }
 }
 

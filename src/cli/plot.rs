@@ -153,9 +153,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             Picture::Svg => drawing.svg().into_bytes(),
             Picture::Png => drawing.png(args.scale)?,
         };
-        match is_stdout(path) {
-            true => output::print_data(|out| out.write_all(&bytes))?,
-            false => files.push((path.as_path(), bytes)),
+        if is_stdout(path) {
+            output::print_data(|out| out.write_all(&bytes))?
+        } else {
+            files.push((path.as_path(), bytes))
         }
     }
     let all: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (*path, &bytes[..])).collect();

@@ -56,10 +56,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let rule = match args.paper {
-        true => Some(MaxCrushRule::Spline),
-        false => args.max_crush,
-    };
+    let rule = if args.paper { Some(MaxCrushRule::Spline) } else { args.max_crush };
     let formats = args
         .output
         .iter()

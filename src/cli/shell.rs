@@ -42,9 +42,12 @@ pub(super) fn command() -> Command {
 
 fn under_one_heading(command: Command) -> Command {
     let global = |id: &str| ["help", "version"].contains(&id);
-    let command = command.mut_args(|arg| match global(arg.get_id().as_str()) {
-        true => arg.help_heading(GLOBAL).display_order(1000),
-        false => arg,
+    let command = command.mut_args(|arg| {
+        if global(arg.get_id().as_str()) {
+            arg.help_heading(GLOBAL).display_order(1000)
+        } else {
+            arg
+        }
     });
     command.mut_subcommands(under_one_heading)
 }
@@ -70,9 +73,10 @@ pub(super) fn short_help() -> String {
     let mut text =
         format!("{about}\n\nUsage: crumple COMMAND [OPTIONS]\n\nThe usual order of work:\n");
     for (command, what) in ORDER {
-        text += &match is_narrow {
-            true => format!("  crumple {command}\n      {what}\n"),
-            false => format!("  crumple {command:<34}{what}\n"),
+        text += &if is_narrow {
+            format!("  crumple {command}\n      {what}\n")
+        } else {
+            format!("  crumple {command:<34}{what}\n")
         };
     }
     text + "\ncrumple demo shows all of it on bundled runs;\n\
@@ -116,11 +120,12 @@ fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     command.build();
     let mut written = Vec::new();
     pages(&command, "crumple", folder, &mut written)?;
-    match options.json {
-        true => output::print_json(&Pages { written })?,
-        false => output::print(|out| {
+    if options.json {
+        output::print_json(&Pages { written })?
+    } else {
+        output::print(|out| {
             written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
-        })?,
+        })?
     }
     Ok(Outcome::Clean)
 }

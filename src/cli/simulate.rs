@@ -321,10 +321,7 @@ fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
 }
 
 fn print_limits(out: &mut dyn Write, limits: &Limits) -> io::Result<()> {
-    let over = match limits.over.is_empty() {
-        true => "no vehicle".into(),
-        false => limits.over.join(", "),
-    };
+    let over = if limits.over.is_empty() { "no vehicle".into() } else { limits.over.join(", ") };
     let of = match &limits.trains {
         Some(trains) => format!(", of train {}", trains.join(", ")),
         None => String::new(),

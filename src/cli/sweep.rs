@@ -159,9 +159,8 @@ fn write(
     let bar = Count::new(global, items.end - items.start);
     let mut begun = false;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
-    let mut step = |done: u64| match std::mem::replace(&mut begun, true) {
-        true => bar.set(done),
-        false => bar.begin(done),
+    let mut step = |done: u64| {
+        if std::mem::replace(&mut begun, true) { bar.set(done) } else { bar.begin(done) }
     };
     let report = if is_stdout(output) || is_device {
         let mut progress = |done| {
@@ -170,21 +169,21 @@ fn write(
         };
         let mut write =
             |out: &mut dyn Write| sweep::write_rows(sweep, out, output, options, &mut progress);
-        match is_stdout(output) {
-            true => output::print_data(write),
-            false => {
-                let device = OpenOptions::new().write(true).open(output);
-                let failed = |source| crate::file::not_written(output, source);
-                Ok(write(&mut device.map_err(failed)?)?)
-            }
+        if is_stdout(output) {
+            output::print_data(write)
+        } else {
+            let device = OpenOptions::new().write(true).open(output);
+            let failed = |source| crate::file::not_written(output, source);
+            Ok(write(&mut device.map_err(failed)?)?)
         }
     } else {
         let stop = stop_flag();
         sweep::write(sweep, output, options, |done| {
             step(done);
-            match stop.load(Ordering::Relaxed) {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+            if stop.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         })
         .map_err(Failure::from)
@@ -265,9 +264,10 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
                 counted(report.rows, "item"),
                 report.failed
             )?;
-            match report.resumed == report.rows && report.rows > 0 {
-                true => writeln!(out, "{} is complete: nothing was left to run", output.display()),
-                false => writeln!(out, "wrote {}", output.display()),
+            if report.resumed == report.rows && report.rows > 0 {
+                writeln!(out, "{} is complete: nothing was left to run", output.display())
+            } else {
+                writeln!(out, "wrote {}", output.display())
             }
         })?;
     }

@@ -202,10 +202,7 @@ fn print_group(
                 Some(format!("{} to {} ({error:.1} %)", km_per_h(low), km_per_h(high)))
             });
             let then: Vec<String> = then.collect();
-            match then.is_empty() {
-                true => Ok(()),
-                false => writeln!(out, "then: {}", then.join(", ")),
-            }
+            if then.is_empty() { Ok(()) } else { writeln!(out, "then: {}", then.join(", ")) }
         }
         None => Ok(()),
     }

@@ -52,12 +52,10 @@ impl FromStr for SpeedRange {
             ));
         }
         let (low_m_per_s, high_m_per_s) = (end(low, 0.0)?, end(high, f64::INFINITY)?);
-        match low_m_per_s <= high_m_per_s {
-            true => Ok(Self { low_m_per_s, high_m_per_s }),
-            false => Err(error!(
-                Usage,
-                "\"{text}\" ends below its beginning: write the lower speed first"
-            )),
+        if low_m_per_s <= high_m_per_s {
+            Ok(Self { low_m_per_s, high_m_per_s })
+        } else {
+            Err(error!(Usage, "\"{text}\" ends below its beginning: write the lower speed first"))
         }
     }
 }
@@ -140,10 +138,7 @@ impl Selection {
             let tags: Vec<String> = self.tags.iter().map(|tag| format!("\"{tag}\"")).collect();
             asked.push(format!("has the tag {}", tags.join(" or ")));
         }
-        match asked.is_empty() {
-            true => "is there".into(),
-            false => asked.join(" and "),
-        }
+        if asked.is_empty() { "is there".into() } else { asked.join(" and ") }
     }
 }
 
@@ -174,9 +169,10 @@ fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case
 /// Cases with their speeds and tags, for a message.
 fn listed(cases: &[&Case]) -> String {
     let shown = |case: &&Case| {
-        let tags = match case.provenance.tags.is_empty() {
-            true => String::new(),
-            false => format!(", {}", case.provenance.tags.join(", ")),
+        let tags = if case.provenance.tags.is_empty() {
+            String::new()
+        } else {
+            format!(", {}", case.provenance.tags.join(", "))
         };
         format!("{} ({}{tags})", CasePath::of(case), km_per_h(case.conditions.speed.m_per_s))
     };

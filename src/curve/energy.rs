@@ -282,9 +282,10 @@ impl Claim<'_> {
         let (crush_m, loading_s) = (self.curve.deflection_m()[end], self.curve.time_s()[end]);
         let scale = |units: &UnitSystem| {
             let speed = units.speed() / self.units.speed();
-            let force = match self.is_body_force {
-                true => units.acceleration() / self.units.acceleration(),
-                false => units.force() / self.units.force(),
+            let force = if self.is_body_force {
+                units.acceleration() / self.units.acceleration()
+            } else {
+                units.force() / self.units.force()
             };
             let length = units.length_m / self.units.length_m;
             (speed, force * length, length, units.time_s / self.units.time_s)

@@ -32,10 +32,8 @@ pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let advance = MIN_ADVANCE * d[end];
     // The force at contact is the one of the first sample, whose deflection is 0.
-    let (mut deflection_m, mut force_n) = match d[0] > advance {
-        false => (vec![0.0], vec![f[0]]),
-        true => (vec![0.0, d[0]], vec![0.0, f[0]]),
-    };
+    let (mut deflection_m, mut force_n) =
+        if d[0] <= advance { (vec![0.0], vec![f[0]]) } else { (vec![0.0, d[0]], vec![0.0, f[0]]) };
     let mut dropped = 0;
     for i in 1..=end {
         if d[i] > deflection_m[deflection_m.len() - 1] + advance {

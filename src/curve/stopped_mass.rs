@@ -108,9 +108,10 @@ impl StoppedMass {
     /// Stopped mass in kg at a deflection in m.
     pub(crate) fn at(&self, deflection_m: f64) -> f64 {
         let (d, m) = (&self.deflection_m, &self.stopped_kg);
-        match deflection_m < d[d.len() - 1] {
-            true => piecewise::by_share(d, m, piecewise::segment(d, deflection_m), deflection_m),
-            false => m[m.len() - 1],
+        if deflection_m < d[d.len() - 1] {
+            piecewise::by_share(d, m, piecewise::segment(d, deflection_m), deflection_m)
+        } else {
+            m[m.len() - 1]
         }
     }
 

@@ -56,9 +56,10 @@ pub(super) fn write_keeping(
         if !lost.is_empty() {
             return Err(would_drop(listed(&lost)));
         }
-        match layout::decode(draft)?.holds_what(database) {
-            true => Ok(()),
-            false => Err(would_drop(listed(&before))),
+        if layout::decode(draft)?.holds_what(database) {
+            Ok(())
+        } else {
+            Err(would_drop(listed(&before)))
         }
     })
 }
@@ -228,9 +229,10 @@ impl Edit<'_> {
         let moved: HashSet<&CasePath> = self.moves.all.values().collect();
         for name in self.new.groups() {
             let attributes = group::attributes(name, self.new.cases(name));
-            let group = match there.contains(name) {
-                true => replace_group_attributes(root.group(name)?, attributes)?,
-                false => with_attributes(root.create_group(name)?, attributes)?,
+            let group = if there.contains(name) {
+                replace_group_attributes(root.group(name)?, attributes)?
+            } else {
+                with_attributes(root.create_group(name)?, attributes)?
             };
             let before: HashMap<&str, &Case> =
                 self.old.cases(name).iter().map(|case| (case.id.name.as_str(), case)).collect();

@@ -117,9 +117,10 @@ impl Foreign {
             self.add("type", place, &name);
         }
         for (name, dataset) in group.iter_datasets()? {
-            match datasets.contains(&name.as_str()) {
-                true => self.of_dataset(&format!("{place}/{name}"), &dataset)?,
-                false => self.add("dataset", place, &name),
+            if datasets.contains(&name.as_str()) {
+                self.of_dataset(&format!("{place}/{name}"), &dataset)?
+            } else {
+                self.add("dataset", place, &name)
             }
         }
         Ok(())

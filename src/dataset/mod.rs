@@ -118,9 +118,10 @@ pub(crate) fn feature_values(
             .filter(|f| f.parameter == feature.parameter)
             .filter_map(|f| f.category.as_deref())
             .collect();
-        let among = match known.is_empty() {
-            true => " as a finite number".into(),
-            false => format!(", one of {}", known.join(", ")),
+        let among = if known.is_empty() {
+            " as a finite number".into()
+        } else {
+            format!(", one of {}", known.join(", "))
         };
         error!(
             Dataset,

@@ -84,9 +84,10 @@ impl Place {
         let room = width.max(40) - number.len() - 3;
         let line: Vec<char> = spot.text.chars().collect();
         // A third of the room before the place, and never more than the line needs.
-        let first = match line.len() > room {
-            true => spot.before.saturating_sub(room / 3).min(line.len() - room),
-            false => 0,
+        let first = if line.len() > room {
+            spot.before.saturating_sub(room / 3).min(line.len() - room)
+        } else {
+            0
         };
         let mut shown: Vec<char> = line.iter().skip(first).take(room).copied().collect();
         if first > 0 {

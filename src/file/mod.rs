@@ -80,15 +80,16 @@ pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         file.take(most + 1).read_to_end(&mut bytes)?;
     }
     let size = size.max(bytes.len() as u64);
-    match size <= most {
-        true => Ok(bytes),
-        false => Err(io::Error::new(
+    if size <= most {
+        Ok(bytes)
+    } else {
+        Err(io::Error::new(
             io::ErrorKind::FileTooLarge,
             format!(
                 "the file has {size} bytes, expected at most {most} ({} MiB): is this another kind of file?",
                 most >> 20
             ),
-        )),
+        ))
     }
 }
 

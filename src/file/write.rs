@@ -142,9 +142,10 @@ impl Draft {
         let target = target_of(path);
         let name = target.file_name().unwrap_or_default();
         let mut own = OsString::from(".crumple-");
-        match name.len() <= MAX_NAME_BYTES {
-            true => own.push(name),
-            false => own.push(&*blake3::hash(name.as_encoded_bytes()).to_hex()),
+        if name.len() <= MAX_NAME_BYTES {
+            own.push(name)
+        } else {
+            own.push(&*blake3::hash(name.as_encoded_bytes()).to_hex())
         }
         own.push(".part");
         let path = folder_of(&target).join(own);

@@ -87,16 +87,18 @@ impl RegressionForest<f64> {
             || self.trees().iter().flat_map(|tree| (0..tree.nodes()).map(move |n| (tree, n)));
         let leaves = || nodes().filter(|(tree, node)| tree.is_leaf(*node));
         let tree_of = |leaves_only: bool| {
-            let count = move |tree: &Tree<f64>| match leaves_only {
-                true => (0..tree.nodes()).filter(|&node| tree.is_leaf(node)).count(),
-                false => tree.nodes(),
+            let count = move |tree: &Tree<f64>| {
+                if leaves_only {
+                    (0..tree.nodes()).filter(|&node| tree.is_leaf(node)).count()
+                } else {
+                    tree.nodes()
+                }
             };
             (0u64..).zip(self.trees()).flat_map(move |(at, tree)| repeat_n(at, count(tree)))
         };
         let number = |(_, node): (&Tree<f64>, usize)| node as u64;
-        let mode = |(tree, node): (&Tree<f64>, usize)| match tree.is_leaf(node) {
-            true => "LEAF",
-            false => "BRANCH_LT",
+        let mode = |(tree, node): (&Tree<f64>, usize)| {
+            if tree.is_leaf(node) { "LEAF" } else { "BRANCH_LT" }
         };
         Message::default()
             .text(1, INPUT)

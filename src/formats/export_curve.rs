@@ -363,10 +363,7 @@ pub(super) fn file_stem(curve: &PredictedCurve) -> String {
 pub(super) fn identifier(name: &str) -> String {
     let text: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    match text.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        true => text,
-        false => format!("curve_{text}"),
-    }
+    if text.starts_with(|c: char| c.is_ascii_alphabetic()) { text } else { format!("curve_{text}") }
 }
 
 /// A name that is told apart from earlier ones of the same kind.

@@ -108,9 +108,10 @@ fn array(name: &str, values: impl Iterator<Item = f64>, meaning: &str) -> String
 
 /// The package has the name of its file, as translators expect: so packages of one folder differ.
 fn package_name(stem: &str) -> String {
-    match KEYWORDS.split(' ').any(|word| word == stem) {
-        true => format!("curve_{stem}"),
-        false => identifier(stem),
+    if KEYWORDS.split(' ').any(|word| word == stem) {
+        format!("curve_{stem}")
+    } else {
+        identifier(stem)
     }
 }
 

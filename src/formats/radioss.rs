@@ -44,9 +44,10 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             files.push((format!("{stem}_0001.rad"), engine(curve, units, &stem)));
         }
     }
-    match options.deck {
-        true => files.insert(0, (format!("{stem}_0000.rad"), lines.into_bytes())),
-        false => files.push((format!("{stem}.rad"), lines.into_bytes())),
+    if options.deck {
+        files.insert(0, (format!("{stem}_0000.rad"), lines.into_bytes()))
+    } else {
+        files.push((format!("{stem}.rad"), lines.into_bytes()))
     }
     Ok(Exported { files, notes, ..Exported::default() })
 }

@@ -48,9 +48,10 @@ pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, Error>
     }
     let table = Table::of(model, options)?;
     let is_csv = options.extension.as_deref() == Some("csv");
-    let bytes = match is_csv {
-        true => table.to_csv(model, options.force),
-        false => table.to_hdf5(model, options.force)?,
+    let bytes = if is_csv {
+        table.to_csv(model, options.force)
+    } else {
+        table.to_hdf5(model, options.force)?
     };
     let extension = if is_csv { "csv" } else { "h5" };
     let name = format!("table.{extension}");
@@ -199,9 +200,10 @@ fn no_band_note(curves: &[ExportCurve]) -> Option<String> {
     let without: Vec<&ExportCurve> = curves.iter().filter(|c| c.band.is_none()).collect();
     let why = without.first()?.no_band?;
     let speeds = without.iter().map(|c| km_per_h(c.predicted.speed_m_per_s));
-    let at = match without.len() == curves.len() {
-        true => String::new(),
-        false => format!(" at {}", speeds.collect::<Vec<_>>().join(", ")),
+    let at = if without.len() == curves.len() {
+        String::new()
+    } else {
+        format!(" at {}", speeds.collect::<Vec<_>>().join(", "))
     };
     Some(format!("table: written without a band{at}: {why}"))
 }

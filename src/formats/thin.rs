@@ -196,9 +196,10 @@ fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelo
         if with(high, until)?.work_to(d[end]) >= wanted_j {
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                match with(middle, until)?.work_to(d[end]) < wanted_j {
-                    true => low = middle,
-                    false => high = middle,
+                if with(middle, until)?.work_to(d[end]) < wanted_j {
+                    low = middle
+                } else {
+                    high = middle
                 }
             }
             return with(high, until);

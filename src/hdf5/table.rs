@@ -259,9 +259,10 @@ impl Table {
         }
         let bytes = self.datasets[column].read_raw_rows(row, rows);
         let bytes = bytes.map_err(|e| self.damaged(name, e.to_string()))?;
-        match bytes.len() as u64 == rows * self.columns[column].values.size() as u64 {
-            true => Ok(bytes),
-            false => Err(self.damaged(name, format!("{} bytes of {rows} rows", bytes.len()))),
+        if bytes.len() as u64 == rows * self.columns[column].values.size() as u64 {
+            Ok(bytes)
+        } else {
+            Err(self.damaged(name, format!("{} bytes of {rows} rows", bytes.len())))
         }
     }
 

@@ -247,9 +247,10 @@ impl Layout {
         let title = |e: &EntityId| self.titles.get(e).map_or("", String::as_str);
         let titles: Vec<&str> = entities.iter().map(title).collect();
         if titles.iter().any(|title| !title.is_empty()) {
-            match titles.len() <= MAX_TEXTS {
-                true => drop(dataset.set_attr(TITLES, texts(&titles))),
-                false => self.titles_of.push((name.clone(), entities.to_vec())),
+            if titles.len() <= MAX_TEXTS {
+                drop(dataset.set_attr(TITLES, texts(&titles)))
+            } else {
+                self.titles_of.push((name.clone(), entities.to_vec()))
             }
         }
         self.entities.push((entities.to_vec(), scale));

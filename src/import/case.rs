@@ -172,10 +172,7 @@ fn case_name(item: &Item) -> Result<String, Error> {
     if let Some(name) = &item.case {
         return Ok(name.clone());
     }
-    let stem = match item.path.is_dir() {
-        true => item.path.file_name(),
-        false => item.path.file_stem(),
-    };
+    let stem = if item.path.is_dir() { item.path.file_name() } else { item.path.file_stem() };
     let name = stem.map(|stem| stem.to_string_lossy().into_owned());
     name.ok_or_else(|| {
         error!(

@@ -59,10 +59,8 @@ pub(crate) struct Settings {
 /// It names the file and what to do; the database is then unchanged.
 pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
-    let mut database = match path.try_exists().unwrap_or(true) {
-        true => Database::read(path)?,
-        false => Database::default(),
-    };
+    let mut database =
+        if path.try_exists().unwrap_or(true) { Database::read(path)? } else { Database::default() };
     let mut cases: Vec<Case> = Vec::with_capacity(items.len());
     let now = clock::now_utc();
     for item in items {

@@ -209,9 +209,10 @@ impl<'a> View<'a> {
     fn other_kind(&self, is_pair: bool) -> Option<Reason> {
         let is_other = self.best.as_ref().is_some_and(|b| (b.kind == StudyKind::Pair) != is_pair)
             && self.counts;
-        let (own, others) = match is_pair {
-            true => ("one body moves", "two bodies do"),
-            false => ("two bodies move", "one does"),
+        let (own, others) = if is_pair {
+            ("one body moves", "two bodies do")
+        } else {
+            ("two bodies move", "one does")
         };
         let why = format!("{own} in it, {others} in the others");
         is_other.then_some(Reason::OtherRecipe { why })
@@ -342,9 +343,10 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Op
     for run in of_runs {
         let best = run.iter().map(|j| j.residual).fold(f64::INFINITY, f64::min);
         for Judged { node, residual } in run {
-            let limit = match is_centre(node.title.as_deref()) {
-                true => best + CENTRE_AS_GOOD,
-                false => AS_GOOD.0 * best + AS_GOOD.1,
+            let limit = if is_centre(node.title.as_deref()) {
+                best + CENTRE_AS_GOOD
+            } else {
+                AS_GOOD.0 * best + AS_GOOD.1
             };
             let empty = Sum { node, runs: 0, residual: 0.0, roughness: 0.0, seen: 0.0 };
             let sum = sums.entry(node.id).or_insert(empty);
@@ -376,9 +378,10 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Op
     let (first, others) = sums.split_first()?;
     let about = |sum: &Sum<'_>| {
         let title = sum.node.title.as_ref().map_or(String::new(), |title| format!("\"{title}\", "));
-        match by_force {
-            true => format!("{title}follows the impulse within {} %", percent(sum.residual)),
-            false => format!("{title}starts at the same velocity"),
+        if by_force {
+            format!("{title}follows the impulse within {} %", percent(sum.residual))
+        } else {
+            format!("{title}starts at the same velocity")
         }
     };
     let others = others

@@ -24,12 +24,12 @@ impl<'a> Batches<'a> {
         let mut all: Vec<i64> = source.entities.iter().map(|entity| entity.id.id).collect();
         all.sort_unstable();
         all.dedup();
-        let ids = match all.len() <= at_once {
-            true => vec![None],
-            false => all
-                .chunks(at_once)
+        let ids = if all.len() <= at_once {
+            vec![None]
+        } else {
+            all.chunks(at_once)
                 .map(|ids| Some(ids.iter().map(|&id| WantedId { id, side: None }).collect()))
-                .collect(),
+                .collect()
         };
         Self { source, components, ids, held: None }
     }

@@ -166,11 +166,12 @@ fn force(measured: &Measured<'_>, given: &Given) -> Proposed<ForceSource> {
     if named.is_some() {
         return Proposed::found(source, Evidence::Given("by --force".into()));
     }
-    let evidence = match force.others.is_empty() {
-        true => Evidence::Computed("the only force along the motion, and the bodies follow it".into()),
-        false => Evidence::Guessed(
-            "of the forces that the bodies follow, the one with the largest impulse along the motion".into(),
-        ),
+    let evidence = if force.others.is_empty() {
+        Evidence::Computed("the only force along the motion, and the bodies follow it".into())
+    } else {
+        Evidence::Guessed(
+        "of the forces that the bodies follow, the one with the largest impulse along the motion".into(),
+    )
     };
     Proposed::found(source, evidence)
 }

@@ -28,9 +28,8 @@ pub(super) struct Explanation {
 /// The best node of a body for a force: its residual, and the sign of its mass.
 fn best(body: &Body, force: usize) -> (f64, f64) {
     let fits = body.nodes.iter().map(|node| node.fits[force]);
-    fits.fold((1.0, 0.0), |best, fit| match fit.residual < best.0 {
-        true => (fit.residual, fit.mass.signum()),
-        false => best,
+    fits.fold((1.0, 0.0), |best, fit| {
+        if fit.residual < best.0 { (fit.residual, fit.mass.signum()) } else { best }
     })
 }
 

@@ -70,9 +70,10 @@ pub(super) fn agree(
         for &(k, _) in one {
             let mut from = runs[k].1.evidence();
             if one.len() > 1 {
-                let range = match is_near(least, most, 5e-4) {
-                    true => "all alike".into(),
-                    false => format!("{} to {} kg", least.round(), most.round()),
+                let range = if is_near(least, most, 5e-4) {
+                    "all alike".into()
+                } else {
+                    format!("{} to {} kg", least.round(), most.round())
                 };
                 from = format!("{from}; median of {} runs, {range}", one.len());
             }
@@ -105,10 +106,7 @@ fn rounded(kg: f64) -> f64 {
 
 /// A mass as a study has it.
 pub(super) fn text(kg: f64) -> String {
-    match kg >= 1e3 {
-        true => format!("{}t", kg / 1e3),
-        false => format!("{kg}kg"),
-    }
+    if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
 }
 
 /// Of the masses of a pair whether they are one.

@@ -54,12 +54,13 @@ pub(crate) use scenario::propose_scenario;
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
-    match is_there {
-        true => Err(error!(
+    if is_there {
+        Err(error!(
             Study,
             "{path} is there already, and nothing is written over it: name another with -o, or remove it",
             path = path.display()
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }

@@ -91,9 +91,10 @@ impl Survey {
     /// Looks over a run. A recipe's force may be named, which is then kept however small it is.
     pub(super) fn of(sources: &Sources, named: Option<(&str, i64)>) -> Result<Self, Reason> {
         let source = &sources.motion;
-        let components = match source.has("x_velocity") {
-            true => DisplacementComponent::ALL.map(DisplacementComponent::velocity),
-            false => DisplacementComponent::ALL.map(DisplacementComponent::name),
+        let components = if source.has("x_velocity") {
+            DisplacementComponent::ALL.map(DisplacementComponent::velocity)
+        } else {
+            DisplacementComponent::ALL.map(DisplacementComponent::name)
         };
         let mut nodes = Batches::new(source, components.to_vec());
         let (starts, time) = starts(&mut nodes, source)?;

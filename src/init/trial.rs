@@ -32,8 +32,9 @@ pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<
             }
         }
     }
-    match proposal.runs.is_empty() {
-        true => Err(no_usable_run(&proposal.left_out, &proposal.warnings)),
-        false => Ok(()),
+    if proposal.runs.is_empty() {
+        Err(no_usable_run(&proposal.left_out, &proposal.warnings))
+    } else {
+        Ok(())
     }
 }

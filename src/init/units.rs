@@ -151,10 +151,8 @@ pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
             .sum();
         (agree.iter().filter(|agrees| **agrees).count(), unusual, agree)
     });
-    let best = agreeing.reduce(|a, b| match b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() {
-        true => b,
-        false => a,
-    });
+    let best =
+        agreeing.reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
     match best {
         Some((count, _, agree)) if count > 0 => agree,
         _ => vec![true; runs.len()],
@@ -193,9 +191,10 @@ fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence)> {
 }
 
 fn shown_speed(m_per_s: f64) -> String {
-    match (0.3..SPEED_M_PER_S.high).contains(&m_per_s) {
-        true => km_per_h(m_per_s),
-        false => format!("{} m/s", digits(m_per_s)),
+    if (0.3..SPEED_M_PER_S.high).contains(&m_per_s) {
+        km_per_h(m_per_s)
+    } else {
+        format!("{} m/s", digits(m_per_s))
     }
 }
 
@@ -226,9 +225,10 @@ pub(super) fn digits(value: f64) -> String {
 
 /// A decimal number without zeros at its end.
 pub(super) fn trimmed(number: &str) -> String {
-    match number.contains('.') {
-        true => number.trim_end_matches('0').trim_end_matches('.').into(),
-        false => number.into(),
+    if number.contains('.') {
+        number.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        number.into()
     }
 }
 

@@ -292,11 +292,12 @@ impl Chain {
         else {
             return wrong("a crush zone which is not there");
         };
-        match stopping.is_sound(body.mass_kg + zone.mass_kg) {
-            true => Ok(()),
-            false => wrong(
+        if stopping.is_sound(body.mass_kg + zone.mass_kg) {
+            Ok(())
+        } else {
+            wrong(
                 "a stopped mass that falls with the deflection, or is not less than its vehicle's: expected that of a vehicle not much heavier than this one",
-            ),
+            )
         }
     }
 
@@ -349,10 +350,8 @@ impl Chain {
     /// Time of free motion in s until the first gap or slack closes, and the times of each
     /// interface's; 0 if none closes.
     pub(super) fn flights(&self) -> (f64, Vec<(f64, f64)>) {
-        let flight = |gap_m: f64, closing: f64| match closing > 0.0 {
-            true => gap_m / closing,
-            false => f64::INFINITY,
-        };
+        let flight =
+            |gap_m: f64, closing: f64| if closing > 0.0 { gap_m / closing } else { f64::INFINITY };
         let speed = |i: usize| self.bodies.get(i).map_or(0.0, |b| b.speed_m_per_s);
         let flights: Vec<(f64, f64)> = self
             .interfaces

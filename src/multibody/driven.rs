@@ -19,10 +19,12 @@ impl ForceLaw {
     /// The law that follows a curve.
     pub fn of_curve(curve: &DrivingCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
-        let memory = |stiffness_n_per_m: f64| match stiffness_n_per_m > 0.0 {
-            true => Unloading::Memory { stiffness_n_per_m },
-            // A curve that never rises has no line to unload on.
-            false => Unloading::Elastic,
+        let memory = |stiffness_n_per_m: f64| {
+            if stiffness_n_per_m > 0.0 {
+                Unloading::Memory { stiffness_n_per_m }
+            } else {
+                Unloading::Elastic
+            }
         };
         let law = match unloading {
             UnloadingChoice::Own => {

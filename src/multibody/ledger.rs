@@ -99,10 +99,10 @@ impl Account {
         (ledger.kinetic_j, ledger.damped_j, ledger.resisted_j) =
             (now.kinetic_j, now.damped_j, now.resisted_j);
         let energy = now.kinetic_j + now.interfaces_j + now.damped_j + now.resisted_j;
-        let share = |difference: f64, scale: f64| match difference == 0.0 {
-            true => 0.0,
-            // What is not finite is out of any tolerance.
-            false => {
+        let share = |difference: f64, scale: f64| {
+            if difference == 0.0 {
+                0.0
+            } else {
                 Some(difference.abs() / scale).filter(|e| !e.is_nan()).unwrap_or(f64::INFINITY)
             }
         };

@@ -50,9 +50,8 @@ impl Layout {
     pub(crate) fn new(bodies: usize) -> Self {
         let rows = bodies.div_ceil(LANES);
         // Without a body that is only a pad, the last one stands behind the end.
-        let slot = |i: usize| match i < rows * LANES {
-            true => Slot::new(i % rows, i / rows),
-            false => Slot::new(rows, 0),
+        let slot = |i: usize| {
+            if i < rows * LANES { Slot::new(i % rows, i / rows) } else { Slot::new(rows, 0) }
         };
         Self((0..=bodies).map(slot).collect())
     }
@@ -124,21 +123,17 @@ impl Rows {
 /// Of the neighbours in front of row `c`; the last body never moves.
 #[inline(always)]
 pub(super) fn ahead(rows: &[Row], c: usize) -> Row {
-    match c + 1 < rows.len() {
-        true => rows[c + 1],
-        false => [rows[0][1], rows[0][2], rows[0][3], 0.0],
-    }
+    if c + 1 < rows.len() { rows[c + 1] } else { [rows[0][1], rows[0][2], rows[0][3], 0.0] }
 }
 
 /// Of the neighbours behind row `c`; there is nothing behind the first body.
 #[inline(always)]
 pub(super) fn behind(rows: &[Row], c: usize) -> Row {
-    match c > 0 {
-        true => rows[c - 1],
-        false => {
-            let last = &rows[rows.len() - 1];
-            [0.0, last[0], last[1], last[2]]
-        }
+    if c > 0 {
+        rows[c - 1]
+    } else {
+        let last = &rows[rows.len() - 1];
+        [0.0, last[0], last[1], last[2]]
     }
 }
 

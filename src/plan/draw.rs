@@ -109,9 +109,10 @@ impl Distribution {
     /// # Errors
     /// [`Error`] if the ends are not in order.
     pub(crate) fn uniform(from: f64, to: f64) -> Result<Self, Error> {
-        match from < to {
-            true => Ok(Self::Uniform { from, to }),
-            false => Err(error!(Sweep at "to", "from must lie below to")),
+        if from < to {
+            Ok(Self::Uniform { from, to })
+        } else {
+            Err(error!(Sweep at "to", "from must lie below to"))
         }
     }
 
@@ -120,9 +121,10 @@ impl Distribution {
     /// # Errors
     /// [`Error`] if the three are not in order.
     pub(crate) fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, Error> {
-        match from < to && from <= mode && mode <= to {
-            true => Ok(Self::Triangular { from, mode, to }),
-            false => Err(error!(Sweep at "mode", "from, mode and to must rise")),
+        if from < to && from <= mode && mode <= to {
+            Ok(Self::Triangular { from, mode, to })
+        } else {
+            Err(error!(Sweep at "mode", "from, mode and to must rise"))
         }
     }
 
@@ -163,9 +165,10 @@ impl Distribution {
             Self::Uniform { from, to } => (from + share * (to - from)).clamp(*from, *to),
             Self::Triangular { from, mode, to } => {
                 let (width, rise) = (to - from, mode - from);
-                let value = match share * width < rise {
-                    true => from + (share * width * rise).sqrt(),
-                    false => to - ((1.0 - share) * width * (to - mode)).sqrt(),
+                let value = if share * width < rise {
+                    from + (share * width * rise).sqrt()
+                } else {
+                    to - ((1.0 - share) * width * (to - mode)).sqrt()
                 };
                 value.clamp(*from, *to)
             }
@@ -199,10 +202,7 @@ fn normal_quantile(share: f64) -> f64 {
     let tail = if q < 0.0 { share } else { 1.0 - share };
     // Beyond what a double tells from 0 the quantile is about −38.
     let r = (-libm::log(tail.max(f64::MIN_POSITIVE))).sqrt();
-    let z = match r <= 5.0 {
-        true => ratio(r - 1.6, &MIDDLE),
-        false => ratio(r - 5.0, &TAIL),
-    };
+    let z = if r <= 5.0 { ratio(r - 1.6, &MIDDLE) } else { ratio(r - 5.0, &TAIL) };
     if q < 0.0 { -z } else { z }
 }
 

@@ -37,10 +37,7 @@ fn segment(a: Point, b: Point, [left, top, right, bottom]: [f64; 4]) -> Option<(
             continue;
         }
         let share = room / towards;
-        match towards < 0.0 {
-            true => from = from.max(share),
-            false => to = to.min(share),
-        }
+        if towards < 0.0 { from = from.max(share) } else { to = to.min(share) }
     }
     let at = |t: f64, end: Point| match t {
         0.0 | 1.0 => end,

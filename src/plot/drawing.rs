@@ -161,9 +161,10 @@ impl Text {
     fn area(&self) -> [f64; 4] {
         let width = font::width(&self.text, self.size);
         let (up, down) = (font::ASCENT * self.size, font::DESCENT * self.size);
-        match self.is_upright {
-            true => [self.x - up, self.y - width, self.x + down, self.y],
-            false => [self.x, self.y - up, self.x + width, self.y + down],
+        if self.is_upright {
+            [self.x - up, self.y - width, self.x + down, self.y]
+        } else {
+            [self.x, self.y - up, self.x + width, self.y + down]
         }
     }
 }

@@ -70,10 +70,7 @@ pub(super) fn fitted(text: &str, size: f64, most: f64) -> String {
     let (mut fits, mut too_wide) = (0, letters.len());
     while fits + 1 < too_wide {
         let kept = fits.midpoint(too_wide);
-        match width(&shortened(kept), size) <= most {
-            true => fits = kept,
-            false => too_wide = kept,
-        }
+        if width(&shortened(kept), size) <= most { fits = kept } else { too_wide = kept }
     }
     shortened(fits)
 }

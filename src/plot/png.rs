@@ -105,9 +105,10 @@ fn draw_text(map: &mut Pixmap, text: &Text, whole: Transform) {
     let s = (text.size / font::units_per_em()) as f32;
     let (x, y) = (text.x as f32, text.y as f32);
     // Outlines have y upwards; an upright text runs upwards.
-    let place = match text.is_upright {
-        true => Transform::from_row(0.0, -s, -s, 0.0, x, y),
-        false => Transform::from_row(s, 0.0, 0.0, -s, x, y),
+    let place = if text.is_upright {
+        Transform::from_row(0.0, -s, -s, 0.0, x, y)
+    } else {
+        Transform::from_row(s, 0.0, 0.0, -s, x, y)
     };
     map.fill_path(&path, &ink(text.paint, 1.0), FillRule::Winding, place.post_concat(whole), None);
 }

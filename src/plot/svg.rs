@@ -164,11 +164,10 @@ fn looks(stroke: Option<&Stroke>, fill: Option<(Paint, f64)>, target: SvgFor) ->
     let in_page = target == SvgFor::Page;
     let mut classes = Vec::new();
     if let Some((paint, opacity)) = fill {
-        match in_page {
-            true => classes.push(format!("f-{}", class(paint))),
-            false => {
-                let _ = write!(looks, r#" fill="{}""#, colour(paint));
-            }
+        if in_page {
+            classes.push(format!("f-{}", class(paint)))
+        } else {
+            let _ = write!(looks, r#" fill="{}""#, colour(paint));
         }
         if opacity < 1.0 {
             let _ = write!(looks, r#" fill-opacity="{opacity}""#);
@@ -209,9 +208,10 @@ fn write_text(out: &mut String, text: &Text, target: SvgFor) {
     let (x, y, said) = (number(text.x), number(text.y), escaped(&text.text));
     let turned = if text.is_upright { " rotate(-90)" } else { "" };
     if target == SvgFor::Page {
-        let place = match text.is_upright {
-            true => format!(r#"transform="translate({x} {y}){turned}""#),
-            false => format!(r#"x="{x}" y="{y}""#),
+        let place = if text.is_upright {
+            format!(r#"transform="translate({x} {y}){turned}""#)
+        } else {
+            format!(r#"x="{x}" y="{y}""#)
         };
         let size = match text.size {
             SIZE => String::new(),

@@ -58,10 +58,7 @@ pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Column
         let number = |field: usize| {
             row.number(field).map_err(|NoNumber { line, column, found, is_number }| {
                 let name = header[field].to_string();
-                match is_number {
-                    true => error!(Rating, "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value"),
-                    false => error!(Rating, "line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\""),
-                }
+                if is_number { error!(Rating, "line {line}, column {column} (\"{name}\"): expected a finite number, found \"{found}\": remove the lines without a value") } else { error!(Rating, "line {line}, column {column} (\"{name}\"): expected a number, found \"{found}\"") }
             })
         };
         let (at, value) = (number(0)?, number(column)?);

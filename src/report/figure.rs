@@ -135,8 +135,5 @@ fn number(value: f64) -> Value {
     }
     let digits: f64 = format!("{value:.4e}").parse().unwrap_or(value);
     // Whole numbers are shorter without their point.
-    match digits.fract() == 0.0 && digits.abs() < 1e9 {
-        true => json!(digits as i64),
-        false => json!(digits),
-    }
+    if digits.fract() == 0.0 && digits.abs() < 1e9 { json!(digits as i64) } else { json!(digits) }
 }

@@ -10,10 +10,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// `4.5 %`.
 pub(super) fn percent(share: f64) -> String {
-    match share.is_finite() {
-        true => format!("{:.1} %", 100.0 * share),
-        false => "–".into(),
-    }
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
 }
 
 /// `−4.5 %`, `+4.5 %`.

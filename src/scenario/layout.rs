@@ -125,9 +125,10 @@ pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
 /// What acts between two ends, or an end and the wall: plates if `end` comes from a model, as the
 /// other one then does.
 fn joint<'a>(end: Option<CrushZone<'a>>, curve: Option<&'a str>) -> Joint<'a> {
-    match end.is_some_and(|end| end.is_of_model()) {
-        true => Joint::Plates,
-        false => Joint::Curve(curve.unwrap_or_default()),
+    if end.is_some_and(|end| end.is_of_model()) {
+        Joint::Plates
+    } else {
+        Joint::Curve(curve.unwrap_or_default())
     }
 }
 
@@ -164,17 +165,17 @@ impl<'a> Layout<'a> {
         let plates_kg = plate_kg * plates.count() as f64;
         let within = |zone_name: &str, zone: &CrushZone<'a>, body: usize, zone_body: usize| Slot {
             name: format!("{zone_name}|{name}"),
-            joint: match zone.is_of_model() {
-                false => Joint::Curve(zone.curve),
-                // Which vehicles meet there is known when all stand in their row.
-                true => Joint::End(End {
+            joint: if !zone.is_of_model() {
+                Joint::Curve(zone.curve)
+            } else {
+                Joint::End(End {
                     curve: zone.curve,
                     body,
                     zone: zone_body,
                     behind: body,
                     ahead: None,
                     at: Role::Wall,
-                }),
+                })
             },
             gap_m: Some(0.0),
             role: Role::Within,

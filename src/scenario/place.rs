@@ -90,9 +90,10 @@ impl Scenario {
             let own = if end == "front" { &table.front } else { &table.rear };
             table.name == vehicle && own.is_some()
         });
-        match has_own {
-            true => self.vehicle(vehicle).key(end).key("curve"),
-            false => self.vehicle(vehicle).key("ends"),
+        if has_own {
+            self.vehicle(vehicle).key(end).key("curve")
+        } else {
+            self.vehicle(vehicle).key("ends")
         }
     }
 

@@ -12,10 +12,7 @@ impl Cholesky {
         for r in 0..n {
             for c in 0..=r {
                 let rest = entry(r, c) - dot(&l[r][..c], &l[c][..c]);
-                l[r][c] = match r == c {
-                    true => rest.max(f64::MIN_POSITIVE).sqrt(),
-                    false => rest / l[c][c],
-                };
+                l[r][c] = if r == c { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / l[c][c] };
             }
         }
         Self { rows: l }

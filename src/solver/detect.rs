@@ -32,10 +32,7 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
         Some(format) if is_lsdyna => Ok(format),
         _ => Err(ReadError::UnknownFormat {
             path: path.into(),
-            looks_like: match is_lsdyna {
-                true => "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
-                false => NOT_RECOGNISED,
-            }
+            looks_like: if is_lsdyna { "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header" } else { NOT_RECOGNISED }
             .into(),
             known: format_names(),
         }),

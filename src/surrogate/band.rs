@@ -199,9 +199,10 @@ pub(crate) fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
 /// How far `v` lies outside of training speeds, which do not fall; 0 between them.
 pub(crate) fn distance_outside_m_per_s(speeds: &[f64], v: f64) -> f64 {
     let (Some(&low), Some(&high)) = (speeds.first(), speeds.last()) else { return 0.0 };
-    match is_same_speed(low, v) || is_same_speed(high, v) {
-        true => 0.0,
-        false => (low - v).max(v - high).max(0.0),
+    if is_same_speed(low, v) || is_same_speed(high, v) {
+        0.0
+    } else {
+        (low - v).max(v - high).max(0.0)
     }
 }
 

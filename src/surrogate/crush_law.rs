@@ -91,9 +91,10 @@ impl CrushLaw {
     pub(super) fn check(&self) -> Result<(), String> {
         Rate::of(self.sensitivity, None).check_sensitivity()?;
         Rate::of(self.of_impact, None).check_sensitivity()?;
-        match self.stopped.is_sound() {
-            true => Ok(()),
-            false => Err("the stopped mass of its crush law is none".into()),
+        if self.stopped.is_sound() {
+            Ok(())
+        } else {
+            Err("the stopped mass of its crush law is none".into())
         }
     }
 
@@ -131,12 +132,11 @@ impl CrushLaw {
             curves: self.crush_forces(contact),
             rate: self.rate(),
         });
-        match kept.of.iter().copied().eq(of()) {
-            true => kept.rate.standing_n(&kept.curves, speed_m_per_s, deflection_m),
-            false => {
-                let curves = self.crush_forces(contact);
-                self.rate().standing_n(&curves, speed_m_per_s, deflection_m)
-            }
+        if kept.of.iter().copied().eq(of()) {
+            kept.rate.standing_n(&kept.curves, speed_m_per_s, deflection_m)
+        } else {
+            let curves = self.crush_forces(contact);
+            self.rate().standing_n(&curves, speed_m_per_s, deflection_m)
         }
     }
 

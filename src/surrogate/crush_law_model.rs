@@ -73,11 +73,10 @@ fn over_interval(
     };
     let mean_n = |((&d, &f), u): ((&f64, &f64), &f64)| {
         let half_m = (0.5 * interval_s * u).min(end_m - d);
-        match half_m > LEAST_WAY_M {
-            true => {
-                (force.work_to(d + half_m) - force.work_to((d - half_m).abs())) / (2.0 * half_m)
-            }
-            false => f,
+        if half_m > LEAST_WAY_M {
+            (force.work_to(d + half_m) - force.work_to((d - half_m).abs())) / (2.0 * half_m)
+        } else {
+            f
         }
     };
     along_m.iter().zip(force_n).zip(closing_m_per_s).map(mean_n).collect()

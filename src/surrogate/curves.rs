@@ -24,12 +24,13 @@ impl CaseCurve {
         force_n: Vec<f64>,
         closing_m_per_s: Vec<f64>,
     ) -> Result<Self, Error> {
-        let closing = match closing_m_per_s.is_empty() {
-            true => None,
-            false => Some(
+        let closing = if closing_m_per_s.is_empty() {
+            None
+        } else {
+            Some(
                 Envelope::new(deflection_m.clone(), closing_m_per_s)
                     .map_err(|e| e.coded(ErrorCode::Model))?,
-            ),
+            )
         };
         let envelope =
             Envelope::new(deflection_m, force_n).map_err(|e| e.coded(ErrorCode::Model))?;

@@ -177,10 +177,7 @@ impl Landmarks {
                     track.positions.iter().map(|&(i, d)| (cases[i].speed_m_per_s, d)).collect();
                 let (low, high) = (points.first()?.0, points.last()?.0);
                 // Beyond the speeds that have it a parabola would run away.
-                let degree = match (low..=high).contains(&v) {
-                    true => (points.len() - 1).min(2),
-                    false => 1,
-                };
+                let degree = if (low..=high).contains(&v) { (points.len() - 1).min(2) } else { 1 };
                 let d = least_squares(&points, degree)?.at(v);
                 (d > 0.0).then_some((k, d))
             })

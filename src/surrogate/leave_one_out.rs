@@ -137,9 +137,10 @@ pub struct Scatter {
 impl Scatter {
     /// That of one of the forces of a group that declares `declared`.
     pub(crate) fn of_force(&self, force: ForceKind, declared: ForceKind) -> Option<ForceScatter> {
-        let (force_share, largest_force_share) = match force == declared {
-            true => (self.force_share, self.largest_force_share),
-            false => self.body.map(|body| (body.force_share, body.largest_force_share))?,
+        let (force_share, largest_force_share) = if force == declared {
+            (self.force_share, self.largest_force_share)
+        } else {
+            self.body.map(|body| (body.force_share, body.largest_force_share))?
         };
         let degrees_of_freedom = self.degrees_of_freedom;
         Some(ForceScatter { degrees_of_freedom, force_share, largest_force_share })

@@ -177,12 +177,11 @@ pub(super) fn by_all_rules(
     kinetic_j: f64,
 ) -> MaxCrush {
     // Crush over speed is a function only if nothing else differs.
-    let points: Vec<(f64, f64)> = match model.features.is_empty() {
-        true => {
-            let whole = model.cases.iter().filter(|c| !c.truncated);
-            whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect()
-        }
-        false => Vec::new(),
+    let points: Vec<(f64, f64)> = if model.features.is_empty() {
+        let whole = model.cases.iter().filter(|c| !c.truncated);
+        whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect()
+    } else {
+        Vec::new()
     };
     let spline_m = spline(&points, v);
     let monotone_m = monotone(&points, v);

@@ -88,9 +88,10 @@ impl Model {
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
         let curves = Curves::of(&cases)?;
-        let switches = match set.features.is_empty() {
-            true => Landmarks::of(&curves.declared).jumps,
-            false => Vec::new(),
+        let switches = if set.features.is_empty() {
+            Landmarks::of(&curves.declared).jumps
+        } else {
+            Vec::new()
         };
         let speed = |i: usize| cases[i].speed_m_per_s;
         let needed_law = if kind.entry().needs_crush_law {
@@ -113,9 +114,10 @@ impl Model {
             features: set.features.clone(),
             training_hash: set.hash(),
             // Crush over speed is a function only if nothing else differs.
-            max_crush_rule: match set.features.is_empty() {
-                true => kind.entry().crush_rule,
-                false => MaxCrushRule::Motion,
+            max_crush_rule: if set.features.is_empty() {
+                kind.entry().crush_rule
+            } else {
+                MaxCrushRule::Motion
             },
             mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
             leave_one_out: None,
@@ -137,10 +139,7 @@ impl Model {
     /// the error, the error or the error.
     pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
         Self::check_inputs(set, kind)?;
-        match kind.entry().needs_crush_law {
-            true => Self::fit_curves(set, kind).map(|_| ()),
-            false => Ok(()),
-        }
+        if kind.entry().needs_crush_law { Self::fit_curves(set, kind).map(|_| ()) } else { Ok(()) }
     }
 
     /// Whether number and parameters of the set's cases serve the model.
@@ -196,9 +195,10 @@ impl Model {
         force: ForceKind,
     ) -> Result<Option<Band>, Warning> {
         let Some(of) = &self.leave_one_out else { return Ok(None) };
-        let (inner, ends) = match force == self.force_kind {
-            true => (of.band, of.band_outside),
-            false => (of.body_band, of.body_band_outside),
+        let (inner, ends) = if force == self.force_kind {
+            (of.band, of.band_outside)
+        } else {
+            (of.body_band, of.body_band_outside)
         };
         if inner.or(ends).is_none() {
             return Ok(None);

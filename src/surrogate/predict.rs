@@ -204,9 +204,10 @@ impl<'a> Prediction<'a> {
         let motion = &self.motion;
         let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;
         let body_n = || deflection_m.iter().map(|&d| motion.body.force_at(d)).collect();
-        let body = match motion.asked.model.has_body_force() {
-            true => Some(self.corrected(&deflection_m, body_n())?.envelope),
-            false => None,
+        let body = if motion.asked.model.has_body_force() {
+            Some(self.corrected(&deflection_m, body_n())?.envelope)
+        } else {
+            None
         };
         let mut warnings = motion.asked.model.warnings(&motion.asked.at());
         warnings.extend(declared.factor.map(Warning::energy_corrected));

@@ -337,9 +337,10 @@ impl PredictedCurve {
 
     /// Lower and upper edge of the band of one of its forces, in N.
     fn edges(&self, force: ForceKind) -> (Option<&Vec<f64>>, Option<&Vec<f64>>) {
-        match force == ForceKind::Body && self.body_force_n.is_some() {
-            true => (self.body_force_low_n.as_ref(), self.body_force_high_n.as_ref()),
-            false => (self.force_low_n.as_ref(), self.force_high_n.as_ref()),
+        if force == ForceKind::Body && self.body_force_n.is_some() {
+            (self.body_force_low_n.as_ref(), self.body_force_high_n.as_ref())
+        } else {
+            (self.force_low_n.as_ref(), self.force_high_n.as_ref())
         }
     }
 

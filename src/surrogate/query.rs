@@ -227,12 +227,11 @@ fn relative_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64> {
     let [one, of_v, of_square, right, right_v] = sums;
     let determinant = one * of_square - of_v * of_v;
     let level = right / one;
-    let line = match determinant > 1e-9 * one * of_square {
-        true => {
-            let b = (one * right_v - of_v * right) / determinant;
-            ((right - b * of_v) / one, b)
-        }
-        false => (level, 0.0),
+    let line = if determinant > 1e-9 * one * of_square {
+        let b = (one * right_v - of_v * right) / determinant;
+        ((right - b * of_v) / one, b)
+    } else {
+        (level, 0.0)
     };
     let is_sound = points.iter().all(|&(v, _)| line.0 + line.1 * v > 0.0);
     let (a, b) = if is_sound { line } else { (level, 0.0) };

@@ -237,9 +237,10 @@ impl Rate {
 
     /// Whether β is one that a fit gives.
     pub(super) fn check_sensitivity(&self) -> Result<(), String> {
-        match (0.0..=MOST).contains(&self.sensitivity) {
-            true => Ok(()),
-            false => Err(format!("its rate sensitivity is {}", self.sensitivity)),
+        if (0.0..=MOST).contains(&self.sensitivity) {
+            Ok(())
+        } else {
+            Err(format!("its rate sensitivity is {}", self.sensitivity))
         }
     }
 
@@ -249,10 +250,7 @@ impl Rate {
         let kept = self
             .levels
             .get_or_compute(|| Levels { of: of().collect(), levels: self.find_levels(cases) });
-        match kept.of.iter().copied().eq(of()) {
-            true => kept.levels.clone(),
-            false => self.find_levels(cases),
-        }
+        if kept.of.iter().copied().eq(of()) { kept.levels.clone() } else { self.find_levels(cases) }
     }
 
     fn find_levels(&self, cases: &[CaseCurve]) -> Vec<f64> {

@@ -58,18 +58,16 @@ pub(super) fn is_far_outside(speed_m_per_s: f64, low: f64, high: f64) -> bool {
 
 /// `9 km/h is 16 km/h below the lowest training speed (25 km/h to 72 km/h)`.
 pub(super) fn outside_of(speed_m_per_s: f64, low: f64, high: f64) -> String {
-    let (side, by) = match speed_m_per_s < low {
-        true => ("below the lowest", low - speed_m_per_s),
-        false => ("above the highest", speed_m_per_s - high),
+    let (side, by) = if speed_m_per_s < low {
+        ("below the lowest", low - speed_m_per_s)
+    } else {
+        ("above the highest", speed_m_per_s - high)
     };
     let (speed, by) = (km_per_h(speed_m_per_s), km_per_h(by));
-    match low == high {
-        true => format!("{speed} is {by} from {}, the one training speed", km_per_h(low)),
-        false => format!(
-            "{speed} is {by} {side} training speed ({} to {})",
-            km_per_h(low),
-            km_per_h(high)
-        ),
+    if low == high {
+        format!("{speed} is {by} from {}, the one training speed", km_per_h(low))
+    } else {
+        format!("{speed} is {by} {side} training speed ({} to {})", km_per_h(low), km_per_h(high))
     }
 }
 
@@ -100,9 +98,10 @@ impl fmt::Display for Warning {
 
 impl Warning {
     pub(crate) fn out_of_range(speed_m_per_s: f64, low: f64, high: f64) -> Self {
-        let far = match is_far_outside(speed_m_per_s, low, high) {
-            true => " by more than a third of the range",
-            false => "",
+        let far = if is_far_outside(speed_m_per_s, low, high) {
+            " by more than a third of the range"
+        } else {
+            ""
         };
         Self {
             code: WarningCode::OutOfRange,

@@ -91,14 +91,13 @@ pub fn write(
     file.sync_all().map_err(&write_failed)?;
     drop(file);
     if tally.done == tally.rows {
-        match is_hdf5(output) {
-            true => {
-                let finished = ShardFile { path: part.clone(), head: head.clone() };
-                to_hdf5::convert(&[finished], &head, output)?;
-                // What remains is only the space it takes.
-                let _ = fs::remove_file(&part);
-            }
-            false => fs::rename(&part, output).map_err(&write_failed)?,
+        if is_hdf5(output) {
+            let finished = ShardFile { path: part.clone(), head: head.clone() };
+            to_hdf5::convert(&[finished], &head, output)?;
+            // What remains is only the space it takes.
+            let _ = fs::remove_file(&part);
+        } else {
+            fs::rename(&part, output).map_err(&write_failed)?
         }
     }
     Ok(tally.close())

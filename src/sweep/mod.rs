@@ -216,11 +216,10 @@ impl Sweep {
 fn results(plan: &Plan) -> Result<Vec<ResultName>, Error> {
     let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
-    match kept.len() == asked.len() && !kept.is_empty() {
-        true => Ok(kept),
-        false => Err(
-            error!(Sweep at "results", "sweep.results: name each result once, and at least one"),
-        ),
+    if kept.len() == asked.len() && !kept.is_empty() {
+        Ok(kept)
+    } else {
+        Err(error!(Sweep at "results", "sweep.results: name each result once, and at least one"))
     }
 }
 

@@ -61,10 +61,8 @@ impl Statistics {
             max: f64::NEG_INFINITY,
             sample: Vec::new(),
         };
-        let threshold = match rows <= SAMPLE {
-            true => u64::MAX,
-            false => (u64::MAX / rows).saturating_mul(SAMPLE),
-        };
+        let threshold =
+            if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) };
         Self { columns: columns.iter().map(column).collect(), threshold }
     }
 

@@ -278,12 +278,11 @@ impl Binder<'_> {
     }
 
     fn known_curve(&self, key: &str, curve: &str) -> Result<(), Error> {
-        match self.scenario.curves.contains_key(curve) {
-            true => Ok(()),
-            false => {
-                let known = self.scenario.curves.keys().map(String::as_str);
-                Err(unknown(key, "curve", curve, known))
-            }
+        if self.scenario.curves.contains_key(curve) {
+            Ok(())
+        } else {
+            let known = self.scenario.curves.keys().map(String::as_str);
+            Err(unknown(key, "curve", curve, known))
         }
     }
 
@@ -296,12 +295,13 @@ impl Binder<'_> {
         let mut scenario = self.scenario.clone();
         let used = scenario.curve_names_mut().iter().any(|name| *name == curve)
             || self.plan.vary.iter().any(replaces);
-        match used {
-            true => Ok(()),
-            false => Err(
+        if used {
+            Ok(())
+        } else {
+            Err(
                 error!(Sweep at "curve", "no interface has curve \"{curve}\", so varying it has no effect"
                 ),
-            ),
+            )
         }
     }
 }
@@ -313,13 +313,14 @@ fn unknown<'a>(key: &str, what: &str, name: &str, known: impl Iterator<Item = &'
 /// Names stand in the columns of the result.
 fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
-    match name.is_empty() || name.contains(breaks) {
-        true => Err(
+    if name.is_empty() || name.contains(breaks) {
+        Err(
             error!(Sweep at key, "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
                 name.escape_debug()
             ),
-        ),
-        false => Ok(()),
+        )
+    } else {
+        Ok(())
     }
 }
 

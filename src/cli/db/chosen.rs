@@ -34,11 +34,12 @@ impl Chosen {
     /// The same, which may not be everything by mistake; `what` is what happens to the cases.
     pub(super) fn some(&self, what: &str) -> Result<Selection, Failure> {
         let selection = self.selection();
-        match selection.is_all() {
-            true => Err(Failure::Usage(format!(
+        if selection.is_all() {
+            Err(Failure::Usage(format!(
                 "say which cases are {what}: with --group, --case, --speed or --tag"
-            ))),
-            false => Ok(selection),
+            )))
+        } else {
+            Ok(selection)
         }
     }
 }

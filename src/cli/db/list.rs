@@ -38,9 +38,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
     // A database without cases has nothing to list, which is no error.
-    let cases: Vec<&Case> = match selection.is_all() {
-        true => database.all().collect(),
-        false => selection.find(&args.database, &database)?,
+    let cases: Vec<&Case> = if selection.is_all() {
+        database.all().collect()
+    } else {
+        selection.find(&args.database, &database)?
     };
     let mut groups: BTreeMap<String, Vec<CaseRow>> = BTreeMap::new();
     for case in cases {

@@ -47,9 +47,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if args.compare {
         return compare(&args.in_order(&selection, &database)?, options);
     }
-    let cases: Vec<&Case> = match selection.is_all() {
-        true => database.all().collect(),
-        false => selection.find(&args.database, &database)?,
+    let cases: Vec<&Case> = if selection.is_all() {
+        database.all().collect()
+    } else {
+        selection.find(&args.database, &database)?
     };
     show(&cases, options)
 }
@@ -140,9 +141,8 @@ fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
         return Ok(Outcome::Clean);
     }
     let is_one_group = cases.iter().all(|case| case.id.group == cases[0].id.group);
-    let name = |case: &Difference| match is_one_group {
-        true => case.case.clone(),
-        false => format!("{}/{}", case.group, case.case),
+    let name = |case: &Difference| {
+        if is_one_group { case.case.clone() } else { format!("{}/{}", case.group, case.case) }
     };
     let names: Vec<String> = comparison.cases.iter().map(name).collect();
     let heading: Vec<&str> = [if is_one_group { cases[0].id.group.as_str() } else { "" }]
@@ -186,15 +186,12 @@ const QUANTITIES: [Quantity; 7] = [
         Some(l1) => format!("{:.1} %", l1 * 100.0),
         None => "-".into(),
     }),
-    ("up to", |c, first| match first {
-        true => "-".into(),
-        false => format!("{:.4} m", c.common_deflection_m),
-    }),
+    (
+        "up to",
+        |c, first| if first { "-".into() } else { format!("{:.4} m", c.common_deflection_m) },
+    ),
 ];
 
 fn with_difference(value: String, difference: f64, is_reference: bool) -> String {
-    match is_reference {
-        true => value,
-        false => format!("{value} {:>+7.1} %", difference * 100.0),
-    }
+    if is_reference { value } else { format!("{value} {:>+7.1} %", difference * 100.0) }
 }

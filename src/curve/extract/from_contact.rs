@@ -34,9 +34,10 @@ impl FromContact {
         if direction < 0.0 {
             remarks.note("deflection: sign flipped, positive in compression");
         }
-        let start_s = match offset_m < 0.0 {
-            false => contact_s,
-            true => closed_s(record, contact_s, -offset_m, most_m, travel)?,
+        let start_s = if offset_m >= 0.0 {
+            contact_s
+        } else {
+            closed_s(record, contact_s, -offset_m, most_m, travel)?
         };
         if offset_m != 0.0 {
             remarks.note(format!("offset: the deflection at contact is {} mm", offset_m * 1e3));
@@ -74,10 +75,8 @@ fn closed_s(
     let i = (next..record.time_s.len())
         .find(|&i| travel(i) >= slack_m)
         .ok_or(ExtractError::OffsetTooLarge { offset_m: -slack_m, most_m })?;
-    let (from_s, from_m) = match i == next {
-        true => (contact_s, 0.0),
-        false => (record.time_s[i - 1], travel(i - 1)),
-    };
+    let (from_s, from_m) =
+        if i == next { (contact_s, 0.0) } else { (record.time_s[i - 1], travel(i - 1)) };
     let share = (slack_m - from_m) / (travel(i) - from_m);
     Ok(from_s + share * (record.time_s[i] - from_s))
 }

@@ -238,10 +238,7 @@ fn resampling(points: &[(f64, f64)]) -> usize {
     let smallest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
     let reach = points[points.len() - 1].0 - points[0].0;
     let intervals = (reach / smallest - 1e-6).ceil();
-    match intervals < 100.0 {
-        true => 0,
-        false => (intervals as usize + 1).min(MOST_RESAMPLED),
-    }
+    if intervals < 100.0 { 0 } else { (intervals as usize + 1).min(MOST_RESAMPLED) }
 }
 
 /// A number in a field of ten columns, with as many digits as fit.

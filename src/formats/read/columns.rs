@@ -17,13 +17,14 @@ pub(super) const MAX_CURVES: usize = 10_000;
 
 /// Refuses one curve more than a file may have.
 pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
-    match curves > MAX_CURVES {
-        true => Err(error!(
+    if curves > MAX_CURVES {
+        Err(error!(
             CurveFile,
             "the file has more than {most} curves: take out the one that is meant",
             most = MAX_CURVES
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 
@@ -372,9 +373,10 @@ impl Points {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
         let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
         for i in 1..d.len() {
-            let (fits, way) = match i <= end {
-                true => (d[i] > d[i - 1], "increase up to the largest"),
-                false => (d[i] < d[i - 1], "decrease behind the largest"),
+            let (fits, way) = if i <= end {
+                (d[i] > d[i - 1], "increase up to the largest")
+            } else {
+                (d[i] < d[i - 1], "decrease behind the largest")
             };
             if !fits {
                 return Err(error!(

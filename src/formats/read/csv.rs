@@ -116,15 +116,10 @@ impl Table {
             Ok(row) => !is_bare && frame::is_row_of_units(&row.fields().collect::<Vec<_>>()),
             Err(_) => false,
         });
-        let layout = match has_names {
-            true => Layout::of(
-                &names,
-                line,
-                units_row.transpose().map_err(not_csv)?.as_ref(),
-                lack,
-                asked,
-            )?,
-            false => Layout::without_header(&header, units, asked)?,
+        let layout = if has_names {
+            Layout::of(&names, line, units_row.transpose().map_err(not_csv)?.as_ref(), lack, asked)?
+        } else {
+            Layout::without_header(&header, units, asked)?
         };
         table.notes.extend(layout.note());
         let taken = layout.sizes(units, &mut table.units_used, &mut table.notes)?;
@@ -171,13 +166,14 @@ impl Table {
             }
         }
         self.lines.push(row.line);
-        match self.lines.len() > MAX_POINTS {
-            true => Err(error!(
+        if self.lines.len() > MAX_POINTS {
+            Err(error!(
                 CurveFile,
                 "the curve has more than {most} points: thin it",
                 most = MAX_POINTS
-            )),
-            false => Ok(()),
+            ))
+        } else {
+            Ok(())
         }
     }
 }

@@ -160,9 +160,10 @@ impl Frame {
     /// What was skipped, in one line; `None` if nothing was.
     pub(super) fn note(&self) -> Option<String> {
         let ((first, _), (last, _)) = (self.titles.first()?, self.titles.last()?);
-        let lines = match first == last {
-            true => format!("line {first} is a title"),
-            false => format!("lines {first} to {last} are titles"),
+        let lines = if first == last {
+            format!("line {first} is a title")
+        } else {
+            format!("lines {first} to {last} are titles")
         };
         let shown = self.titles.iter().take(TITLES).map(|(_, title)| super::error::shown(title));
         let more = if self.titles.len() > TITLES { ", …" } else { "" };
@@ -262,9 +263,10 @@ pub(super) fn names_both(names: &[String], asked: &[&str]) -> bool {
         names.iter().any(|name| Label::of_column(name).is_some_and(|l| l.quantity == quantity))
     };
     let is_asked = |asked: &&str| names.iter().any(|name| name.eq_ignore_ascii_case(asked));
-    match asked.iter().any(is_asked) {
-        true => names.len() > 1,
-        false => names.len() > 1 && has(Quantity::Deflection) && has(Quantity::Force),
+    if asked.iter().any(is_asked) {
+        names.len() > 1
+    } else {
+        names.len() > 1 && has(Quantity::Deflection) && has(Quantity::Force)
     }
 }
 

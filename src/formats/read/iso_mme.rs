@@ -30,12 +30,11 @@ pub(super) fn tests(folder: &Path) -> Vec<PathBuf> {
         names.filter(|path| has_extension(path, "mme") && !path.is_dir()).collect()
     };
     let own = of(folder);
-    match own.is_empty() {
-        false => own,
-        true => {
-            let within = names(folder).unwrap_or_default().into_iter();
-            within.filter(|path| path.is_dir() && !of(path).is_empty()).collect()
-        }
+    if !own.is_empty() {
+        own
+    } else {
+        let within = names(folder).unwrap_or_default().into_iter();
+        within.filter(|path| path.is_dir() && !of(path).is_empty()).collect()
     }
 }
 
@@ -278,9 +277,10 @@ impl Channel {
                 place = Place::Line(line)
             )));
         };
-        match found.values.len() == self.values.len() {
-            true => Ok(found.values.clone()),
-            false => Err(named(error!(
+        if found.values.len() == self.values.len() {
+            Ok(found.values.clone())
+        } else {
+            Err(named(error!(
                 CurveFile,
                 "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
                 declared = format!("{} times", found.values.len()),
@@ -288,7 +288,7 @@ impl Channel {
                 place = Place::Line(line),
                 remedy = "name the channel of its own times",
                 what = format!("the reference channel {}", found.code)
-            ))),
+            )))
         }
     }
 

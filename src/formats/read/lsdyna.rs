@@ -204,22 +204,26 @@ impl Deck {
         let fields = Fields::of(line, number, 20);
         curve.points.push((fields.number(0, false)?, fields.number(1, false)?));
         curve.lines.push(number);
-        match curve.points.len() > MAX_POINTS {
-            true => Err(error!(
+        if curve.points.len() > MAX_POINTS {
+            Err(error!(
                 CurveFile,
                 "the curve has more than {most} points: thin it",
                 most = MAX_POINTS
-            )),
-            false => Ok(()),
+            ))
+        } else {
+            Ok(())
         }
     }
 
     /// The curve of that number, or the only one.
     fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
         let known = || {
-            let shown = |c: &Found| match c.title.is_empty() {
-                true => c.id.to_string(),
-                false => format!("{} (\"{}\")", c.id, shown(&c.title)),
+            let shown = |c: &Found| {
+                if c.title.is_empty() {
+                    c.id.to_string()
+                } else {
+                    format!("{} (\"{}\")", c.id, shown(&c.title))
+                }
             };
             self.curves.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
         };
@@ -285,13 +289,14 @@ impl<'a> Fields<'a> {
     }
 
     fn place(&self, field: usize) -> Place {
-        match self.is_free {
-            true => Place::Field { line: self.line, field: field + 1 },
-            false => Place::Columns {
+        if self.is_free {
+            Place::Field { line: self.line, field: field + 1 }
+        } else {
+            Place::Columns {
                 line: self.line,
                 from: field * self.width + 1,
                 to: (field + 1) * self.width,
-            },
+            }
         }
     }
 

@@ -239,12 +239,9 @@ fn choose<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Mat
             ));
         }
     };
-    match table.rows > MAX_POINTS {
-        true => Err(error!(
-            CurveFile,
-            "the curve has more than {most} points: thin it",
-            most = MAX_POINTS
-        )),
-        false => Ok(table),
+    if table.rows > MAX_POINTS {
+        Err(error!(CurveFile, "the curve has more than {most} points: thin it", most = MAX_POINTS))
+    } else {
+        Ok(table)
     }
 }

@@ -222,12 +222,11 @@ pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
 /// It names the file, the place in it, what was expected there and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static Reader), Error> {
     let tests = if path.is_dir() { iso_mme::tests(path) } else { Vec::new() };
-    let (bytes, own) = match tests.is_empty() {
-        false => {
-            iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
-            (Vec::new(), None)
-        }
-        true => open(path).map(|(bytes, own)| (bytes, Some(own)))?,
+    let (bytes, own) = if !tests.is_empty() {
+        iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
+        (Vec::new(), None)
+    } else {
+        open(path).map(|(bytes, own)| (bytes, Some(own)))?
     };
     if bytes.starts_with(ZIP) {
         let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV";

@@ -40,12 +40,11 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
                 && file.units.is_none()
                 && input.options.units.is_none();
             let stated = if own { Some((UnitSystem::SI, table.line)) } else { file.units };
-            let system = match own {
-                true => {
-                    notes.push(format!("units: SI, as crumple export writes {OURS}"));
-                    UnitSystem::SI
-                }
-                false => units(stated, input.options.units, REMEDY, &mut notes)?,
+            let system = if own {
+                notes.push(format!("units: SI, as crumple export writes {OURS}"));
+                UnitSystem::SI
+            } else {
+                units(stated, input.options.units, REMEDY, &mut notes)?
             };
             (system.length_m, system.force(), Some(system))
         }
@@ -158,9 +157,10 @@ impl File {
     /// Whether the last table has all its values.
     fn check_last(&self) -> Result<(), Error> {
         let Some(table) = self.tables.last() else { return Ok(()) };
-        match table.values.len() == table.rows * table.columns {
-            true => Ok(()),
-            false => Err(error!(
+        if table.values.len() == table.rows * table.columns {
+            Ok(())
+        } else {
+            Err(error!(
                 CurveFile,
                 "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
                 declared = format!("{} rows of {}", table.rows, table.columns),
@@ -168,7 +168,7 @@ impl File {
                 place = Place::Line(table.line),
                 remedy = "write the file anew, it may be cut",
                 what = format!("table {}", table.name)
-            )),
+            ))
         }
     }
 
@@ -242,9 +242,10 @@ fn check_size(
             most = MAX_POINTS
         ));
     }
-    match rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
-        true => Ok(()),
-        false => Err(error!(
+    if rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
+        Ok(())
+    } else {
+        Err(error!(
             CurveFile,
             "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
             declared = format!("{rows} rows of {columns}"),
@@ -252,7 +253,7 @@ fn check_size(
             place = Place::Line(line),
             remedy = "correct the size",
             what = format!("table {}", shown(name))
-        )),
+        ))
     }
 }
 

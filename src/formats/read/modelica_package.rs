@@ -62,9 +62,10 @@ struct Array {
 
 impl Array {
     fn check(&self) -> Result<(), Error> {
-        match self.is_closed && self.values.len() == self.declared {
-            true => Ok(()),
-            false => Err(error!(
+        if self.is_closed && self.values.len() == self.declared {
+            Ok(())
+        } else {
+            Err(error!(
                 CurveFile,
                 "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
                 declared = format!("{} values", self.declared),
@@ -72,7 +73,7 @@ impl Array {
                 place = Place::Line(self.line),
                 remedy = "write the file anew, it may be cut",
                 what = format!("constant {}", self.name)
-            )),
+            ))
         }
     }
 }

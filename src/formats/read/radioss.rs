@@ -137,13 +137,14 @@ impl Deck {
                 let fields = Fields::of(line, at, WIDTH);
                 function.points.push((fields.number(0, false)?, fields.number(1, false)?));
                 function.lines.push(at);
-                match function.points.len() > MAX_POINTS {
-                    true => Err(error!(
+                if function.points.len() > MAX_POINTS {
+                    Err(error!(
                         CurveFile,
                         "the curve has more than {most} points: thin it",
                         most = MAX_POINTS
-                    )),
-                    false => Ok(Next::Point),
+                    ))
+                } else {
+                    Ok(Next::Point)
                 }
             }
             other => Ok(other),

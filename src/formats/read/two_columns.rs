@@ -209,13 +209,14 @@ impl Found {
         if let Some(pair) = pair(line) {
             self.points.push(pair);
             self.lines.push(at);
-            return match self.points.len() > MAX_POINTS {
-                true => Err(error!(
+            return if self.points.len() > MAX_POINTS {
+                Err(error!(
                     CurveFile,
                     "the curve has more than {most} points: thin it",
                     most = MAX_POINTS
-                )),
-                false => Ok(()),
+                ))
+            } else {
+                Ok(())
             };
         }
         if self.points.is_empty() && self.headers.len() < HEADERS {

@@ -55,9 +55,8 @@ impl<'a> Engine<'a> {
         for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
             let closing = self.closing(k);
             // Exactly 0 where contact begins, whatever the rounding.
-            let at = |begins_s: f64, closing: f64, gap_m: f64| match begins_s == flight_s {
-                true => 0.0,
-                false => closing * flight_s - gap_m,
+            let at = |begins_s: f64, closing: f64, gap_m: f64| {
+                if begins_s == flight_s { 0.0 } else { closing * flight_s - gap_m }
             };
             let deflection = at(flights[k].0, closing, interface.gap_m);
             self.push.set_start(k, deflection, closing > 0.0);

@@ -128,9 +128,10 @@ impl ForceLaw {
     pub(in super::super) fn branch(&self, i: usize, largest_m: f64) -> Branch {
         let top = self.on_envelope(i, largest_m);
         let (top_n, stored_j) = (top.force_n, self.stored_j(&top));
-        let length_m = match self.has_memory() && top_n > 0.0 && stored_j > 0.0 {
-            true => stored_j / (top_n * self.shape.share()),
-            false => 0.0, // the envelope itself has no force here
+        let length_m = if self.has_memory() && top_n > 0.0 && stored_j > 0.0 {
+            stored_j / (top_n * self.shape.share())
+        } else {
+            0.0
         };
         let (i_m, i_n) = (self.envelope.deflection_m()[i], self.envelope.force_n()[i]);
         let along = largest_m - i_m;

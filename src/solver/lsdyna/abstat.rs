@@ -67,9 +67,10 @@ impl Body for Abstat {
         if line.is_blank() || (text.starts_with(b"time   airbag/cv #") && line.is_heading()) {
             return;
         }
-        let read = match text.starts_with(MATERIAL) {
-            true => self.material(line, states),
-            false => self.row(line, states),
+        let read = if text.starts_with(MATERIAL) {
+            self.material(line, states)
+        } else {
+            self.row(line, states)
         };
         if read.is_none() {
             let found = shown(line.columns(1, 40));

@@ -29,9 +29,10 @@ const fn scales() -> [Scale; 256] {
         if -EXACT <= power && power <= EXACT {
             let digits = exponent.unsigned_abs() as usize;
             let index = if exponent < 0 { digits | NEGATIVE } else { digits };
-            table[index] = match power < 0 {
-                true => Scale { factor: 1.0, divisor: ten_to(-power) },
-                false => Scale { factor: ten_to(power), divisor: 1.0 },
+            table[index] = if power < 0 {
+                Scale { factor: 1.0, divisor: ten_to(-power) }
+            } else {
+                Scale { factor: ten_to(power), divisor: 1.0 }
             };
         }
         exponent += 1;

@@ -101,9 +101,10 @@ fn value_end(text: &[u8], from: usize) -> usize {
     let behind = text.get(from..).unwrap_or_default();
     let blanks = behind.iter().take_while(|b| b.is_ascii_whitespace()).count();
     let word = behind[blanks..].iter().take_while(|b| !b.is_ascii_whitespace()).count();
-    match is_whole_real(&behind[blanks..blanks + word]) {
-        true => from + blanks + word,
-        false => from + VALUE_WIDTH,
+    if is_whole_real(&behind[blanks..blanks + word]) {
+        from + blanks + word
+    } else {
+        from + VALUE_WIDTH
     }
 }
 

@@ -216,9 +216,10 @@ impl Group {
                 None => return Ok(None),
             },
         };
-        match codes.len() == variables {
-            true => Ok(Some(Self { kind, objects: named, codes })),
-            false => Ok(None),
+        if codes.len() == variables {
+            Ok(Some(Self { kind, objects: named, codes }))
+        } else {
+            Ok(None)
         }
     }
 

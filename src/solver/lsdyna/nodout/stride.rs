@@ -262,9 +262,10 @@ impl Stride {
                 return Ok(None);
             }
             let rows_at = at + block.rows_at;
-            let read = match dense {
-                true => block.read_all(window, rows_at, wanted, audit, out)?,
-                false => block.read_some(window, rows_at, wanted, out)?,
+            let read = if dense {
+                block.read_all(window, rows_at, wanted, audit, out)?
+            } else {
+                block.read_some(window, rows_at, wanted, out)?
             };
             if read.is_none() {
                 return Ok(None);
