@@ -365,7 +365,7 @@ fn db_check_holds_attributes_against_the_curves() {
     let t = |name: &str, value: AttrValue, code: &str, message: &str| {
         fs::write(&path, &built).unwrap();
         edited(&path, |file| {
-            file.group("lead-car-wall/36kmh").unwrap().set_attr(name, value).unwrap()
+            file.group("lead-car-wall/36kmh").unwrap().set_attr(name, value).unwrap();
         });
         let found = findings(folder.path());
         let named = found.iter().any(|f| {

@@ -729,9 +729,9 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     let with = |more: &[&'static str]| -> Vec<String> {
         WALL.iter()
             .chain(&["--speed"])
-            .map(|s| s.to_string())
+            .map(std::string::ToString::to_string)
             .chain([v.clone()])
-            .chain(more.iter().map(|s| s.to_string()))
+            .chain(more.iter().map(std::string::ToString::to_string))
             .collect()
     };
     let t_with = |code: i32, more: &[&'static str], expected: &str| {

@@ -619,7 +619,7 @@ fn several_parameters() {
         }
     }
     let set = TrainingSet::new("made", &cases).unwrap();
-    let names: Vec<String> = set.features.iter().map(|f| f.name()).collect();
+    let names: Vec<String> = set.features.iter().map(crumple::dataset::Feature::name).collect();
     assert_eq!(names, ["angle_deg", "obstacle=pole", "obstacle=wall"]);
     for options in all_kinds() {
         if !options.entry().sees_features {

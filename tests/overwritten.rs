@@ -69,7 +69,8 @@ fn check(
         whole.histories.iter().map(|h| (h.label(), &h.values)).collect();
     // An id that was overwritten is another one; that needs a problem.
     let known = |label: &String| by_label.contains_key(label);
-    let unknown = damaged.histories.iter().find(|h| !known(&h.label())).map(|h| h.label());
+    let unknown =
+        damaged.histories.iter().find(|h| !known(&h.label())).map(crumple::history::History::label);
     assert!(unknown.is_none() || !damaged.problems.is_empty(), "{name}: {unknown:?}");
     let state = |k| state(damaged, k).filter(|(label, _)| known(label));
     let mut next = 0;

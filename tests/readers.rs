@@ -300,7 +300,7 @@ fn labels_may_be_absent_or_repeat_for_every_wall() {
 fn labels_are_bounded() {
     let mut text = String::new();
     for i in 0..2_000 {
-        let label = format!("invented energy {}", i);
+        let label = format!("invented energy {i}");
         text += &glstat("0.00000E+00", &[(&label, "   1.00000E+00")]);
     }
     let file = read("glstat", &text);

@@ -64,7 +64,7 @@ impl Named<'_> {
                     previous.of_run.insert(run.into(), (CasePath::of(case), place));
                 }
             } else {
-                without.push(case)
+                without.push(case);
             }
         }
         // Made of each, for runs that have no case of their name.

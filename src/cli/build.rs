@@ -115,9 +115,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let database = output.display().to_string();
     if options.json {
-        output::print_json(&Document::of(report, database, runs))?
+        output::print_json(&Document::of(report, database, runs))?;
     } else {
-        output::print(|out| print(out, &Document::of(report, database, runs)))?
+        output::print(|out| print(out, &Document::of(report, database, runs)))?;
     }
     Ok(outcome)
 }
@@ -178,9 +178,9 @@ fn moved_lines(moved: &[Moved]) -> Vec<String> {
     let mut lines = Vec::new();
     for Moved { paths: (from, to), .. } in moved {
         if from.name == to.name {
-            *groups.entry((&from.group, &to.group)).or_default() += 1
+            *groups.entry((&from.group, &to.group)).or_default() += 1;
         } else {
-            lines.push(format!("{from}: renamed since it was built, is {to} now"))
+            lines.push(format!("{from}: renamed since it was built, is {to} now"));
         }
     }
     let group = |((from, to), count): (&(&str, &str), &usize)| {

@@ -124,14 +124,14 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
         write_whole(output, text.as_bytes())?;
         let scenario = output.display().to_string();
         if options.json {
-            output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?
+            output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?;
         } else {
             output::print(|out| {
                 writeln!(
                     out,
                     "wrote {scenario}: put your trains in, then crumple simulate {scenario}"
                 )
-            })?
+            })?;
         }
     }
     Ok(if proposal.missing.is_empty() { Outcome::Clean } else { Outcome::Warned })

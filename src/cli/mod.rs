@@ -225,18 +225,18 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Partly) => FAILED,
         Err(Failure::Usage(message)) => {
             if options.json {
-                print_document(&ErrorDocument::usage(&message))
+                print_document(&ErrorDocument::usage(&message));
             } else {
-                output::say(&format!("error: {message}"))
+                output::say(&format!("error: {message}"));
             }
             USAGE
         }
         Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
         Err(Failure::Failed(error)) => {
             if options.json {
-                print_document(&ErrorDocument::new(&*error))
+                print_document(&ErrorDocument::new(&*error));
             } else {
-                print_error(&*error)
+                print_error(&*error);
             }
             FAILED
         }

@@ -154,9 +154,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             Picture::Png => drawing.png(args.scale)?,
         };
         if is_stdout(path) {
-            output::print_data(|out| out.write_all(&bytes))?
+            output::print_data(|out| out.write_all(&bytes))?;
         } else {
-            files.push((path.as_path(), bytes))
+            files.push((path.as_path(), bytes));
         }
     }
     let all: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (*path, &bytes[..])).collect();

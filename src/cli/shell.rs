@@ -121,11 +121,11 @@ fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     let mut written = Vec::new();
     pages(&command, "crumple", folder, &mut written)?;
     if options.json {
-        output::print_json(&Pages { written })?
+        output::print_json(&Pages { written })?;
     } else {
         output::print(|out| {
             written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
-        })?
+        })?;
     }
     Ok(Outcome::Clean)
 }

@@ -119,7 +119,7 @@ fn say_notes(report: &Report, options: GlobalOptions) {
                 }
             }
             GroupReport::Failed { group, error } => {
-                output::say(&format!("error: {group}: {error}"))
+                output::say(&format!("error: {group}: {error}"));
             }
         }
     }

@@ -118,9 +118,9 @@ impl Foreign {
         }
         for (name, dataset) in group.iter_datasets()? {
             if datasets.contains(&name.as_str()) {
-                self.of_dataset(&format!("{place}/{name}"), &dataset)?
+                self.of_dataset(&format!("{place}/{name}"), &dataset)?;
             } else {
-                self.add("dataset", place, &name)
+                self.add("dataset", place, &name);
             }
         }
         Ok(())

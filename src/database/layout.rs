@@ -437,7 +437,7 @@ impl<'a> Opened<'a> {
         Ok(attributes
             .get(CASES)
             .and_then(AttrValue::as_strings)
-            .map(|names| names.iter().map(|name| name.to_string()).collect()))
+            .map(|names| names.iter().map(std::string::ToString::to_string).collect()))
     }
 
     /// Whether a group has what every case has; one of it is enough, so that damage shows.

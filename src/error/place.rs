@@ -150,7 +150,7 @@ enum Step {
 impl KeyPath {
     /// Keys of tables within tables, with dots between: `recipe.force.id`.
     pub(crate) fn of(keys: &str) -> Self {
-        keys.split('.').fold(Self::default(), |path, key| path.key(key))
+        keys.split('.').fold(Self::default(), KeyPath::key)
     }
 
     /// A key in the table at this path.

@@ -143,9 +143,9 @@ impl Draft {
         let name = target.file_name().unwrap_or_default();
         let mut own = OsString::from(".crumple-");
         if name.len() <= MAX_NAME_BYTES {
-            own.push(name)
+            own.push(name);
         } else {
-            own.push(&*blake3::hash(name.as_encoded_bytes()).to_hex())
+            own.push(&*blake3::hash(name.as_encoded_bytes()).to_hex());
         }
         own.push(".part");
         let path = folder_of(&target).join(own);

@@ -18,7 +18,8 @@ pub(crate) fn write(model: &Model, _options: &Options) -> Result<Exported, Error
         model.speed_kind.name(),
         model.group
     );
-    let further: Vec<String> = model.features.iter().map(|f| f.name()).collect();
+    let further: Vec<String> =
+        model.features.iter().map(super::super::dataset::Feature::name).collect();
     let features: Vec<&str> = ["speed_m_per_s", "deflection_m"]
         .into_iter()
         .chain(further.iter().map(String::as_str))

@@ -45,9 +45,9 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         }
     }
     if options.deck {
-        files.insert(0, (format!("{stem}_0000.rad"), lines.into_bytes()))
+        files.insert(0, (format!("{stem}_0000.rad"), lines.into_bytes()));
     } else {
-        files.push((format!("{stem}.rad"), lines.into_bytes()))
+        files.push((format!("{stem}.rad"), lines.into_bytes()));
     }
     Ok(Exported { files, notes, ..Exported::default() })
 }

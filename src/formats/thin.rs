@@ -197,9 +197,9 @@ fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelo
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
                 if with(middle, until)?.work_to(d[end]) < wanted_j {
-                    low = middle
+                    low = middle;
                 } else {
-                    high = middle
+                    high = middle;
                 }
             }
             return with(high, until);

@@ -248,9 +248,9 @@ impl Layout {
         let titles: Vec<&str> = entities.iter().map(title).collect();
         if titles.iter().any(|title| !title.is_empty()) {
             if titles.len() <= MAX_TEXTS {
-                drop(dataset.set_attr(TITLES, texts(&titles)))
+                drop(dataset.set_attr(TITLES, texts(&titles)));
             } else {
-                self.titles_of.push((name.clone(), entities.to_vec()))
+                self.titles_of.push((name.clone(), entities.to_vec()));
             }
         }
         self.entities.push((entities.to_vec(), scale));

@@ -363,7 +363,7 @@ impl Run {
     /// All that a user must know, as text.
     pub fn all_warnings(&self) -> Vec<String> {
         let mut warnings = self.ledger.warnings();
-        warnings.extend(self.warnings.iter().map(|w| w.to_string()));
+        warnings.extend(self.warnings.iter().map(std::string::ToString::to_string));
         warnings
     }
 

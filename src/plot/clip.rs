@@ -58,7 +58,7 @@ pub(super) fn band(
 ) -> Vec<(f64, f64, f64)> {
     let mut kept: Vec<(f64, f64, f64)> = Vec::new();
     let mut keep = |(x, low, high): (f64, f64, f64)| {
-        kept.push((x, low.clamp(top, bottom), high.clamp(top, bottom)))
+        kept.push((x, low.clamp(top, bottom), high.clamp(top, bottom)));
     };
     let is_finite = |e: &(f64, f64, f64)| e.0.is_finite() && e.1.is_finite() && e.2.is_finite();
     let edges: Vec<_> = edges.iter().copied().filter(is_finite).collect();

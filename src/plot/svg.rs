@@ -165,7 +165,7 @@ fn looks(stroke: Option<&Stroke>, fill: Option<(Paint, f64)>, target: SvgFor) ->
     let mut classes = Vec::new();
     if let Some((paint, opacity)) = fill {
         if in_page {
-            classes.push(format!("f-{}", class(paint)))
+            classes.push(format!("f-{}", class(paint)));
         } else {
             let _ = write!(looks, r#" fill="{}""#, colour(paint));
         }

@@ -237,7 +237,7 @@ impl Validated<'_> {
                 }
             }
             Err(error) => {
-                content.warn(format!("{group}: no curve at {}: {error}", km_per_h(speed)))
+                content.warn(format!("{group}: no curve at {}: {error}", km_per_h(speed)));
             }
         }
         if let Ok(set) = TrainingSet::new(group, *cases)

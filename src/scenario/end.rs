@@ -161,7 +161,7 @@ fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCur
 fn warnings(model: &Model, speed_m_per_s: f64) -> Vec<String> {
     let mass_kg = model.mass_kg;
     let point = QueryPoint { speed_m_per_s, features: &[], mass_kg, closing_m_per_s: None };
-    model.warnings(&point).iter().map(|w| w.to_string()).collect()
+    model.warnings(&point).iter().map(std::string::ToString::to_string).collect()
 }
 
 /// The interface of two plates that meet after `gap_m`.

@@ -25,7 +25,7 @@ pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Remarks {
             shown_name(path)
         )),
         Err(error) => {
-            remarks.warn(format!("{name}: the binary file beside it cannot be compared: {error}"))
+            remarks.warn(format!("{name}: the binary file beside it cannot be compared: {error}"));
         }
     }
     remarks

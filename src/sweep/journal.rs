@@ -97,7 +97,7 @@ pub fn write(
             // What remains is only the space it takes.
             let _ = fs::remove_file(&part);
         } else {
-            fs::rename(&part, output).map_err(&write_failed)?
+            fs::rename(&part, output).map_err(&write_failed)?;
         }
     }
     Ok(tally.close())

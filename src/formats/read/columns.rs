@@ -228,7 +228,7 @@ impl Points {
                 notes.push("sign: the deflection is turned, positive in compression".into());
             }
             (false, true) => {
-                notes.push("sign: the force is turned, positive in compression".into())
+                notes.push("sign: the force is turned, positive in compression".into());
             }
             (false, false) => return,
         }

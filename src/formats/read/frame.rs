@@ -48,7 +48,7 @@ impl Separator {
                     quoted ^= c == '"';
                     !quoted && c == char::from(self.byte())
                 });
-                let fields = split.take(MOST_COLUMNS).map(|field| field.trim());
+                let fields = split.take(MOST_COLUMNS).map(str::trim);
                 fields.map(|field| field.trim_matches('"').trim()).collect()
             }
         };
@@ -224,7 +224,7 @@ fn fit(lines: &[Line<'_>], separator: Separator, asked: &[&str]) -> Option<(Fit,
     };
     let fields = separator.fields(&first.text);
     let all_numbers = fields.len() > 1 && fields.iter().all(|field| separator.is_number(field));
-    let owned = || fields.iter().map(|field| field.to_string()).collect();
+    let owned = || fields.iter().map(std::string::ToString::to_string).collect();
     match header {
         _ if all_numbers => Some((Fit::Numbers, owned())),
         Some(header) if names_both(&header, asked) => Some((Fit::Header, header)),

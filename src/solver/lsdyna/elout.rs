@@ -236,8 +236,9 @@ impl Elout {
             (whole && (6..=7).contains(&numbers)).then_some(())?;
             let names = &RESULTANTS[..numbers];
             let key = Key { quantity, point: 0, surface: "", location: None, names };
-            let table =
-                self.table(key, states, || names.iter().map(|n| n.to_string()).collect())?;
+            let table = self.table(key, states, || {
+                names.iter().map(std::string::ToString::to_string).collect()
+            })?;
             states.row(table, entity, line, |k| {
                 let from = RESULTANT_AT + k * RESULTANT_WIDTH;
                 Some((from + 1, from + RESULTANT_WIDTH))

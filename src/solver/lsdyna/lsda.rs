@@ -64,7 +64,7 @@ impl Kind {
         match (self.0, header.big_endian) {
             // The two that matter, without going byte by byte.
             (9, false) => {
-                out.extend(bytes.as_chunks().0.iter().map(|w| f64::from(f32::from_le_bytes(*w))))
+                out.extend(bytes.as_chunks().0.iter().map(|w| f64::from(f32::from_le_bytes(*w))));
             }
             (10, false) => out.extend(bytes.as_chunks().0.iter().map(|w| f64::from_le_bytes(*w))),
             (9, true) => out.extend(words(4).map(|w| f64::from(f32::from_bits(w as u32)))),

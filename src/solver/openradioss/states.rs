@@ -203,7 +203,7 @@ impl States {
     fn name(&self, header: &Header, record: usize, word: usize) -> String {
         let Some(group) = record.checked_sub(self.first_group).map(|k| &header.groups[k]) else {
             let global = GLOBAL_COMPONENTS.get(word).filter(|_| record == 1 && header.globals > 0);
-            return global.map_or(format!("value {}", word + 1), |name| name.to_string());
+            return global.map_or(format!("value {}", word + 1), std::string::ToString::to_string);
         };
         let width = group.codes.len().max(1);
         let id = group.objects.get(word / width).map_or(0, |(id, _)| *id);

@@ -181,10 +181,10 @@ impl Reader<'_, '_> {
         block.cards += 1;
         match block.kind {
             Kind::Title if first && self.context.deck.title.is_none() => {
-                self.context.deck.title = text(card.text)
+                self.context.deck.title = text(card.text);
             }
             Kind::ControlUnits if first => {
-                self.context.units(units::on_card(&card), card.place, true)
+                self.context.units(units::on_card(&card), card.place, true);
             }
             Kind::VelocityOfSet => self.context.velocity_of_set(block, &card),
             Kind::VelocityOfNodes => self.context.velocity_of_id(block, &card, Scope::Node),
