@@ -34,9 +34,6 @@ pub use motion::Quantity;
 pub use train::train_speeds;
 
 use crate::unit::km_per_h;
-pub use motion::BodyMotion;
-pub use motion::Energies;
-pub use motion::InterfaceMotion;
 
 /// A speed in km/h with at most one digit behind the point.
 fn speed(m_per_s: f64) -> String {

@@ -22,35 +22,35 @@ pub enum Quantity {
 
 /// Histories of a body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BodyMotion {
+pub(crate) struct BodyMotion {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Speed in m/s, one value per time.
-    pub v_m_per_s: Vec<f64>,
+    pub(crate) v_m_per_s: Vec<f64>,
     /// Acceleration in m/s².
-    pub a_m_per_s2: Vec<f64>,
+    pub(crate) a_m_per_s2: Vec<f64>,
 }
 
 /// Histories of an interface.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InterfaceMotion {
+pub(crate) struct InterfaceMotion {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Deflection in m, one value per time.
-    pub deflection_m: Vec<f64>,
+    pub(crate) deflection_m: Vec<f64>,
     /// Force in N.
-    pub force_n: Vec<f64>,
+    pub(crate) force_n: Vec<f64>,
 }
 
 /// Energies of the whole chain, one value per time, in J.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Energies {
+pub(crate) struct Energies {
     /// Of the motion.
-    pub kinetic_j: Vec<f64>,
+    pub(crate) kinetic_j: Vec<f64>,
     /// That would come back.
-    pub stored_j: Vec<f64>,
+    pub(crate) stored_j: Vec<f64>,
     /// Lost in the interfaces.
-    pub dissipated_j: Vec<f64>,
+    pub(crate) dissipated_j: Vec<f64>,
 }
 
 /// A run as it is drawn: from a scenario, or from the file of a result.
@@ -59,11 +59,11 @@ pub struct Motion {
     /// Times in s.
     pub time_s: Vec<f64>,
     /// In the order of the legend.
-    pub bodies: Vec<BodyMotion>,
+    pub(crate) bodies: Vec<BodyMotion>,
     /// In the order of the legend.
-    pub interfaces: Vec<InterfaceMotion>,
+    pub(crate) interfaces: Vec<InterfaceMotion>,
     /// Absent where the masses are not known.
-    pub energies: Option<Energies>,
+    pub(crate) energies: Option<Energies>,
 }
 
 fn not_a_number(NoNumber { line, column, found, .. }: NoNumber) -> Error {

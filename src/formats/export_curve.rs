@@ -207,7 +207,7 @@ impl ExportCurve {
     }
 
     /// Speed of separation over impact speed, as the target unloads from the maximal crush.
-    pub fn restitution(&self, unloading: TargetUnloading) -> f64 {
+    pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
             TargetUnloading::Elastic => self.loading.work_to(self.max_crush_m()),
@@ -238,7 +238,7 @@ impl ExportCurve {
     }
 
     /// What the target's unloading gives beside ours, in one line.
-    pub fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
+    pub(crate) fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
         let ours = self.own_restitution();
         let theirs = self.restitution(unloading);
         let how = match unloading {

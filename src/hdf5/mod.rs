@@ -19,7 +19,7 @@ pub(crate) use hdf5_pure::{
 
 /// Why a file is not opened as HDF5.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenError {
+pub(crate) enum OpenError {
     /// It cannot be read, or is no file.
     #[error(transparent)]
     Io(#[from] io::Error),

@@ -38,7 +38,7 @@ pub(super) struct Agreed {
     /// Bodies that move in the run with most of them.
     pub bodies: usize,
     /// For each run whether it can take the recipe.
-    pub members: Vec<Result<(), Reason>>,
+    pub(crate) members: Vec<Result<(), Reason>>,
 }
 
 /// A node and those that could stand for the same body.
@@ -47,7 +47,7 @@ pub(super) struct ChosenNode {
     pub id: i64,
     pub title: Option<String>,
     pub residual: f64,
-    pub others: Vec<Alternative>,
+    pub(crate) others: Vec<Alternative>,
 }
 
 /// A force and those that could be meant.
@@ -60,16 +60,16 @@ pub(super) struct ChosenForce {
     pub title: Option<String>,
     /// Whether the other side has the same force.
     pub other_side: bool,
-    pub others: Vec<Alternative>,
+    pub(crate) others: Vec<Alternative>,
 }
 
 /// What else could be meant, and how well it would do.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Alternative {
+pub(crate) struct Alternative {
     /// As a recipe would name it.
-    pub id: String,
+    pub(crate) id: String,
     /// Title and how well it does.
-    pub about: String,
+    pub(crate) about: String,
 }
 
 /// What runs must share to have one recipe.

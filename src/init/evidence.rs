@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Where a value is from, with what it was taken or made from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "evidence", content = "from", rename_all = "snake_case")]
-pub enum Evidence {
+pub(crate) enum Evidence {
     /// The caller gave it.
     Given(String),
     /// It stands in a file.
@@ -44,7 +44,7 @@ impl std::fmt::Display for Evidence {
 /// A value of a proposal, or why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Proposed<T> {
+pub(crate) enum Proposed<T> {
     /// It was found.
     Found {
         /// As it is proposed.

@@ -21,7 +21,7 @@ pub struct Given {
     /// Node of the other body of a pair.
     pub minus_node: Option<i64>,
     /// The contact force.
-    pub force: Option<GivenForce>,
+    pub(crate) force: Option<GivenForce>,
     /// Mass of the body, in kg.
     pub mass_kg: Option<f64>,
     /// Mass of the other body of a pair, in kg.
@@ -32,15 +32,15 @@ pub struct Given {
 
 /// A force as `FILE:ID[:SIDE][:COMPONENT]`, such as `rcforc:3:surfa`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GivenForce {
+pub(crate) struct GivenForce {
     /// One of `rwforc`, `rcforc`, `secforc`.
-    pub file: String,
+    pub(crate) file: String,
     /// Number of the wall, interface or section.
-    pub id: i64,
+    pub(crate) id: i64,
     /// Side of an interface.
-    pub side: Option<Side>,
+    pub(crate) side: Option<Side>,
     /// Such as `normal_force`.
-    pub component: Option<String>,
+    pub(crate) component: Option<String>,
 }
 
 /// A text that names no force.
@@ -49,9 +49,9 @@ pub struct GivenForce {
     "\"{text}\" is no force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
     FORCES.join(", ")
 )]
-pub struct NoForce {
+pub(crate) struct NoForce {
     /// The text.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 impl FromStr for GivenForce {

@@ -11,7 +11,7 @@ pub struct LeftOut {
     pub path: PathBuf,
     /// Why it is left out.
     #[serde(flatten)]
-    pub reason: Reason,
+    pub(crate) reason: Reason,
     /// The reason in words.
     pub message: String,
     /// Its entry in the study, commented out there, where one can be written.
@@ -28,7 +28,7 @@ impl LeftOut {
 /// Why a run is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "reason", rename_all = "snake_case")]
-pub enum Reason {
+pub(crate) enum Reason {
     /// There is nothing in the folder.
     #[error("the folder is empty")]
     Empty,

@@ -21,7 +21,7 @@ pub(super) struct Measured<'a> {
     pub recorded: &'a [Recorded],
     /// As many as were recorded, or none if the units are not known.
     pub runs: &'a [SiRun<'a>],
-    pub units: &'a Proposed<UnitSystem>,
+    pub(crate) units: &'a Proposed<UnitSystem>,
 }
 
 /// A run in SI.

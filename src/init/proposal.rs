@@ -15,68 +15,68 @@ use crate::unit::UnitSystem;
 #[derive(Clone, Debug, Serialize)]
 pub struct Proposal {
     /// Group of the curve database, and name of the study.
-    pub group: Proposed<String>,
+    pub(crate) group: Proposed<String>,
     /// Units of the solver's files.
-    pub units: Proposed<UnitSystem>,
+    pub(crate) units: Proposed<UnitSystem>,
     /// What hits what.
-    pub kind: Proposed<StudyKind>,
+    pub(crate) kind: Proposed<StudyKind>,
     /// Whether the runs are of one body against the symmetry plane of a pair: only known if the
     /// caller says so.
-    pub half_model: bool,
+    pub(crate) half_model: bool,
     /// Where the deflection comes from.
-    pub deflection: Proposed<DeflectionSource>,
+    pub(crate) deflection: Proposed<DeflectionSource>,
     /// Title of the node, then of the other body's.
-    pub node_titles: Vec<Option<String>>,
+    pub(crate) node_titles: Vec<Option<String>>,
     /// Nodes that could stand for the same bodies, a list for each.
-    pub other_nodes: Vec<Vec<Alternative>>,
+    pub(crate) other_nodes: Vec<Vec<Alternative>>,
     /// Where the force comes from.
-    pub force: Proposed<ForceSource>,
+    pub(crate) force: Proposed<ForceSource>,
     /// Title of the wall or interface.
-    pub force_title: Option<String>,
+    pub(crate) force_title: Option<String>,
     /// Whether the other side of the interface has the same force.
-    pub other_side: bool,
+    pub(crate) other_side: bool,
     /// Forces that could be meant.
-    pub other_forces: Vec<Alternative>,
+    pub(crate) other_forces: Vec<Alternative>,
     /// Filter of the force.
-    pub filter: Proposed<Filter>,
+    pub(crate) filter: Proposed<Filter>,
     /// Common times of the runs.
-    pub sampling: Proposed<Sampling>,
+    pub(crate) sampling: Proposed<Sampling>,
     /// In order of speed.
-    pub runs: Vec<ProposedRun>,
+    pub(crate) runs: Vec<ProposedRun>,
     /// Folders that are left out.
-    pub left_out: Vec<LeftOut>,
+    pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// What whoever uses the study should look at.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// A run of a proposed study.
 #[derive(Clone, Debug, Serialize)]
-pub struct ProposedRun {
+pub(crate) struct ProposedRun {
     /// The folder, as it was found.
-    pub folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// The folder as the study names it.
-    pub path: String,
+    pub(crate) path: String,
     /// Name of the case.
-    pub name: String,
+    pub(crate) name: String,
     /// Impact speed in m/s: of a pair the closing speed.
-    pub speed_m_per_s: Proposed<f64>,
+    pub(crate) speed_m_per_s: Proposed<f64>,
     /// Mass of the body, or of each body of a pair, in kg.
-    pub mass_kg: Proposed<f64>,
+    pub(crate) mass_kg: Proposed<f64>,
     /// Mass of the other body in kg, where it is another.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub other_mass_kg: Option<Proposed<f64>>,
+    pub(crate) other_mass_kg: Option<Proposed<f64>>,
     /// Solver's time behind which the record is not used, in s.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub truncate_s: Option<Proposed<f64>>,
+    pub(crate) truncate_s: Option<Proposed<f64>>,
     /// Largest crush in m, if the units are known: doubled for half a model.
-    pub crush_m: Option<f64>,
+    pub(crate) crush_m: Option<f64>,
     /// Whole states that motion and force both have.
-    pub states: usize,
+    pub(crate) states: usize,
     /// What is to be said of its speed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Proposal {

@@ -30,7 +30,7 @@ pub(crate) struct ScenarioProposal {
     /// Whether a rigid wall takes the place of the second train.
     pub wall: bool,
     /// Length of the run in s.
-    pub duration_s: Proposed<f64>,
+    pub(crate) duration_s: Proposed<f64>,
     /// What is left to fill in.
     pub missing: Vec<String>,
 }
@@ -58,7 +58,7 @@ pub(crate) struct ProposedTrain {
     /// Its name.
     pub name: &'static str,
     /// Its speed in m/s.
-    pub speed_m_per_s: Proposed<f64>,
+    pub(crate) speed_m_per_s: Proposed<f64>,
     /// From the nose back.
     pub vehicles: Vec<ProposedVehicle>,
 }
@@ -69,7 +69,7 @@ pub(crate) struct ProposedVehicle {
     /// Its name.
     pub name: String,
     /// Its mass in kg.
-    pub mass_kg: Proposed<f64>,
+    pub(crate) mass_kg: Proposed<f64>,
 }
 
 /// Proposes a scenario, which will stand at `path`, for one model or two.

@@ -22,7 +22,7 @@ pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
     /// What is varied.
-    pub sweep: Plan,
+    pub(crate) sweep: Plan,
 }
 
 /// The `[sweep]` table: many runs of one scenario.
@@ -32,25 +32,25 @@ pub struct PlanFile {
 /// of the grid.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub(crate) struct Plan {
     /// Of the random draws; 0 if absent.
     #[serde(default)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Draws at each point of the grid; needed as soon as one variable has a distribution.
-    pub samples: Option<u64>,
+    pub(crate) samples: Option<u64>,
     /// How distributions are drawn.
     #[serde(default)]
-    pub sampling: Sampling,
+    pub(crate) sampling: Sampling,
     /// Results to keep; all if absent.
-    pub results: Option<Vec<ResultName>>,
+    pub(crate) results: Option<Vec<ResultName>>,
     /// What is varied, in the order of the columns.
-    pub vary: Vec<Vary>,
+    pub(crate) vary: Vec<Vary>,
 }
 
 /// How distributions are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Sampling {
+pub(crate) enum Sampling {
     /// Each draw by itself (Monte Carlo).
     #[default]
     Random,
@@ -62,7 +62,7 @@ pub enum Sampling {
 /// A result of each run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum ResultName {
+pub(crate) enum ResultName {
     /// Of each interface.
     PeakForce,
     /// Of each interface.
@@ -96,45 +96,45 @@ pub(crate) const RESULTS: [ResultName; 8] = [
 /// One thing that is varied.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Vary {
+pub(crate) struct Vary {
     /// What is varied.
-    pub what: What,
+    pub(crate) what: What,
     /// Of a speed: the train.
-    pub train: Option<String>,
+    pub(crate) train: Option<String>,
     /// Of a mass: the vehicle.
-    pub vehicle: Option<String>,
+    pub(crate) vehicle: Option<String>,
     /// Of a mass: several vehicles, or "all".
-    pub vehicles: Option<Vehicles>,
+    pub(crate) vehicles: Option<Vehicles>,
     /// Each of `vehicles` by itself, instead of one value for all of them.
     #[serde(default)]
-    pub each: bool,
+    pub(crate) each: bool,
     /// Of a gap, band, force or curve: the name among the curves.
-    pub curve: Option<String>,
+    pub(crate) curve: Option<String>,
     /// Of a gap: "contact", the first contact.
-    pub interface: Option<String>,
+    pub(crate) interface: Option<String>,
     /// Values are factors on what the scenario has. Of a force they always are.
     #[serde(default)]
-    pub factor: bool,
+    pub(crate) factor: bool,
     /// The values; of a curve, names among the curves that take its place.
-    pub values: Option<Vec<Entry>>,
+    pub(crate) values: Option<Vec<Entry>>,
     /// First of `steps` even values, or lower end of a distribution.
-    pub from: Option<Entry>,
+    pub(crate) from: Option<Entry>,
     /// Last of `steps` even values, or upper end of a distribution.
-    pub to: Option<Entry>,
+    pub(crate) to: Option<Entry>,
     /// Number of even values, both ends among them.
-    pub steps: Option<u64>,
+    pub(crate) steps: Option<u64>,
     /// How values are drawn, if they are.
-    pub distribution: Option<DistributionName>,
+    pub(crate) distribution: Option<DistributionName>,
     /// Of the quantity itself, also of a lognormal one, before it is truncated.
-    pub mean: Option<Entry>,
+    pub(crate) mean: Option<Entry>,
     /// Standard deviation of the quantity itself, before it is truncated.
-    pub sd: Option<Entry>,
+    pub(crate) sd: Option<Entry>,
     /// Of a triangular distribution: the likeliest value.
-    pub mode: Option<Entry>,
+    pub(crate) mode: Option<Entry>,
     /// Nothing below is drawn (normal, lognormal).
-    pub min: Option<Entry>,
+    pub(crate) min: Option<Entry>,
     /// Nothing above is drawn (normal, lognormal).
-    pub max: Option<Entry>,
+    pub(crate) max: Option<Entry>,
 }
 
 /// What is varied.
@@ -183,7 +183,7 @@ pub enum Vehicles {
 /// Distribution of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum DistributionName {
+pub(crate) enum DistributionName {
     /// `from`, `to`.
     Uniform,
     /// `from`, `mode`, `to`.
@@ -196,7 +196,7 @@ pub enum DistributionName {
 
 /// A number, a number with a unit, or a name, as written.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry(pub String);
+pub(crate) struct Entry(pub String);
 
 impl<'de> Deserialize<'de> for Entry {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

@@ -27,28 +27,28 @@ pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Iso18571 {
+pub(crate) struct Iso18571 {
     /// Corridor score Z.
-    pub corridor: f64,
+    pub(crate) corridor: f64,
     /// Phase score E_P.
-    pub phase: f64,
+    pub(crate) phase: f64,
     /// Magnitude score E_M.
-    pub magnitude: f64,
+    pub(crate) magnitude: f64,
     /// Slope score E_S.
-    pub slope: f64,
+    pub(crate) slope: f64,
     /// `R = 0.4 Z + 0.2 (E_P + E_M + E_S)`.
-    pub rating: f64,
+    pub(crate) rating: f64,
     /// The standard's word for this rating.
-    pub grade: Grade,
+    pub(crate) grade: Grade,
     /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
     /// the interval; 0 if one of the signals is constant.
-    pub late_s: f64,
+    pub(crate) late_s: f64,
 }
 
 /// Grades of ISO/TS 18571, table 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Grade {
+pub(crate) enum Grade {
     /// R above 0.94.
     Excellent,
     /// Above 0.80.

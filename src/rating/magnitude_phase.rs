@@ -7,13 +7,13 @@ use serde::Serialize;
 
 /// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct MagnitudePhase {
+pub(crate) struct MagnitudePhase {
     /// Above 0 if the prediction is larger.
-    pub magnitude: f64,
+    pub(crate) magnitude: f64,
     /// 0 to 1.
-    pub phase: f64,
+    pub(crate) phase: f64,
     /// Of Sprague and Geers the root of the sum of the two squares; of Russell that, times √(π/4).
-    pub combined: f64,
+    pub(crate) combined: f64,
 }
 
 /// `√Σr²`, `√Σp²` and `acos(Σrp / √(Σr² Σp²)) / π`; `None` if one of the signals is zero

@@ -42,16 +42,15 @@ use serde::Serialize;
 
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub use cora::Cora;
+pub(crate) use cora::Cora;
 use cora::cora;
-pub use deceleration::Deceleration;
-pub use differences::MaxAbs;
-pub use differences::Pointwise;
+pub(crate) use deceleration::Deceleration;
+pub(crate) use differences::MaxAbs;
+pub(crate) use differences::Pointwise;
 use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
-pub use iso18571::Grade;
-pub use iso18571::Iso18571;
+pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
-pub use magnitude_phase::MagnitudePhase;
+pub(crate) use magnitude_phase::MagnitudePhase;
 use magnitude_phase::{russell, sprague_geers};
 pub use signal::Signal;
 pub(crate) use signal::{INTERVAL_S, Pair};
@@ -118,25 +117,25 @@ pub struct Rating {
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
     /// Relative differences sample by sample.
-    pub pointwise: Option<Pointwise>,
+    pub(crate) pointwise: Option<Pointwise>,
     /// The largest difference and its time.
-    pub max_abs: MaxAbs,
+    pub(crate) max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
-    pub peaks: Vec<Peak>,
+    pub(crate) peaks: Vec<Peak>,
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
     /// Measure of Sprague and Geers.
-    pub sprague_geers: Option<MagnitudePhase>,
+    pub(crate) sprague_geers: Option<MagnitudePhase>,
     /// Measure of Russell.
-    pub russell: Option<MagnitudePhase>,
+    pub(crate) russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
-    pub iso18571: Option<Iso18571>,
+    pub(crate) iso18571: Option<Iso18571>,
     /// Null over more than 2 s.
-    pub cora: Option<Cora>,
+    pub(crate) cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
-    pub deceleration: Option<Decelerations>,
+    pub(crate) deceleration: Option<Decelerations>,
     /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
@@ -163,25 +162,25 @@ impl Rated {
 
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Peak {
+pub(crate) struct Peak {
     /// Time of the reference's peak, in s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Value of the reference, in the unit of the signals.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Prediction over reference, less 1; null if the prediction has no peak within a tenth of the
     /// common times: it is missing.
-    pub error: Option<f64>,
+    pub(crate) error: Option<f64>,
     /// By how much the prediction's peak is later, in s.
-    pub shift_s: Option<f64>,
+    pub(crate) shift_s: Option<f64>,
 }
 
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Decelerations {
+pub(crate) struct Decelerations {
     /// Of the reference.
-    pub reference: Deceleration,
+    pub(crate) reference: Deceleration,
     /// Of the prediction.
-    pub prediction: Deceleration,
+    pub(crate) prediction: Deceleration,
 }
 
 /// Rates `prediction` against `reference`.

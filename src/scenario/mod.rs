@@ -50,23 +50,18 @@ use crate::error::{Document, Error, Place, error};
 use crate::manifest;
 use crate::multibody::{Chain, Run, RunSettings, SimulationError, simulate};
 use place::Origin;
-pub use tables::ContactTable;
-pub use tables::CrushZoneTable;
-pub use tables::CurveTable;
-pub use tables::DampingTable;
-pub use tables::EndName;
-pub use tables::InterfaceSpeed;
-pub use tables::LawName;
-pub use tables::LimitsTable;
-pub use tables::MethodName;
-pub use tables::ReferenceTable;
-pub use tables::ResistanceTable;
-pub use tables::RunTable;
+pub(crate) use tables::CrushZoneTable;
+pub(crate) use tables::CurveTable;
+pub(crate) use tables::DampingTable;
+pub(crate) use tables::EndName;
+pub(crate) use tables::InterfaceSpeed;
+pub(crate) use tables::LawName;
+pub(crate) use tables::LimitsTable;
+pub(crate) use tables::ReferenceTable;
 pub use tables::Scenario;
-pub use tables::StageTable;
-pub use tables::TrainTable;
-pub use tables::VehicleTable;
-pub use tables::WallTable;
+pub(crate) use tables::StageTable;
+pub(crate) use tables::TrainTable;
+pub(crate) use tables::VehicleTable;
 
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
@@ -78,9 +73,9 @@ pub struct Prepared {
     /// Bodies as the scenario lists them: indices into the chain, first train first.
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
-    pub used: Vec<Used>,
+    pub(crate) used: Vec<Used>,
     /// Limits that results are held against.
-    pub limits: Option<LimitsTable>,
+    pub(crate) limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
     pub limited: Vec<usize>,
     /// Warnings of the curves used.
@@ -107,13 +102,13 @@ impl Prepared {
 
 /// What an interface uses.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Used {
+pub(crate) struct Used {
     /// Name of its curve in the scenario.
-    pub curve: String,
+    pub(crate) curve: String,
     /// Which force it is, where that is known: `contact` or `body`.
-    pub force: Option<&'static str>,
+    pub(crate) force: Option<&'static str>,
     /// Speed that its curve was predicted for, in m/s.
-    pub speed_m_per_s: Option<f64>,
+    pub(crate) speed_m_per_s: Option<f64>,
 }
 
 /// Parses and checks the text of a scenario; curves are not read. `path` is for messages.

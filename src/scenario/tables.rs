@@ -19,57 +19,57 @@ use crate::unit::{
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Times of the run.
-    pub run: RunTable,
+    pub(crate) run: RunTable,
     /// Curves, used below by name.
-    pub curves: BTreeMap<String, CurveTable>,
+    pub(crate) curves: BTreeMap<String, CurveTable>,
     /// The moving train, then the one it meets, if any.
-    pub train: Vec<TrainTable>,
+    pub(crate) train: Vec<TrainTable>,
     /// A rigid wall in place of a second train.
-    pub wall: Option<WallTable>,
+    pub(crate) wall: Option<WallTable>,
     /// Between the two noses, or nose and wall.
-    pub contact: ContactTable,
+    pub(crate) contact: ContactTable,
     /// Limits that results are held against.
-    pub limits: Option<LimitsTable>,
+    pub(crate) limits: Option<LimitsTable>,
     /// FE's run of the whole, for `crumple compare --train`; a run takes no notice of it.
-    pub reference: Option<ReferenceTable>,
+    pub(crate) reference: Option<ReferenceTable>,
     /// What `crumple sweep` varies; a single run takes no notice of it.
-    pub sweep: Option<Plan>,
+    pub(crate) sweep: Option<Plan>,
 }
 
 /// Limits of a standard, as configuration: they belong to an edition and a category of vehicles.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LimitsTable {
+pub(crate) struct LimitsTable {
     /// Such as "EN 15227".
-    pub standard: String,
+    pub(crate) standard: String,
     /// Such as "2020".
-    pub edition: String,
+    pub(crate) edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
-    pub mean_deceleration_g: f64,
+    pub(crate) mean_deceleration_g: f64,
     /// Trains whose vehicles (without crush zones that are masses of their own) are held against
     /// it, by name; all if absent.
-    pub trains: Option<Vec<String>>,
+    pub(crate) trains: Option<Vec<String>>,
 }
 
 /// Where FE's speeds of the vehicles are.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ReferenceTable {
+pub(crate) struct ReferenceTable {
     /// Solver file with the nodes, such as a nodout; a case.json beside it tells how long FE
     /// took.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// Units of the file, such as "mm-t-s".
     #[schemars(with = "String")]
-    pub units: UnitSystem,
+    pub(crate) units: UnitSystem,
     /// Component of the nodes, `x_velocity` if absent.
     #[serde(default = "x_velocity")]
-    pub component: String,
+    pub(crate) component: String,
     /// Node of each vehicle, by the vehicle's name.
-    pub nodes: BTreeMap<String, i64>,
+    pub(crate) nodes: BTreeMap<String, i64>,
     /// FE's time of the first contact; 0 if absent.
-    pub contact: Option<TimeText>,
+    pub(crate) contact: Option<TimeText>,
     /// The comparison ends here, counted from the contact; with the record if absent.
-    pub until: Option<TimeText>,
+    pub(crate) until: Option<TimeText>,
 }
 
 fn x_velocity() -> String {
@@ -79,26 +79,26 @@ fn x_velocity() -> String {
 /// Times of the run.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RunTable {
+pub(crate) struct RunTable {
     /// From the first contact; the last output is the last whole output_interval in it.
-    pub duration: TimeText,
+    pub(crate) duration: TimeText,
     /// Of the recorded states; 0.75 ms if absent.
     #[serde(default = "default_interval")]
-    pub output_interval: TimeText,
+    pub(crate) output_interval: TimeText,
     /// Longest integration step.
-    pub step: Option<TimeText>,
+    pub(crate) step: Option<TimeText>,
     /// How the motion is integrated.
     #[serde(default)]
-    pub method: MethodName,
+    pub(crate) method: MethodName,
     /// Which speed an interface's model curve is predicted for.
     #[serde(default)]
-    pub interface_speed: InterfaceSpeed,
+    pub(crate) interface_speed: InterfaceSpeed,
 }
 
 /// How the motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum MethodName {
+pub(crate) enum MethodName {
     /// Velocity Verlet, of order 2.
     #[default]
     Verlet,
@@ -126,7 +126,7 @@ fn default_interval() -> TimeText {
 /// Which speed an interface's model curve is predicted for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum InterfaceSpeed {
+pub(crate) enum InterfaceSpeed {
     /// The speed at which the trains meet.
     Train,
     /// The interface's own closing speed.
@@ -137,75 +137,75 @@ pub enum InterfaceSpeed {
 /// One curve: exactly one of `model`, `file`, `database` and `stages`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CurveTable {
+pub(crate) struct CurveTable {
     /// Model file; the curve is predicted for the speed of the interface.
-    pub model: Option<PathBuf>,
+    pub(crate) model: Option<PathBuf>,
     /// Curve file: predicted curve (.json) or table (.csv).
-    pub file: Option<PathBuf>,
+    pub(crate) file: Option<PathBuf>,
     /// Curve database, with `case`.
-    pub database: Option<PathBuf>,
+    pub(crate) database: Option<PathBuf>,
     /// Case of the database, as "group/case".
-    pub case: Option<String>,
+    pub(crate) case: Option<String>,
     /// Stages in series on one stroke, such as those of a coupler, the first one first.
-    pub stages: Option<Vec<StageTable>>,
+    pub(crate) stages: Option<Vec<StageTable>>,
     /// Unloading stiffness; the curve's own if absent.
-    pub unloading: Option<StiffnessText>,
+    pub(crate) unloading: Option<StiffnessText>,
     /// Free distance before contact: between the surfaces that meet, so between mid-surfaces of
     /// meshed plates less half of both thicknesses.
-    pub gap: Option<LengthText>,
+    pub(crate) gap: Option<LengthText>,
     /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
-    pub tension: Option<String>,
+    pub(crate) tension: Option<String>,
     /// Damper in parallel with the curve. It acts while the curve has contact, also on a stretch
     /// without force, but not where memory has left a gap; then it only pushes. With a tension
     /// curve it acts along both and may pull.
-    pub damping: Option<DampingTable>,
+    pub(crate) damping: Option<DampingTable>,
     /// Force law.
     #[serde(default)]
-    pub law: LawName,
+    pub(crate) law: LawName,
     /// What the force does beyond the curve.
     #[serde(default)]
-    pub end: EndName,
+    pub(crate) end: EndName,
     /// Of a model: the rule for the maximal crush; the model's own if absent.
     #[serde(default)]
-    pub max_crush: Option<MaxCrushRule>,
+    pub(crate) max_crush: Option<MaxCrushRule>,
     /// Of a model: values of its further parameters.
     #[serde(default)]
-    pub parameters: BTreeMap<String, Parameter>,
+    pub(crate) parameters: BTreeMap<String, Parameter>,
     /// Of a model, predicted curve or database case: the force that is taken; if absent the
     /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not say it: the force that it holds.
-    pub force: Option<ForceKind>,
+    pub(crate) force: Option<ForceKind>,
     /// Of a model or predicted curve: member of the band of the force that is taken, from −1
     /// (lower edge) over 0 (the curve) to 1 (upper edge).
-    pub band: Option<f64>,
+    pub(crate) band: Option<f64>,
     /// Factor on the force.
-    pub scale: Option<f64>,
+    pub(crate) scale: Option<f64>,
 }
 
 /// A stage of a staged curve.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct StageTable {
+pub(crate) struct StageTable {
     /// For people, such as "deformation tube".
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
     /// Length of the stage.
-    pub stroke: LengthText,
+    pub(crate) stroke: LengthText,
     /// Force at the begin of the stage, 0 if absent: it steps there from the stage before.
-    pub from: Option<ForceText>,
+    pub(crate) from: Option<ForceText>,
     /// Force at its end; the same as at its begin if absent.
-    pub to: Option<ForceText>,
+    pub(crate) to: Option<ForceText>,
 }
 
 /// A damper's coefficient over the magnitude of the closing speed, piecewise linear and held
 /// beyond its ends; one pair of values for a constant one.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct DampingTable {
+pub(crate) struct DampingTable {
     /// Closing speeds, rising; 0 if absent.
     #[serde(default = "zero")]
-    pub speed_m_per_s: Vec<f64>,
+    pub(crate) speed_m_per_s: Vec<f64>,
     /// The coefficient at each.
     #[serde(rename = "coefficient_N_s_per_m")]
-    pub coefficient_n_s_per_m: Vec<f64>,
+    pub(crate) coefficient_n_s_per_m: Vec<f64>,
 }
 
 fn zero() -> Vec<f64> {
@@ -215,7 +215,7 @@ fn zero() -> Vec<f64> {
 /// Force law of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum LawName {
+pub(crate) enum LawName {
     /// Elastic-plastic: unloads on a line of the unloading stiffness.
     #[default]
     Memory,
@@ -229,7 +229,7 @@ pub enum LawName {
 /// What the force does beyond the curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum EndName {
+pub(crate) enum EndName {
     /// Holds the last force.
     #[default]
     Hold,
@@ -242,43 +242,43 @@ pub enum EndName {
 /// A train.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TrainTable {
+pub(crate) struct TrainTable {
     /// Of the train, such as "A".
-    pub name: String,
+    pub(crate) name: String,
     /// In the direction in which the first train moves; below 0 if it comes against it.
-    pub speed: SignedSpeedText,
+    pub(crate) speed: SignedSpeedText,
     /// Curve of the interfaces between its vehicles; needless where both facing ends come from a
     /// model.
-    pub inner: Option<String>,
+    pub(crate) inner: Option<String>,
     /// Clear distance between its vehicles before contact: between the surfaces that meet, so
     /// between mid-surfaces of meshed plates less half of both thicknesses; the curve's own if
     /// absent.
-    pub gap: Option<LengthText>,
+    pub(crate) gap: Option<LengthText>,
     /// Running and braking resistance of its vehicles; none if absent.
-    pub resistance: Option<ResistanceTable>,
+    pub(crate) resistance: Option<ResistanceTable>,
     /// From the nose back.
-    pub vehicles: Vec<VehicleTable>,
+    pub(crate) vehicles: Vec<VehicleTable>,
 }
 
 /// A vehicle.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct VehicleTable {
+pub(crate) struct VehicleTable {
     /// Of the vehicle, as in the results.
-    pub name: String,
+    pub(crate) name: String,
     /// Of the whole vehicle.
-    pub mass: MassText,
+    pub(crate) mass: MassText,
     /// Curve of the interface behind it, in place of the train's `inner`.
-    pub behind: Option<String>,
+    pub(crate) behind: Option<String>,
     /// Clear distance behind it, in place of the train's `gap`.
-    pub gap: Option<LengthText>,
+    pub(crate) gap: Option<LengthText>,
     /// Model of both of its ends, in place of `front` and `rear`: the crush force between crush zone
     /// and body, and the mass that is stopped.
-    pub ends: Option<String>,
+    pub(crate) ends: Option<String>,
     /// The crush zone at its front (the end towards the train's nose), as a body of its own.
-    pub front: Option<CrushZoneTable>,
+    pub(crate) front: Option<CrushZoneTable>,
     /// The same at its rear.
-    pub rear: Option<CrushZoneTable>,
+    pub(crate) rear: Option<CrushZoneTable>,
 }
 
 impl VehicleTable {
@@ -317,11 +317,11 @@ impl VehicleTable {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CrushZone<'a> {
     /// `front` or `rear`.
-    pub end: &'static str,
+    pub(crate) end: &'static str,
     /// Curve between it and the body.
-    pub curve: &'a str,
+    pub(crate) curve: &'a str,
     /// `None` if a model tells what is stopped.
-    pub mass_kg: Option<f64>,
+    pub(crate) mass_kg: Option<f64>,
 }
 
 impl CrushZone<'_> {
@@ -334,36 +334,36 @@ impl CrushZone<'_> {
 /// A mass split off a vehicle: it stands in front of the interface's spring, the body behind.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CrushZoneTable {
+pub(crate) struct CrushZoneTable {
     /// Part of the vehicle's mass. If absent, the curve is a model, which tells how much mass the
     /// crush zone stops.
-    pub mass: Option<MassText>,
+    pub(crate) mass: Option<MassText>,
     /// Curve between it and the body.
-    pub curve: String,
+    pub(crate) curve: String,
 }
 
 /// `R = m (A + B|v| + C v² + μ g) sgn(v)`.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
-pub struct ResistanceTable {
+pub(crate) struct ResistanceTable {
     /// A.
-    pub constant_m_per_s2: f64,
+    pub(crate) constant_m_per_s2: f64,
     /// B.
-    pub linear_per_s: f64,
+    pub(crate) linear_per_s: f64,
     /// C.
-    pub quadratic_per_m: f64,
+    pub(crate) quadratic_per_m: f64,
     /// Coefficient of friction of the brakes, over the whole weight.
-    pub braking: f64,
+    pub(crate) braking: f64,
 }
 
 /// A rigid wall.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct WallTable {
+pub(crate) struct WallTable {
     /// As in the results.
     #[serde(default = "wall_name")]
-    pub name: String,
+    pub(crate) name: String,
 }
 
 fn wall_name() -> String {
@@ -373,9 +373,9 @@ fn wall_name() -> String {
 /// The first contact.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ContactTable {
+pub(crate) struct ContactTable {
     /// Name of its curve; needless where the noses come from models.
-    pub curve: Option<String>,
+    pub(crate) curve: Option<String>,
     /// Free distance between the surfaces before contact; the curve's own if absent.
-    pub gap: Option<LengthText>,
+    pub(crate) gap: Option<LengthText>,
 }
