@@ -13,7 +13,6 @@ pub(crate) struct CsvTable<'a> {
     separator: u8,
 }
 
-/// One row.
 pub(crate) struct Row {
     record: StringRecord,
     /// Line in the file, counted from 1.
@@ -37,18 +36,12 @@ pub(crate) struct NoNumber {
 
 impl<'a> CsvTable<'a> {
     /// The table in `text`, which `lines_before` other lines of its file precede.
-    ///
-    /// # Errors
-    /// If the header is no UTF-8.
     pub(crate) fn open(text: &'a [u8], lines_before: u64) -> Result<Self, csv::Error> {
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
         Self::separated(text, lines_before, separator(text))
     }
 
     /// The same, where what separates the columns is known.
-    ///
-    /// # Errors
-    /// If the header is no UTF-8.
     pub(crate) fn separated(
         text: &'a [u8],
         lines_before: u64,
@@ -105,9 +98,6 @@ impl Row {
 
     /// The finite number in a field, counted from 0; between semicolons or tabs with a decimal
     /// comma or point.
-    ///
-    /// # Errors
-    /// [`NoNumber`] with its place.
     pub(crate) fn number(&self, field: usize) -> Result<f64, NoNumber> {
         let found = self.field(field);
         let parsed = if self.decimal_comma && !found.contains('.') {

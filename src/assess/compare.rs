@@ -83,9 +83,6 @@ pub(crate) struct NsdmFit {
 }
 
 /// The speeds of a group that lie between others, for a comparison at each, in m/s.
-///
-/// # Errors
-/// If the cases are no training set.
 pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
@@ -101,9 +98,6 @@ pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, Erro
 /// The model is one body against a wall, with the effective mass of the case; the
 /// reference is FE's rate of deflection. Accelerations are central differences over the
 /// sampled times of both, as FE's contact forces are means over two output intervals.
-///
-/// # Errors
-/// It lists the speeds there are if none fits.
 pub(crate) fn compare(
     group: &str,
     cases: &[Case],

@@ -55,9 +55,6 @@ pub(crate) struct LeftOutCase<'a> {
 
 impl<'a> LeftOutCase<'a> {
     /// Leaves out all cases of the speed of the set's case `index`.
-    ///
-    /// # Errors
-    /// [`NotLeftOut`] if it cannot be compared with.
     pub(crate) fn new(set: &'a TrainingSet, index: usize) -> Result<Self, NotLeftOut> {
         let own = &set.cases[index];
         let case: &Case = &own.case;
@@ -88,9 +85,6 @@ impl<'a> LeftOutCase<'a> {
     ///
     /// That of the body's motion is made from FE's speeds, so its errors check that curve, force law
     /// and run are consistent; only a contact force's are a floor for predictions of it.
-    ///
-    /// # Errors
-    /// If a curve makes no run.
     pub(crate) fn floors(&self) -> Result<Vec<Floor>, Error> {
         let floor = |(kind, curve): (ForceKind, DrivingCurve)| {
             let errors = self.reference.errors_with(&curve)?;
@@ -217,7 +211,6 @@ impl<'a> LeftOutCase<'a> {
     }
 }
 
-/// The forces in N at these deflections.
 pub(super) fn forces_n(envelope: &Envelope, deflection_m: &[f64]) -> Vec<f64> {
     deflection_m.iter().map(|&d| envelope.force_at(d)).collect()
 }
@@ -260,9 +253,6 @@ impl Trial<'_> {
     }
 
     /// Its row by a rule: only this one's curve is run and compared along the crush.
-    ///
-    /// # Errors
-    /// Says why there is no row.
     pub(crate) fn judged(&self, rule: MaxCrushRule) -> Result<Judged, String> {
         let judged = match self.answers.get(&rule) {
             Some(Ok(answer)) => self.held.judged(self.model, answer).map_err(|e| e.to_string()),

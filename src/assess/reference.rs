@@ -98,9 +98,6 @@ impl Reference {
     }
 
     /// Errors of the one-mass run that a driving curve gives.
-    ///
-    /// # Errors
-    /// If the curve makes no run, or one whose errors are no finite numbers.
     pub(crate) fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, Error> {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
@@ -149,9 +146,6 @@ impl Reference {
     }
 
     /// A run's first body's speeds at [`time_s`](Self::time_s).
-    ///
-    /// # Errors
-    /// If the run ends before the window.
     pub(crate) fn velocity_of(&self, run: &Run) -> Result<Vec<f64>, Error> {
         interpolate(&run.time_s, &run.bodies[0].v_m_per_s, &self.time_s).map_err(|_| {
             error!(

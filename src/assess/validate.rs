@@ -102,9 +102,6 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
 
 /// The model that `auto` chooses for a vehicle, by what it is chosen by and no more: there is no validation in
 /// it, hence no band, and ends of the range are not left out.
-///
-/// # Errors
-/// As [`train`].
 pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
     let (fitting, _) = those_that_fit(&set, &ModelKind::candidates(seed));
@@ -124,9 +121,6 @@ pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<M
 }
 
 /// Fits the model of `kept` that a validation of these cases chose.
-///
-/// # Errors
-/// As [`train`].
 pub(crate) fn train_chosen(
     group: &str,
     cases: &[Case],
@@ -234,9 +228,6 @@ fn those_that_fit(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind
 }
 
 /// Every case left out in turn, with notes on those that cannot be.
-///
-/// # Errors
-/// Says why no speed can be left out.
 fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String>), String> {
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -267,7 +258,6 @@ fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<Trial
 struct Tables {
     rows: Vec<LeftOut>,
     means: Vec<Means>,
-    /// By model.
     residuals: BTreeMap<&'static str, ResidualsOf>,
     notes: Vec<String>,
 }
@@ -371,9 +361,6 @@ impl ModelTable {
 /// The errors of the chosen model are those that it was chosen by, and so a little too good;
 /// these are not. Speeds that leave fewer than three others, or fail otherwise, have no row but a
 /// note.
-///
-/// # Errors
-/// As [`validate`].
 pub(crate) fn add_nested(
     validation: &mut Validation,
     cases: &[Case],

@@ -76,7 +76,6 @@ pub struct BuildReport {
 }
 
 impl BuildReport {
-    /// The case of a run.
     pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
         self.database.cases(&run.case.group).iter().find(|case| case.id.name == run.case.name)
     }

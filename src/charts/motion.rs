@@ -23,29 +23,24 @@ pub enum Quantity {
 /// Histories of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BodyMotion {
-    /// Its name.
     pub(crate) name: String,
     /// Speed in m/s, one value per time.
     pub(crate) v_m_per_s: Vec<f64>,
-    /// Acceleration in m/s².
     pub(crate) a_m_per_s2: Vec<f64>,
 }
 
 /// Histories of an interface.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct InterfaceMotion {
-    /// Its name.
     pub(crate) name: String,
     /// Deflection in m, one value per time.
     pub(crate) deflection_m: Vec<f64>,
-    /// Force in N.
     pub(crate) force_n: Vec<f64>,
 }
 
 /// Energies of the whole chain, one value per time, in J.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Energies {
-    /// Of the motion.
     pub(crate) kinetic_j: Vec<f64>,
     /// That would come back.
     pub(crate) stored_j: Vec<f64>,

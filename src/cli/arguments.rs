@@ -40,7 +40,6 @@ pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     })
 }
 
-/// Rules for the maximal crush.
 pub(super) const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
     ("spline", MaxCrushRule::Spline, "Cubic spline through the training speeds (reference method)"),
     ("monotone", MaxCrushRule::Monotone, "Monotone cubic through (0, 0) and the training speeds"),

@@ -43,7 +43,6 @@ static FE_RUNS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/fe");
 const GROUP: &str = "lead-car-wall";
 const SPEED_M_PER_S: f64 = 50.0 * M_PER_S_PER_KM_PER_H;
 
-/// Seed of the forests.
 const SEED: u64 = 0;
 
 /// FE's run of a whole train, for the comparison of methods.
@@ -53,7 +52,6 @@ static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set
 static SCENARIOS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/examples/trains");
 /// The one that the demo runs.
 const SCENARIO: &str = "scenario.toml";
-/// Those that the report shows.
 const REPORTED: [&str; 2] = [SCENARIO, "en15227-identical-units.toml"];
 
 /// Groups and the model files of their curves.

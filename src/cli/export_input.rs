@@ -106,7 +106,6 @@ impl Input {
         }
     }
 
-    /// The curves.
     pub(super) fn curves(&self, chosen: &Chosen<'_>) -> Result<Curves, Failure> {
         let of_case = |case: &Case| -> Result<ExportInput, Failure> {
             Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })

@@ -7,7 +7,6 @@ use crate::file;
 
 use super::Failure;
 
-/// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileKind {
     /// Curve database.
@@ -30,7 +29,6 @@ const HEAD: u64 = 4096;
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 impl FileKind {
-    /// The kind of a file.
     pub(super) fn of(path: &Path) -> Result<Self, Failure> {
         let mut head = Vec::new();
         file::open(path)

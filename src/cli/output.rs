@@ -30,7 +30,6 @@ pub(super) fn print_data<T, E: Error + 'static>(
     Ok(written)
 }
 
-/// Prints one JSON document.
 pub(super) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     // JSON escapes the others itself; they stand within strings only.
     let escaped = |code: u8| format!("\\u{code:04x}");

@@ -61,9 +61,6 @@ pub(crate) struct Difference {
 const STEPS: usize = 400;
 
 /// Holds cases against the first of them.
-///
-/// # Errors
-/// If a case has no loading branch.
 pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;

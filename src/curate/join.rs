@@ -47,10 +47,6 @@ pub(crate) struct Target {
 
 /// Joins the databases at `inputs`, in their order, into the file at `output`, which is one of them
 /// and then comes first, or is not there yet. Equal curves of a group are taken once, with the tags and notes of both.
-///
-/// # Errors
-/// If different curves have one name and nothing says what to do, if a group would
-/// have two kinds of speed or force, or a file cannot be read or written.
 pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,
@@ -85,9 +81,6 @@ pub(crate) fn merge(
 
 /// Copies the chosen cases of the database at `path`. A copy in another group is no longer its
 /// study's: building that leaves it as it is.
-///
-/// # Errors
-/// As of [`merge`], and if nothing is chosen or a case would be copied to its own place.
 pub(crate) fn copy(
     path: &Path,
     selection: &Selection,
@@ -139,7 +132,6 @@ pub(crate) fn copy(
 /// A case that is to be joined.
 struct Incoming {
     case: Case,
-    /// Where it was.
     from: CasePath,
     /// The hashes that it was written with if somebody has changed it since.
     altered: Option<BTreeMap<String, String>>,

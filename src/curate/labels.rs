@@ -105,10 +105,6 @@ impl Labels {
 
 /// Changes tags and notes of the chosen cases of the database at `path`; returns these as they are
 /// now. Where nothing changes the file is not written.
-///
-/// # Errors
-/// If nothing is chosen, a text is no tag or note, or one that is to be taken away
-/// is not there.
 pub(crate) fn label(
     path: &Path,
     selection: &Selection,

@@ -36,9 +36,7 @@ pub(crate) use tables::write_tables;
 /// Whether a database is changed or only asked what would change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Effect {
-    /// The file is written.
     Written,
-    /// It stays as it is.
     OnlySaid,
 }
 

@@ -10,9 +10,6 @@ use crate::database::{CasePath, Database, names};
 use crate::file::WriterLock;
 
 /// Removes the chosen cases from the database at `path`; returns them.
-///
-/// # Errors
-/// If nothing is chosen, or the database cannot be written.
 pub(crate) fn remove(
     path: &Path,
     selection: &Selection,
@@ -27,9 +24,6 @@ pub(crate) fn remove(
 }
 
 /// Gives the one chosen case another name in its group; returns both.
-///
-/// # Errors
-/// If not just one is chosen, or the name is none or another case's.
 pub(crate) fn rename_case(
     path: &Path,
     group: Option<&str>,
@@ -51,9 +45,6 @@ pub(crate) fn rename_case(
 }
 
 /// Gives a group another name; returns its cases as they are called now.
-///
-/// # Errors
-/// If there is no such group, or the name is none or another group's.
 pub(crate) fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<CasePath>, Error> {
     check("group", name)?;
     let _lock = WriterLock::take(path)?;

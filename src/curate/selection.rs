@@ -91,10 +91,6 @@ impl Selection {
     }
 
     /// The chosen cases, by group, speed and name; `path` is for messages.
-    ///
-    /// # Errors
-    /// For a group or name that is not there or is in several groups, and if
-    /// nothing is chosen; it lists what there is.
     pub(crate) fn find<'a>(
         &self,
         path: &Path,

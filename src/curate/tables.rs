@@ -22,9 +22,6 @@ pub(crate) enum Tables {
 /// Writes the tables of cases into the folder at `path`, which is made if it is not there; returns
 /// their paths. Numbers have as many digits as they need to be read back the same; what a case
 /// does not have is empty.
-///
-/// # Errors
-/// [`Error`] if the folder cannot be made or a table not be written.
 pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,

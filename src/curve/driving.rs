@@ -94,9 +94,6 @@ impl DrivingCurve {
 
     /// The curve of a case: the recipe's force, or for [`ForceKind::Body`] beside a contact
     /// force the recorded one of the body's motion.
-    ///
-    /// # Errors
-    /// [`NoDrivingCurve`] if the case has no such curve.
     pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
         let is_other = force == ForceKind::Body && case.curves.force_kind == ForceKind::Contact;
         if is_other && !case.moves_by_its_force() {
@@ -133,9 +130,6 @@ impl DrivingCurve {
 
     /// The same with the loading branch continued by what lies beyond it, at the level that the
     /// branch ends with.
-    ///
-    /// # Errors
-    /// If the two make no envelope.
     pub(crate) fn continued(mut self) -> Result<Self, Error> {
         let Some(beyond) = self.beyond.take() else { return Ok(self) };
         let end = self.loading.end_m();
@@ -156,9 +150,6 @@ impl DrivingCurve {
     }
 
     /// The same with all forces, and the stiffness with them, times `factor` (above 0).
-    ///
-    /// # Errors
-    /// If the products are no finite numbers.
     pub(crate) fn scaled(mut self, factor: f64) -> Result<Self, Error> {
         let times = |e: &Envelope| {
             let force_n = e.force_n().iter().map(|f| f * factor).collect();

@@ -176,10 +176,6 @@ impl Claim<'_> {
     }
 
     /// Refuses what no crash can be, with the likely cause.
-    ///
-    /// # Errors
-    /// [`Impossible`] if work or impulse lie outside 0.67 to 1.5 of what the impact asks for, or
-    /// speed or crush are those of no vehicle (domain: units, masses, speeds of another run).
     pub(crate) fn check(&self) -> Result<Balance, Impossible> {
         let balance = self.balance();
         let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);

@@ -24,9 +24,6 @@ pub(crate) fn loading_end(curve: &Curve) -> usize {
 
 /// The samples up to the largest deflection whose deflection advances, begun at 0. A record
 /// that begins with a deflection (an offset) rises to it in a straight line.
-///
-/// # Errors
-/// If fewer than two samples remain.
 pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     let end = loading_end(curve);
     let (d, f) = (curve.deflection_m(), curve.force_n());

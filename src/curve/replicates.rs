@@ -29,9 +29,6 @@ fn measured(recipe: &str) -> serde_json::Value {
 
 /// The mean of runs that agree in speed, masses, parameters and recipe; a single run as it is.
 /// It reaches as far as the shortest of them.
-///
-/// # Errors
-/// If the shortest ends before the first one's second state.
 pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, Error> {
     if others.is_empty() {
         return Ok(first.clone());

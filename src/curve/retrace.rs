@@ -43,9 +43,6 @@ const SHORTEST: f64 = 1e-6;
 const FINEST: f64 = 5e-6;
 
 /// The motion of a table under an impact.
-///
-/// # Errors
-/// It says what of the table tells none.
 pub(super) fn retrace(
     table: &Table<'_>,
     impact: &Impact,

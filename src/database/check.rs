@@ -44,9 +44,6 @@ pub(crate) struct Checked {
 }
 
 /// Checks the database file at `path`; damage of a case is a finding.
-///
-/// # Errors
-/// If it cannot be opened, or its groups not be listed.
 pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
     // Each has its own bound of bytes, and every dataset is read twice.
     let (raw, decoded) = (layout::open(path)?, layout::open(path)?);

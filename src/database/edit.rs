@@ -19,9 +19,6 @@ use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Grou
 /// Writes a database over the file at `path` with all that others have put into it, which is
 /// `before`: into a copy of the file, in which only what differs is changed, and which then takes
 /// its place.
-///
-/// # Errors
-/// If something would be lost; the file is then unchanged.
 pub(super) fn write_keeping(
     database: &Database,
     path: &Path,
@@ -91,7 +88,6 @@ struct Moves {
     groups: BTreeMap<String, String>,
     /// Cases that have to be moved once the groups have been.
     cases: Vec<(CasePath, CasePath)>,
-    /// All cases that are moved.
     all: BTreeMap<CasePath, CasePath>,
 }
 

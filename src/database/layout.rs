@@ -30,7 +30,6 @@ const WRITTEN_BY: &str = concat!("crumple ", env!("CARGO_PKG_VERSION"));
 /// The oldest it reads: that one has no body force, dates, origins, tags and dimension scales.
 pub(crate) const OLDEST: i64 = 2;
 
-/// Attributes of the root that are this layout's.
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
 /// Group of a case with the curve at the solver's rate.
 pub(crate) const ORIGINAL: &str = "original";
@@ -219,7 +218,6 @@ pub(crate) fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Con
     Ok(content)
 }
 
-/// The root's attributes.
 pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
     [
         ("format", AttrValue::VarLenString(FORMAT.into())),
@@ -337,9 +335,6 @@ fn not_hdf5(path: &Path, detail: impl Display) -> Error {
 }
 
 /// Opens a database file; values are not read yet.
-///
-/// # Errors
-/// If it is no file, not HDF5, not a curve database, or of another layout.
 pub(crate) fn open(path: &Path) -> Result<Opened<'_>, Error> {
     let file = hdf5::open(path).map_err(|e| match e {
         OpenError::Io(source) => Error::io(path, source),
@@ -425,7 +420,6 @@ impl<'a> Opened<'a> {
         Ok(written_by == Some(WRITTEN_BY))
     }
 
-    /// The attributes of a group.
     pub(crate) fn group_attributes(&self, name: &str) -> Result<HashMap<String, AttrValue>, Error> {
         let group = self.check(name, self.file.root().group(name))?;
         self.check(name, group.attrs())

@@ -198,10 +198,6 @@ impl Database {
 
     /// Adds cases or replaces those of the same group, name and study, as [`Database::put`]; the
     /// work grows with the number of cases, not with its square.
-    ///
-    /// # Errors
-    /// If a name is taken by another study; some cases may have been
-    /// put by then.
     pub(crate) fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), Error> {
         let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
         for case in cases {
@@ -241,10 +237,6 @@ impl Database {
     }
 
     /// Gives cases other names and groups, all at once.
-    ///
-    /// # Errors
-    /// If a place is that of a case that stays, or meant for two; nothing
-    /// is changed then.
     pub(crate) fn relocate(&mut self, moves: &BTreeMap<CasePath, CasePath>) -> Result<(), Error> {
         let mut places = HashSet::new();
         for case in self.groups.values().flatten() {

@@ -4,9 +4,6 @@
 const MAX_NAME: usize = 200;
 
 /// Why a text is no name of a group or case, as a message says it of "it".
-///
-/// # Errors
-/// The reason.
 pub(crate) fn check(name: &str) -> Result<(), &'static str> {
     if name.trim().is_empty() || name == "." || name == ".." {
         Err("it is none")

@@ -105,9 +105,6 @@ impl Feature {
 }
 
 /// The values of `features` for the parameters of a query.
-///
-/// # Errors
-/// It names what is missing, or the categories there are.
 pub(crate) fn feature_values(
     features: &[Feature],
     parameters: &BTreeMap<String, Parameter>,
@@ -287,9 +284,6 @@ pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usiz
 }
 
 /// Whether all cases have one kind of speed and of force.
-///
-/// # Errors
-/// It names two that differ.
 pub(crate) fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Result<(), Error> {
     let mut cases = cases.into_iter();
     let Some(first) = cases.next() else { return Ok(()) };

@@ -20,7 +20,6 @@ pub struct Place {
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Spot {
     line: usize,
-    /// Characters before it.
     before: usize,
     /// Its length in characters, 1 or more.
     length: usize,

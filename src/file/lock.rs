@@ -56,9 +56,6 @@ impl Drop for WriterLock {
 
 /// Opens the file at `path`, which is made if need be, and locks it; `None` if another process
 /// holds it. The kernel frees the lock with the file, however the process ends.
-///
-/// # Errors
-/// Those of the operating system.
 pub(super) fn lock(path: &Path) -> io::Result<Option<File>> {
     loop {
         // Only a file: opening a pipe would wait, and a link leads elsewhere.

@@ -26,9 +26,6 @@ pub(crate) enum Kind {
 }
 
 /// What stands at `path`. It is not opened: opening a pipe waits for its writer.
-///
-/// # Errors
-/// Those of the operating system; for a folder, a device or a socket what it is.
 pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
     let kind = fs::metadata(path)?.file_type();
     let refused = |what: &str| {
@@ -54,9 +51,6 @@ fn is_pipe(_: fs::FileType) -> bool {
 }
 
 /// Opens a file for reading; all else is refused before it is opened.
-///
-/// # Errors
-/// Where there is no such file, and for folders, devices and pipes, with what to do instead.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
     match kind(path)? {
         Kind::File => File::open(path),
@@ -68,9 +62,6 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
 }
 
 /// Reads a file of `most` bytes at most.
-///
-/// # Errors
-/// If it cannot be opened, or is no regular file or pipe; for a longer file its size and the bound.
 pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let size = file.metadata()?.len();
@@ -94,9 +85,6 @@ pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 }
 
 /// Reads a text file of `most` bytes at most.
-///
-/// # Errors
-/// As of [`read`], and for bytes that are not UTF-8.
 pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(read(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();

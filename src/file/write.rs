@@ -19,18 +19,12 @@ pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
 /// Writes `bytes` to `path` as a whole: to a temporary file beside it, then by renaming.
 ///
 /// A device or a pipe cannot be renamed over and is written directly.
-///
-/// # Errors
-/// [`Error`] names the path; nothing half-written stays behind.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_all_whole(&[(path, bytes)])
 }
 
 /// Writes several files as `write_whole` does: none is renamed into place before all of
 /// them are written.
-///
-/// # Errors
-/// [`Error`] names the first path that cannot be written.
 pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), Error> {
     let mut prepared: Vec<(&Path, Draft)> = Vec::new();
     for (path, bytes) in files {
@@ -76,9 +70,6 @@ pub fn write_at<T>(
 
 /// Writes a file as `write_whole` does, by a function that is given the path of the temporary
 /// file and may do with it what it likes but remove it.
-///
-/// # Errors
-/// [`Error`] names the path, or of `fill`; nothing is replaced then.
 pub(crate) fn write_by_path<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,

@@ -101,10 +101,6 @@ where
     type Object = RegressionForest<F>;
 
     /// Fits the forest to records (samples × features) and one target per sample.
-    ///
-    /// # Errors
-    /// [`ForestError`] for an empty data set, NaN or infinity, or more features per split
-    /// than there are.
     fn fit(
         &self,
         dataset: &DatasetBase<ArrayBase<D, Ix2>, T>,
@@ -304,7 +300,6 @@ fn importance(gains: &[Vec<f64>]) -> Vec<f64> {
     shares
 }
 
-/// Nodes that are packed in the time that a row walks.
 const NODES_PACKED_AS_ROW_WALKS: usize = 16;
 
 /// Trees from which on rows walk in the order of the first tree's leaves, which costs about

@@ -29,9 +29,6 @@ impl RegressionForest<f64> {
     /// N × 1. Splits and sums are double, so records take the same ways as here; the output
     /// is rounded to float, by 6e-8 of its value at most, because the operator has no
     /// other. NaN goes right, as here. Metadata `features` and `target` hold the names.
-    ///
-    /// # Errors
-    /// If the names do not fit the features or the file would be too large.
     pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, Error> {
         let features = self.features();
         if description.features.len() != features {

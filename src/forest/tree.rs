@@ -82,9 +82,6 @@ impl<F: Float> Tree<F> {
     }
 
     /// Checks the invariant of stored arrays against the number of features.
-    ///
-    /// # Errors
-    /// It names the first node that breaks it.
     pub(crate) fn check(&self, features: usize) -> Result<(), Error> {
         let nodes = self.nodes();
         let lengths = [self.feature.len(), self.threshold.len(), self.left.len(), self.right.len()];

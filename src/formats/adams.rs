@@ -11,7 +11,6 @@ use crate::unit::{FORCE, LENGTH, UnitSystem};
 
 /// Numbers per line of a statement.
 const PER_LINE: usize = 4;
-/// Columns of a comment.
 const COMMENT_WIDTH: usize = 200;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {

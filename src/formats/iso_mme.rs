@@ -105,9 +105,6 @@ pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Err
 }
 
 /// The interval of even times.
-///
-/// # Errors
-/// If the times are not even.
 pub(crate) fn interval_s(times: &[f64]) -> Result<f64, Error> {
     let steps = times.len().saturating_sub(1).max(1) as f64;
     let interval = (times[times.len() - 1] - times[0]) / steps;
@@ -126,9 +123,6 @@ pub(crate) fn interval_s(times: &[f64]) -> Result<f64, Error> {
 }
 
 /// The files of a test.
-///
-/// # Errors
-/// If there are more than 999 channels.
 pub(crate) fn folder(test: &Test<'_>, channels: &[Channel]) -> Result<Exported, Error> {
     if channels.len() > 999 {
         let needs = format!("999 channels or fewer, found {}", channels.len());

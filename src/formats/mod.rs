@@ -64,7 +64,6 @@ enum Writer {
     Together(fn(&[ExportCurve], &Options) -> Result<Exported, Error>),
     /// A predicted or recorded curve with both forces.
     Whole(fn(&ExportInput, &Options) -> Result<Exported, Error>),
-    /// A model.
     Model(fn(&Model, &Options) -> Result<Exported, Error>),
     /// A recorded case with its histories.
     Case(fn(&Case, &Options) -> Result<Exported, Error>),
@@ -292,9 +291,6 @@ impl Format {
     }
 
     /// The files of recorded cases, one set for each.
-    ///
-    /// # Errors
-    /// If the target does not take cases.
     pub(crate) fn export_cases(
         &self,
         cases: &[Case],
@@ -426,9 +422,6 @@ pub(crate) fn names() -> String {
 }
 
 /// The format that the file's extension names.
-///
-/// # Errors
-/// It lists the extensions there are.
 pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let known = || {

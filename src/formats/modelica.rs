@@ -12,7 +12,6 @@ use super::text::{Lines, nine_digits, title};
 use super::thin::thinned;
 use super::{ExportCurve, Exported, Options, Tail, TargetUnloading};
 
-/// Columns of a comment.
 const COMMENT_WIDTH: usize = 200;
 /// Most points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;

@@ -11,9 +11,7 @@ use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, run_time_s};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// Columns of a title.
 const TITLE_WIDTH: usize = 100;
-/// Uncoupled hardening.
 const HARDENING: u32 = 2;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {

@@ -38,9 +38,6 @@ const LAST: f64 = 0.1;
 ///
 /// Points stand at multiples of the curve's last interval, so that a table of even deflections
 /// stays one.
-///
-/// # Errors
-/// If forces or deflections are beyond a double.
 pub(crate) fn with_tail(
     curve: &Envelope,
     beyond: Option<&Envelope>,

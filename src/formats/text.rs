@@ -39,7 +39,6 @@ impl Lines {
         let _ = writeln!(self.0, "{line}");
     }
 
-    /// The bytes of all lines.
     pub(super) fn into_bytes(self) -> Vec<u8> {
         self.0.into_bytes()
     }

@@ -11,9 +11,6 @@ use crate::curve::Envelope;
 /// Whyatt, Cartographic Journal 30, 1993). The forces at the others are then those of the least squares
 /// over the whole curve. `kept` is the index of a point that stays, such as the maximal crush; the forces up
 /// to it are scaled so that the energy to it is the same. A curve of so few points stays as it is.
-///
-/// # Errors
-/// If the result is no envelope.
 pub(crate) fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     if d.len() <= most.max(3) {
@@ -115,9 +112,6 @@ const KINK: f64 = 0.02;
 
 /// The same function with more points, so that Akima and cubic splines through them keep its
 /// energy: at least 200, and one close to each side of a kink, where a spline would overshoot.
-///
-/// # Errors
-/// If the result is no envelope.
 pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     let widest_m = curve.end_m() / FEWEST as f64;
@@ -151,7 +145,6 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
 pub(crate) enum Softened {
     /// There is none that steep.
     Nothing,
-    /// The softer curve.
     Curve(Envelope),
     /// The energy could only be kept by changing the curve's end, or forces by more than a quarter.
     Impossible,
@@ -222,9 +215,6 @@ const MOST_RAISED: f64 = 1.25;
 /// The curve from the origin: a force at zero deflection is reached within a thousandth of the deflection of
 /// `end`, at the same energy to there. The second value is the index of `end` among the points. `None` for a
 /// curve that begins at the origin already.
-///
-/// # Errors
-/// If the result is no envelope.
 pub(crate) fn from_origin(
     curve: &Envelope,
     end: usize,

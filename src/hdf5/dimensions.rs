@@ -20,7 +20,6 @@ pub(crate) struct Scale(usize);
 /// The scales of a file that is being encoded, and how many dimensions they were given to.
 #[derive(Debug, Default)]
 pub(crate) struct Dimensions {
-    /// Names by number.
     names: Vec<String>,
     /// Datasets that have scales.
     attached: usize,
@@ -32,11 +31,9 @@ pub(crate) enum DimensionError {
     /// What was put into the file's headers is not found there.
     #[error("{what} of {expected} dimension scales: {found} found in the encoded file")]
     Count {
-        /// What is counted.
         what: &'static str,
         /// As many as were put in.
         expected: usize,
-        /// As many as are there.
         found: usize,
     },
     /// The attribute's text has not the bytes that the references need.
@@ -105,9 +102,6 @@ impl Dimensions {
     }
 
     /// Puts the references into an encoded file.
-    ///
-    /// # Errors
-    /// [`DimensionError`] if the encoder has not written what the module rests on.
     pub(crate) fn finish(&self, file: &mut Vec<u8>) -> Result<(), DimensionError> {
         let end = file.len() as u64;
         let mut pieces = vec![Piece { at: 0, bytes: std::mem::take(file) }];
@@ -123,9 +117,6 @@ impl Dimensions {
 
     /// Puts the references into the pieces of a file that ends at `end` and whose headers they
     /// hold; what comes behind its end is a further piece.
-    ///
-    /// # Errors
-    /// As [`Dimensions::finish`].
     pub(crate) fn finish_pieces(
         &self,
         pieces: &mut Vec<Piece>,
@@ -180,7 +171,6 @@ pub(crate) struct Piece {
 
 /// What the headers of a file hold of scales.
 struct Found {
-    /// Headers that are changed.
     headers: Vec<Header>,
     /// Address of each scale by its number.
     scales: Vec<Option<u64>>,

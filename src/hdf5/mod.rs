@@ -35,9 +35,6 @@ pub(crate) enum OpenError {
 }
 
 /// Opens an HDF5 file for reading; values are not read yet.
-///
-/// # Errors
-/// [`OpenError`] for what is no file, or not HDF5.
 pub(crate) fn open(path: &Path) -> Result<File, OpenError> {
     file::open(path)?;
     if !hdf5_pure::is_hdf5(path)? {
@@ -47,9 +44,6 @@ pub(crate) fn open(path: &Path) -> Result<File, OpenError> {
 }
 
 /// Bytes of a dataset's values, at least as many as they take as doubles.
-///
-/// # Errors
-/// [`Error`] if the dataset's header is damaged.
 pub(crate) fn declared_bytes(dataset: &Dataset) -> Result<u64, Error> {
     let size = dataset.element_size()?.max(8);
     Ok(dataset.shape()?.iter().fold(size, |bytes, &n| bytes.saturating_mul(n)))

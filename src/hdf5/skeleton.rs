@@ -21,13 +21,11 @@ use super::{DatasetBuilder, FileBuilder};
 
 /// First bytes of the values that come later; the number of the dataset follows.
 const MARK: &[u8; 16] = b"VALUESCOMELATER!";
-/// Bytes of mark and number.
 const MARK_BYTES: usize = 24;
 
 /// The datasets that get their values later.
 #[derive(Default)]
 pub(crate) struct Skeleton {
-    /// Bytes of each.
     lengths: Vec<usize>,
 }
 

@@ -17,7 +17,6 @@ use crate::file::write_at;
 pub(crate) enum Values {
     /// 64 bits, signed.
     Integer,
-    /// Doubles.
     Real,
     /// UTF-8, filled up with zero bytes.
     Text {
@@ -85,9 +84,6 @@ const SMALL_BYTES: u64 = 1 << 16;
 /// A column is a dataset of its name, in which `_` stands for `/`; the dataset `columns` lists
 /// the names in their order. Nothing is held but what `fill` holds and columns up to 64 KiB,
 /// and the same values give the same bytes in whatever pieces they are put.
-///
-/// # Errors
-/// It if the target cannot be written, or of `fill`.
 pub(crate) fn write_table(
     path: &Path,
     attributes: &[(&str, Attribute)],
@@ -189,9 +185,6 @@ pub(crate) struct Table {
 
 impl Table {
     /// Opens a table whose root attribute `format` is `format`; values are not read yet.
-    ///
-    /// # Errors
-    /// It if it is not HDF5, or no such table.
     pub(crate) fn open(path: &Path, format: &str) -> Result<Self, Error> {
         let file = super::open(path).map_err(|source| match source {
             OpenError::Io(source) => Error::io(path, source),
@@ -233,9 +226,6 @@ impl Table {
     }
 
     /// An attribute of the file, if it has it.
-    ///
-    /// # Errors
-    /// [`Error::Damaged`] if attributes cannot be read.
     pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, Error> {
         let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
         Ok(match all.remove(name) {
@@ -248,9 +238,6 @@ impl Table {
     }
 
     /// Bytes of `rows` values of a column from `row` on.
-    ///
-    /// # Errors
-    /// [`Error::Damaged`] names the column.
     pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, Error> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);

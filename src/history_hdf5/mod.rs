@@ -53,10 +53,6 @@ pub struct Beside<'a> {
 /// An undamaged nodout is written state by state while it is read, on all threads, and
 /// never held as a whole; any other file is read first. Gives back what the file says of
 /// itself, with its problems; the histories are left out where they went straight on.
-///
-/// # Errors
-/// [`ConvertError`] if the file cannot be read or the output not be written; the output is
-/// then unchanged.
 pub(crate) fn convert(
     input: &Path,
     format: Option<&str>,
@@ -157,7 +153,6 @@ struct Layout {
     section: String,
     units: Option<UnitSystem>,
     titles: HashMap<EntityId, String>,
-    /// Dimensions of entities.
     entities: Vec<(Vec<EntityId>, Scale)>,
     /// Components, and dimensions with titles, of more entities than an attribute holds texts of.
     long: Vec<(String, Vec<EntityId>)>,
@@ -229,7 +224,6 @@ impl Layout {
         dataset
     }
 
-    /// The dimension of these entities.
     fn dimension(&mut self, entities: &[EntityId]) -> Scale {
         if let Some((_, scale)) = self.entities.iter().find(|(known, _)| known == entities) {
             return *scale;

@@ -21,7 +21,6 @@ enum Quantity {
     Volume,
     Density,
     Time,
-    /// A ratio or a strain.
     Pure,
 }
 

@@ -54,9 +54,6 @@ pub(crate) struct Settings {
 
 /// Adds the curves of `items` to the database at `path`, which is made if it is not there; returns
 /// their cases in the order of the items.
-///
-/// # Errors
-/// It names the file and what to do; the database is then unchanged.
 pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
     let mut database =
@@ -93,9 +90,6 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
 }
 
 /// The case that the curve of one file makes, without a database.
-///
-/// # Errors
-/// It names the file and what to do.
 pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Error> {
     case::of(item, settings, None)
 }

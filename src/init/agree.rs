@@ -19,7 +19,6 @@ const AS_GOOD: (f64, f64) = (1.5, 0.01);
 const CENTRE_AS_GOOD: f64 = 0.05;
 /// Steps of the roughness below which velocities are equally smooth, for each whole.
 const EVEN: f64 = 10.0;
-/// Alternatives that are named.
 const NAMED: usize = 5;
 
 /// The recipe that most runs agree on.
@@ -200,7 +199,6 @@ impl<'a> View<'a> {
         by_force.map_or(1.0, |best| best.residual)
     }
 
-    /// The force of an explanation.
     fn moved_by(&self, explanation: &Explanation) -> Option<&ForceCandidate> {
         explanation.force.map(|force| &self.survey.forces[force])
     }

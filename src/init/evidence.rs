@@ -45,11 +45,8 @@ impl std::fmt::Display for Evidence {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Proposed<T> {
-    /// It was found.
     Found {
-        /// As it is proposed.
         value: T,
-        /// Where it is from.
         #[serde(flatten)]
         evidence: Evidence,
     },
@@ -61,7 +58,6 @@ pub(crate) enum Proposed<T> {
 }
 
 impl<T> Proposed<T> {
-    /// The value, if there is one.
     pub(crate) fn value(&self) -> Option<&T> {
         match self {
             Self::Found { value, .. } => Some(value),

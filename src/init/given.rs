@@ -20,7 +20,6 @@ pub struct Given {
     pub node: Option<i64>,
     /// Node of the other body of a pair.
     pub minus_node: Option<i64>,
-    /// The contact force.
     pub(crate) force: Option<GivenForce>,
     /// Mass of the body, in kg.
     pub mass_kg: Option<f64>,
@@ -37,7 +36,6 @@ pub(crate) struct GivenForce {
     pub(crate) file: String,
     /// Number of the wall, interface or section.
     pub(crate) id: i64,
-    /// Side of an interface.
     pub(crate) side: Option<Side>,
     /// Such as `normal_force`.
     pub(crate) component: Option<String>,
@@ -50,7 +48,6 @@ pub(crate) struct GivenForce {
     FORCES.join(", ")
 )]
 pub(crate) struct NoForce {
-    /// The text.
     pub(crate) text: String,
 }
 

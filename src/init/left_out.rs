@@ -9,7 +9,6 @@ use serde::Serialize;
 pub struct LeftOut {
     /// The folder, as it was found.
     pub path: PathBuf,
-    /// Why it is left out.
     #[serde(flatten)]
     pub(crate) reason: Reason,
     /// The reason in words.
@@ -32,13 +31,11 @@ pub(crate) enum Reason {
     /// There is nothing in the folder.
     #[error("the folder is empty")]
     Empty,
-    /// There are files, and none is a solver's.
     #[error("it holds no solver files")]
     NoSolverFiles,
     /// A solver's file has another name than the solver gave it.
     #[error("it holds no file with a solver's name, but {file} looks like a {format}: name it so")]
     Renamed {
-        /// The file.
         file: String,
         /// What it looks like.
         format: String,
@@ -48,10 +45,7 @@ pub(crate) enum Reason {
     OnlyDeck,
     /// A folder or file cannot be read.
     #[error("{why}")]
-    Unreadable {
-        /// Why not, with the place.
-        why: String,
-    },
+    Unreadable { why: String },
     /// No file holds motions of nodes.
     #[error("it has no histories of nodes (a nodout, or a binout or T01 with one): it has {found}")]
     NoMotion {
@@ -61,7 +55,6 @@ pub(crate) enum Reason {
     /// The record has hardly begun.
     #[error("it died: {file} holds {states} whole {}{damage}", if *.states == 1 { "state" } else { "states" })]
     FewStates {
-        /// The file.
         file: String,
         /// How many whole states it holds.
         states: usize,
@@ -87,10 +80,7 @@ pub(crate) enum Reason {
     Stands,
     /// The chosen histories cannot be used.
     #[error("{why}")]
-    Unusable {
-        /// Which, and why.
-        why: String,
-    },
+    Unusable { why: String },
     /// Its files are those of another run.
     #[error("its files hold the same bytes as those of {of}")]
     SameBytes {
@@ -117,8 +107,5 @@ pub(crate) enum Reason {
     },
     /// The study's build would refuse it.
     #[error("crumple build would refuse it: {why}")]
-    Refused {
-        /// Why.
-        why: String,
-    },
+    Refused { why: String },
 }

@@ -24,7 +24,6 @@ pub(super) struct Measured<'a> {
     pub(crate) units: &'a Proposed<UnitSystem>,
 }
 
-/// A run in SI.
 pub(super) struct SiRun<'a> {
     pub recorded: &'a Recorded,
     /// Closing speed before the contact, twice the run's for half a model.

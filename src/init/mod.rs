@@ -44,9 +44,6 @@ pub(crate) use scenario::ScenarioProposal;
 pub(crate) use scenario::propose_scenario;
 
 /// Refuses a file that is there already.
-///
-/// # Errors
-/// If there is a file; a device or a pipe may be written to.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());

@@ -23,13 +23,11 @@ pub struct Proposal {
     /// Whether the runs are of one body against the symmetry plane of a pair: only known if the
     /// caller says so.
     pub(crate) half_model: bool,
-    /// Where the deflection comes from.
     pub(crate) deflection: Proposed<DeflectionSource>,
     /// Title of the node, then of the other body's.
     pub(crate) node_titles: Vec<Option<String>>,
     /// Nodes that could stand for the same bodies, a list for each.
     pub(crate) other_nodes: Vec<Vec<Alternative>>,
-    /// Where the force comes from.
     pub(crate) force: Proposed<ForceSource>,
     /// Title of the wall or interface.
     pub(crate) force_title: Option<String>,
@@ -37,13 +35,11 @@ pub struct Proposal {
     pub(crate) other_side: bool,
     /// Forces that could be meant.
     pub(crate) other_forces: Vec<Alternative>,
-    /// Filter of the force.
     pub(crate) filter: Proposed<Filter>,
     /// Common times of the runs.
     pub(crate) sampling: Proposed<Sampling>,
     /// In order of speed.
     pub(crate) runs: Vec<ProposedRun>,
-    /// Folders that are left out.
     pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
     pub(crate) notes: Vec<String>,
@@ -54,11 +50,9 @@ pub struct Proposal {
 /// A run of a proposed study.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ProposedRun {
-    /// The folder, as it was found.
     pub(crate) folder: PathBuf,
     /// The folder as the study names it.
     pub(crate) path: String,
-    /// Name of the case.
     pub(crate) name: String,
     /// Impact speed in m/s: of a pair the closing speed.
     pub(crate) speed_m_per_s: Proposed<f64>,

@@ -58,10 +58,7 @@ pub(super) struct Recorded {
 ///
 /// # Errors
 /// If there is no run, none can be used, or they are several groups.
-pub fn propose(
-    request: &Request,
-    progress: impl Fn(&str) + Sync,
-) -> Result<Proposal, Error> {
+pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Proposal, Error> {
     let given = &request.given;
     let folders = Folders::find(&request.folders)?;
     if given.group.is_none() {

@@ -159,9 +159,6 @@ impl Record {
     }
 
     /// The first state in which the bodies do not close any more: the end of the loading.
-    ///
-    /// # Errors
-    /// The closing speed of the last state over that of the first, if they still close then.
     pub(super) fn loading_end(&self) -> Result<usize, f64> {
         let last = self.time.len() - 1;
         match (0..=last).find(|&i| self.closing(i) <= 0.0) {

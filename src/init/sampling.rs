@@ -9,7 +9,6 @@ use crate::curve::recipe::{Filter, Sampling};
 const CFC: u32 = 60;
 /// Finer records are sampled at this interval: CFC 60 leaves nothing that needs more.
 const FINEST_S: f64 = 1e-4;
-/// Most states that are proposed.
 const MOST_STATES: f64 = 20_000.0;
 
 /// The times of a run's record.

@@ -57,7 +57,6 @@ pub(crate) struct ProposedCurve {
 pub(crate) struct ProposedTrain {
     /// Its name.
     pub name: &'static str,
-    /// Its speed in m/s.
     pub(crate) speed_m_per_s: Proposed<f64>,
     /// From the nose back.
     pub vehicles: Vec<ProposedVehicle>,
@@ -68,14 +67,10 @@ pub(crate) struct ProposedTrain {
 pub(crate) struct ProposedVehicle {
     /// Its name.
     pub name: String,
-    /// Its mass in kg.
     pub(crate) mass_kg: Proposed<f64>,
 }
 
 /// Proposes a scenario, which will stand at `path`, for one model or two.
-///
-/// # Errors
-/// If a model cannot be read, or they make no scenario.
 pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<ScenarioProposal, Error> {
     if !(1..=2).contains(&models.len()) {
         return Err(error!(

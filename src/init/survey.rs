@@ -119,7 +119,6 @@ impl Survey {
         Ok(Self { direction, aligned, bodies, forces })
     }
 
-    /// The force of a file and id.
     pub(super) fn force(&self, file: &str, id: i64) -> Option<usize> {
         self.forces.iter().position(|f| f.file == file && f.id == id)
     }

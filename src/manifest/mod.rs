@@ -12,17 +12,11 @@ use crate::guess;
 const MAX_BYTES: u64 = 16 << 20;
 
 /// Reads and parses the TOML file at `path`.
-///
-/// # Errors
-/// Of code [`Toml`](crate::error::ErrorCode::Toml), with the place of an unknown key, a missing key or a bad value.
 pub(crate) fn load<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     parse(path, &read_text(path)?)
 }
 
 /// Reads the text of the TOML file at `path`.
-///
-/// # Errors
-/// Of code [`Io`](crate::error::ErrorCode::Io) for what is no file, not UTF-8 or too large.
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     file::read_text(path, MAX_BYTES).map_err(|source| Error::io(path, source))
 }

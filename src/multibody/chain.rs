@@ -211,10 +211,6 @@ impl Chain {
 
     /// Gives the bodies other masses and speeds (kg, m/s) and the interfaces other gaps and
     /// slacks (m), in the order of the chain; the force laws stay.
-    ///
-    /// # Errors
-    /// [`ChainError`] names the body or interface whose value breaks the invariant; the chain is
-    /// then not to be run.
     pub(crate) fn adjust(
         &mut self,
         motions: &[(f64, f64)],

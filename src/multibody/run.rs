@@ -301,9 +301,6 @@ const MAX_OUTPUTS: f64 = 1e6;
 
 impl Grid {
     /// The longest step that divides the output interval and keeps to the step rule.
-    ///
-    /// # Errors
-    /// [`SimulationError`] for times that make no run, or one that is too long.
     pub(crate) fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, SimulationError> {
         let RunSettings { duration_s, output_interval_s, step_s, method, .. } = *settings;
         let times =

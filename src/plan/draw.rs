@@ -63,7 +63,6 @@ pub(crate) enum Distribution {
     },
     /// Of the quantity itself.
     Normal(Truncated),
-    /// Of the logarithm.
     Lognormal(Truncated),
 }
 
@@ -105,9 +104,6 @@ impl Truncated {
 
 impl Distribution {
     /// Every value between the ends is equally likely.
-    ///
-    /// # Errors
-    /// [`Error`] if the ends are not in order.
     pub(crate) fn uniform(from: f64, to: f64) -> Result<Self, Error> {
         if from < to {
             Ok(Self::Uniform { from, to })
@@ -117,9 +113,6 @@ impl Distribution {
     }
 
     /// The density rises from 0 at `from` to `mode`, and falls to 0 at `to`.
-    ///
-    /// # Errors
-    /// [`Error`] if the three are not in order.
     pub(crate) fn triangular(from: f64, mode: f64, to: f64) -> Result<Self, Error> {
         if from < to && from <= mode && mode <= to {
             Ok(Self::Triangular { from, mode, to })
@@ -129,9 +122,6 @@ impl Distribution {
     }
 
     /// Normal of mean and standard deviation, truncated to `[min, max]` (infinite: not).
-    ///
-    /// # Errors
-    /// [`Error`] if the deviation is not above 0 or the bounds leave nothing.
     pub(crate) fn normal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, Error> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));
@@ -140,9 +130,6 @@ impl Distribution {
     }
 
     /// Lognormal; mean and deviation are those of the quantity itself.
-    ///
-    /// # Errors
-    /// As of [`Distribution::normal`], and if mean or `max` is not above 0.
     pub(crate) fn lognormal(mean: f64, sd: f64, min: f64, max: f64) -> Result<Self, Error> {
         if !(sd > 0.0 && min < max) {
             return Err(order(sd));

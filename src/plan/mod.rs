@@ -237,7 +237,6 @@ impl JsonSchema for Entry {
 /// The values of one variable, in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Spread {
-    /// These.
     List(Vec<f64>),
     /// Names, of which an item has one by its index.
     Names(Vec<String>),
@@ -250,7 +249,6 @@ pub(crate) enum Spread {
         /// Number of values, 2 or more.
         steps: u64,
     },
-    /// Drawn for each item.
     Drawn(Distribution),
 }
 
@@ -278,9 +276,6 @@ pub(crate) struct Design {
 
 impl Plan {
     /// The design of these spreads, one per variable.
-    ///
-    /// # Errors
-    /// [`Error`] if `samples` is missing or without use, or the items are too many.
     pub(crate) fn design(&self, spreads: Vec<Spread>) -> Result<Design, Error> {
         let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
         let samples = match (self.samples, drawn) {
@@ -384,9 +379,6 @@ impl Design {
 
 impl Vary {
     /// Its values or distribution.
-    ///
-    /// # Errors
-    /// [`Error`] names the key.
     pub(crate) fn spread(&self) -> Result<Spread, Error> {
         if let Some(name) = self.distribution {
             self.refuse("distribution", &["values", "steps"])?;

@@ -35,7 +35,6 @@ pub(super) fn units_per_em() -> f64 {
 
 /// Above the baseline, in shares of the size.
 pub(super) const ASCENT: f64 = 0.77;
-/// Below it.
 pub(super) const DESCENT: f64 = 0.24;
 
 /// The characters of a text one behind the other. A character that the font lacks is a box.
@@ -91,7 +90,6 @@ pub(super) fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
     lines
 }
 
-/// The outline of a glyph.
 pub(super) fn outline(glyph: u16) -> Vec<Piece> {
     struct Pieces(Vec<Piece>);
     impl OutlineBuilder for Pieces {

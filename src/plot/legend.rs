@@ -7,11 +7,9 @@ use super::{font, look};
 /// Width of the sample beside a name, in pixels.
 const SAMPLE: f64 = 34.0;
 const GAP: f64 = 7.0;
-/// Between columns.
 const COLUMN_GAP: f64 = 20.0;
 const ROW: f64 = 19.0;
 pub(super) const SIZE: f64 = 13.0;
-/// Opacity of a band.
 pub(super) const BAND: f64 = 0.22;
 
 #[derive(PartialEq)]

@@ -40,12 +40,10 @@ const MARKERS: [Marker; 8] = [
     Marker::Bar,
 ];
 
-/// Colour of a look.
 pub(super) fn colour(look: usize) -> &'static str {
     COLOURS[look % 8]
 }
 
-/// Dash of a look.
 pub(super) fn dash(look: usize) -> &'static [f64] {
     DASHES[(look + look / 8) % 4]
 }

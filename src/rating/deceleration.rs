@@ -7,7 +7,6 @@ use super::differences::integral;
 
 /// The deceleration begins above this share of its largest value.
 const THRESHOLD: f64 = 0.05;
-/// Length of the moving mean.
 const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.

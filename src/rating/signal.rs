@@ -93,9 +93,6 @@ impl Signal {
     }
 
     /// The signal behind a CFC filter without phase shift, at its own times.
-    ///
-    /// # Errors
-    /// If its times are too coarse or too uneven.
     pub(crate) fn filtered(&self, class: u32) -> Result<Self, Error> {
         let filtered = cfc::filter(class, &self.time_s, &self.values).map_err(|source| {
             error!(Rating, "{name}: {}", too_much(&source), name = self.name).caused_by(source)
@@ -114,9 +111,6 @@ pub(crate) struct Pair {
 
 impl Pair {
     /// Interpolates linearly from the first common time on, within `from_s` and `to_s`.
-    ///
-    /// # Errors
-    /// If there are no common times, or fewer than `least` or too many samples.
     pub(crate) fn new(
         reference: &Signal,
         prediction: &Signal,

@@ -23,9 +23,6 @@ pub(crate) struct Columns {
 ///
 /// Separated by commas, semicolons or tabs, whichever stand in the header; lines that begin
 /// with `#` are comments. Other columns are not looked at.
-///
-/// # Errors
-/// With line and column.
 pub(crate) fn read(source: &mut dyn Read, wanted: Option<&str>) -> Result<Columns, Error> {
     let mut text = Vec::new();
     source.read_to_end(&mut text).map_err(|e| not_csv(e.into()))?;

@@ -17,9 +17,6 @@ use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
 
 /// Adds the section of a group.
-///
-/// # Errors
-/// If its models cannot be fitted. A group too small to be validated shows its runs alone.
 pub(super) fn add(
     content: &mut Content,
     group: &str,

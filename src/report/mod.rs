@@ -90,11 +90,8 @@ pub(crate) struct KeyFigure {
 pub(crate) enum Part {
     /// A heading of the third level.
     Heading(String),
-    /// A paragraph.
     Text(String),
-    /// A picture.
     Figure(Figure),
-    /// A table.
     Table(Table),
 }
 
@@ -128,9 +125,6 @@ impl Content {
 /// The page about a database and scenarios, and how many warnings it shows.
 ///
 /// Of `models`, those that `auto` chose for these very cases spare their validation; `step` is told what is being done.
-///
-/// # Errors
-/// For a group that is not there, one that makes no table, or a scenario that does not run.
 pub(crate) fn report(
     path: &Path,
     database: &Database,

@@ -14,9 +14,6 @@ use crate::scenario::{self, Prepared};
 use crate::unit::km_per_h;
 
 /// Runs a scenario and adds its section; with FE's run as its reference also the methods beside it.
-///
-/// # Errors
-/// If it cannot be read or run.
 pub(super) fn add(
     content: &mut Content,
     path: &Path,

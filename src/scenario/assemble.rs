@@ -17,9 +17,6 @@ use crate::unit::SpeedKind;
 
 /// Puts a scenario together with what its files hold, with curves for given speeds of the
 /// interfaces, in the order of the chain; `path` is for messages.
-///
-/// # Errors
-/// It names the key or curve.
 pub(super) fn assemble_at(
     path: &Path,
     scenario: &CheckedScenario<'_>,
@@ -81,9 +78,6 @@ fn limited(scenario: &CheckedScenario<'_>, vehicles: &[usize], limits: &LimitsTa
 /// differs from the one it was made of in nothing else; the force laws stay as they are. That
 /// is right wherever no law depends on these: a model's curve does, on masses and speeds, and
 /// on gaps too if it is sought for the interface's own speed.
-///
-/// # Errors
-/// As of [`assemble`](super::assemble); the chain is then not to be run.
 pub(crate) fn adjust(
     path: &Path,
     scenario: &CheckedScenario<'_>,

@@ -37,9 +37,6 @@ impl Scenario {
     }
 
     /// Checks the scenario as a whole.
-    ///
-    /// # Errors
-    /// It names the key, vehicle or curve.
     pub(crate) fn check(&self) -> Result<CheckedScenario<'_>, Error> {
         check_shape(self)?;
         if let Some(limits) = &self.limits {
@@ -86,9 +83,6 @@ impl CheckedScenario<'_> {
 
     /// Checks `varied`, which differs from this scenario in numbers only and in which of its
     /// curves stand where: what these cannot break is not looked at again.
-    ///
-    /// # Errors
-    /// As of [`Scenario::check`].
     pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, Error> {
         check_values(varied)
     }

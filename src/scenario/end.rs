@@ -70,9 +70,6 @@ fn below(error: impl std::error::Error + Send + Sync + 'static) -> Error {
 const LEAST_OF_END: f64 = 0.1;
 
 /// The end of a vehicle whose neighbours close at `closing_m_per_s`.
-///
-/// # Errors
-/// If the model's runs do not tell stopped mass and crush force.
 pub(super) fn crush_end(
     model: &Model,
     end: &End<'_>,
@@ -118,9 +115,6 @@ pub(super) fn crush_end(
 
 /// The crush force between two vehicles of one mass, or one and the wall, that close at
 /// `speed_m_per_s`: each is moved by `F_f M/(M − m_s)`.
-///
-/// # Errors
-/// As of [`crush_end`].
 pub(super) fn crush_between(
     model: &Model,
     slot: &Slot<'_>,
@@ -165,9 +159,6 @@ fn warnings(model: &Model, speed_m_per_s: f64) -> Vec<String> {
 }
 
 /// The interface of two plates that meet after `gap_m`.
-///
-/// # Errors
-/// None that the constants cause.
 pub(super) fn plates(name: &str, gap_m: f64) -> Result<Interface, Error> {
     let spring = Envelope::new(vec![0.0, 1.0], vec![0.0, PLATES_N_PER_M]).map_err(below)?;
     let law = ForceLaw::new(spring, Unloading::Elastic, EnvelopeEnd::Slope);

@@ -31,7 +31,6 @@ pub(super) struct Slot<'a> {
 /// What acts at a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Joint<'a> {
-    /// A curve of the scenario.
     Curve(&'a str),
     /// The crush law of a model, between body and crush zone.
     End(End<'a>),

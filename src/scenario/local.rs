@@ -35,9 +35,6 @@ const SLOWEST_M_PER_S: f64 = 0.1;
 /// Puts a scenario together with what its files hold; `path` is for messages. Interfaces whose
 /// curves come from models get them for their own closing speeds, unless the scenario asks for
 /// the trains' speed.
-///
-/// # Errors
-/// It names the curve.
 pub(crate) fn assemble(
     path: &Path,
     scenario: &CheckedScenario<'_>,

@@ -80,7 +80,6 @@ pub struct Prepared {
     pub limited: Vec<usize>,
     /// Warnings of the curves used.
     pub warnings: Vec<String>,
-    /// Where it comes from.
     origin: Origin,
 }
 
@@ -123,9 +122,6 @@ pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, Error>
 }
 
 /// Checks a scenario that is not as its file has it, with the file's path in the message.
-///
-/// # Errors
-/// It names the key.
 pub(crate) fn check<'a>(path: &Path, scenario: &'a Scenario) -> Result<CheckedScenario<'a>, Error> {
     scenario.check().map_err(|error| error.placed(|_| Place::of_file(path)))
 }

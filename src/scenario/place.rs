@@ -71,7 +71,6 @@ impl Scenario {
         train(self.train.iter().position(|t| t.name == name).unwrap_or(0))
     }
 
-    /// Every vehicle with its path.
     fn vehicles(&self) -> impl Iterator<Item = (KeyPath, &VehicleTable)> {
         self.train.iter().enumerate().flat_map(|(t, table)| {
             let vehicles = table.vehicles.iter().enumerate();

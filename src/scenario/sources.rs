@@ -22,7 +22,6 @@ pub(crate) struct Sources {
 pub(crate) enum CurveSource {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
-    /// Of a file.
     Curve(Box<DrivingCurve>),
     /// Stages of a device between two bodies.
     Stages(Envelope),
@@ -63,9 +62,6 @@ impl Scenario {
 
 impl Sources {
     /// Reads what `scenario`, which stands at `path`, names.
-    ///
-    /// # Errors
-    /// It names the curve or file.
     pub(crate) fn read(path: &Path, scenario: &CheckedScenario<'_>) -> Result<Self, Error> {
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {

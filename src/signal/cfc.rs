@@ -100,9 +100,6 @@ impl Coefficients {
 ///
 /// Intervals that differ (by up to 60 % of their mean) are resampled linearly to their mean
 /// and back. Both ends are padded by point reflection `2 x_0 − x_j`, so that the ends keep their level.
-///
-/// # Errors
-/// [`CfcError`] if the interval is over `1/(10 CFC)` or the intervals differ.
 pub(crate) fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filtered, CfcError> {
     let n = values.len();
     if n < 2 {

@@ -18,9 +18,6 @@ pub(crate) struct OutOfRange {
 ///
 /// `at_s`: increasing, at least one; `times_s`: increasing, within the range of `at_s`.
 /// Returns one value per time, in the unit of `values`.
-///
-/// # Errors
-/// [`OutOfRange`] names the first time outside the history.
 pub(crate) fn interpolate(
     at_s: &[f64],
     values: &[f64],

@@ -21,7 +21,6 @@ const HEAD_LINES: usize = 1_000;
 
 /// What a folder has of decks.
 pub(crate) enum Search {
-    /// It has no deck.
     None,
     /// The only deck, or the one that includes the others.
     One(PathBuf),
@@ -38,9 +37,6 @@ pub fn read_deck(path: &Path) -> Result<Deck, ReadError> {
 }
 
 /// The same, with the included files that were read.
-///
-/// # Errors
-/// As [`read`].
 pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let folder = path.parent().unwrap_or(Path::new(""));

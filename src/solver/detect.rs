@@ -12,9 +12,6 @@ use super::{ReadError, SolverFile, lsdyna};
 const DETECT_LINES: u64 = 100_000;
 
 /// The format of a file.
-///
-/// # Errors
-/// [`ReadError`] says what it looks like instead.
 pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError> {
     let (by_content, is_lsdyna) = look_at(path, source)?;
     if let Some(format) = by_content {

@@ -147,9 +147,6 @@ pub(crate) fn entity_word(format: &str) -> &'static str {
 }
 
 /// Holds every selected id and component against what the file has.
-///
-/// # Errors
-/// [`ReadError`] names the first that is missing, and what the file has instead.
 pub(super) fn check_selection(
     path: &Path,
     file: &SolverFile,

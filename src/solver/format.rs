@@ -110,7 +110,6 @@ pub(crate) fn format_names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
-/// The format of that name.
 pub(super) fn named(name: &str) -> Result<&'static Format, ReadError> {
     FORMATS
         .iter()

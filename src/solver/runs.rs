@@ -30,9 +30,6 @@ pub(crate) struct RunFolders {
 /// The run folders at or below `root`: itself if it holds solver files, else all below that do.
 ///
 /// Hidden folders are passed over; a folder that is reached by several links counts once.
-///
-/// # Errors
-/// If there is no such folder, or it cannot be read.
 pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
     if !fs::metadata(root)?.is_dir() {
         let message = "this is no folder: give a run's folder, or one above runs";
@@ -45,9 +42,6 @@ pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
 }
 
 /// The solver files of a folder in order of their names, each family of a binary file once.
-///
-/// # Errors
-/// If the folder cannot be read.
 pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = folder
         .read_dir()?

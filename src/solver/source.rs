@@ -37,9 +37,6 @@ pub enum Access {
 }
 
 /// Opens a file. A pipe, which has no positions, is copied to a temporary file.
-///
-/// # Errors
-/// Those of the operating system, and for a device, which may have no end.
 pub(crate) fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
     let kind = file::kind(path)?;
     let mut file = File::open(path)?;
@@ -62,9 +59,6 @@ pub(crate) struct Opened {
 
 impl Opened {
     /// The file with its size of now.
-    ///
-    /// # Errors
-    /// Those of the operating system.
     pub(crate) fn new(file: File) -> io::Result<Self> {
         let size = file.metadata()?.len();
         Ok(Self { file, size })

@@ -12,9 +12,6 @@ use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
     /// Reads the selected histories and extracts the case.
-    ///
-    /// # Errors
-    /// [`RunError`] names the file and what to change.
     pub(crate) fn extract(&self) -> Result<Case, RunError> {
         let mut remarks = Remarks { notes: self.deck_notes.clone(), ..Remarks::default() };
         let units = remarks.take(self.units()?);

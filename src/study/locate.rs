@@ -38,9 +38,6 @@ pub(crate) struct LocatedRun<'a> {
 
 impl Study {
     /// Finds and hashes the files of a run.
-    ///
-    /// # Errors
-    /// [`RunError`] if the folder or a file is missing or unreadable.
     pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, RunError> {
         let folder = self.folder.join(&entry.path);
         if !folder.is_dir() {

@@ -40,9 +40,6 @@ pub struct Study {
 }
 
 /// Loads and checks a study manifest.
-///
-/// # Errors
-/// With its place in the manifest.
 pub(crate) fn load(path: &Path) -> Result<Study, Error> {
     parse(path, &toml_file::read_text(path)?)
 }
@@ -60,7 +57,6 @@ pub fn parse(path: &Path, text: &str) -> Result<Study, Error> {
 }
 
 impl Study {
-    /// Its name.
     pub(crate) fn name(&self) -> &str {
         &self.manifest.study.name
     }

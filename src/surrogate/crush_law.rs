@@ -85,9 +85,6 @@ impl CrushLaw {
     }
 
     /// What a fit guarantees and a file might not.
-    ///
-    /// # Errors
-    /// What is wrong, to follow "the model is damaged: ".
     pub(super) fn check(&self) -> Result<(), String> {
         Rate::of(self.sensitivity, None).check_sensitivity()?;
         Rate::of(self.of_impact, None).check_sensitivity()?;

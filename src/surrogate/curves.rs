@@ -15,8 +15,6 @@ pub(crate) struct CaseCurve {
 }
 
 impl CaseCurve {
-    /// # Errors
-    /// If the columns are no envelopes; closing speeds may be none.
     pub(crate) fn new(
         speed_m_per_s: f64,
         features: Vec<f64>,

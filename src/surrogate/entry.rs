@@ -58,15 +58,11 @@ pub(super) struct FitInput<'a> {
 }
 
 impl FitInput<'_> {
-    /// The forest's options.
     pub(crate) fn forest_options(&self) -> &ForestOptions {
         self.forest.expect("ModelKind gives options to each model with a forest")
     }
 
     /// The crush law with stopped mass.
-    ///
-    /// # Errors
-    /// If the runs tell none.
     pub(crate) fn crush_law(&self) -> Result<CrushLaw, Error> {
         self.crush_law.cloned().ok_or(error!(Model, "model crush-law needs runs that tell the mass which the crush zone stops: contact force and speed of a body against a wall or of two of equal mass, whose momentum agrees; this group's do not: use --model rate"))
     }

@@ -46,9 +46,6 @@ const NEAR_MIDPOINT: f64 = 0.01;
 
 impl ForestSurrogate {
     /// Fits the forest to the table of the set.
-    ///
-    /// # Errors
-    /// [`ForestError`] for options that make no forest.
     pub(crate) fn fit(
         set: &TrainingSet,
         force: ForceKind,

@@ -60,9 +60,6 @@ impl ForestOptions {
 
 impl ForestOptions {
     /// Whether they make a forest.
-    ///
-    /// # Errors
-    /// [`ForestError`] names the option that is out of its range.
     pub(crate) fn check(&self) -> Result<(), ForestError> {
         self.params().check_ref().map(|_| ())
     }

@@ -101,9 +101,6 @@ pub(crate) trait Surrogate: Debug + Send + Sync {
     }
 
     /// What a fit guarantees of the parameters and a file might not.
-    ///
-    /// # Errors
-    /// What is wrong, to follow "the model is damaged: ".
     fn check(&self, _features: usize) -> Result<(), String> {
         Ok(())
     }
@@ -118,7 +115,6 @@ pub(crate) trait Surrogate: Debug + Send + Sync {
         false
     }
 
-    /// Its forest, if it is one.
     fn forest(&self) -> Option<&forest::ForestSurrogate> {
         None
     }

@@ -80,9 +80,6 @@ impl Model {
     }
 
     /// The same without a crush law that its curves do not need, for trials that only ask for curves.
-    ///
-    /// # Errors
-    /// As of [`fit`](Self::fit).
     pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
         Self::check_inputs(set, kind)?;
         let cases: Vec<ModelCase> =
@@ -134,9 +131,6 @@ impl Model {
     }
 
     /// Whether the model can be fitted to the set, without fitting it.
-    ///
-    /// # Errors
-    /// the error, the error or the error.
     pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
         Self::check_inputs(set, kind)?;
         if kind.entry().needs_crush_law { Self::fit_curves(set, kind).map(|_| ()) } else { Ok(()) }

@@ -170,15 +170,11 @@ pub(crate) struct Prediction<'a> {
 /// Both forces to the maximal crush.
 struct Forces {
     declared: Envelope,
-    /// Where it is another.
     body: Option<Envelope>,
 }
 
 impl<'a> Prediction<'a> {
     /// The stages that no rule for the maximal crush changes.
-    ///
-    /// # Errors
-    /// As [`predict`].
     pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
         Self::of(Motion::new(model, query)?)
     }
@@ -196,9 +192,6 @@ impl<'a> Prediction<'a> {
     }
 
     /// The curve to the maximal crush of one rule.
-    ///
-    /// # Errors
-    /// If the rule gives no crush, or the energy correction is out of bounds.
     pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, Error> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;

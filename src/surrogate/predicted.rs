@@ -162,9 +162,6 @@ impl Provenance {
 
 impl PredictedCurve {
     /// The loading branch as a function.
-    ///
-    /// # Errors
-    /// If the curve was read from a file and breaks its promises.
     pub(crate) fn envelope(&self) -> Result<Envelope, Error> {
         let stiffness = self.unloading_stiffness_n_per_m;
         if !(stiffness > 0.0 && stiffness.is_finite()) {
@@ -302,11 +299,6 @@ impl PredictedCurve {
 
     /// The same with `member` of the half width of this force's band added, from −1 (lower edge)
     /// to 1.
-    ///
-    /// # Errors
-    /// As [`envelope`](Self::envelope); the error or
-    /// If it does not have that force; the error
-    /// for a member outside these bounds or a force without a band.
     pub(crate) fn driving_member(
         &self,
         force: ForceKind,
@@ -373,9 +365,6 @@ impl PredictedCurve {
     }
 
     /// The curve that moves a body of one mass: the body force, or the only force there is.
-    ///
-    /// # Errors
-    /// As [`envelope`](Self::envelope); For a contact force alone.
     pub(crate) fn driving_envelope(&self) -> Result<Envelope, Error> {
         let declared = self.envelope()?;
         match &self.body_force_n {

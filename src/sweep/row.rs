@@ -12,16 +12,12 @@ pub(crate) const LAYOUT: i64 = 1;
 /// How an item ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Status {
-    /// There is a result.
     Ok,
-    /// There is a result, with a warning.
     Warned,
-    /// There is no result.
     Failed,
 }
 
 impl Status {
-    /// All of them.
     pub(crate) const ALL: [Self; 3] = [Self::Ok, Self::Warned, Self::Failed];
 
     /// Its name in the column `status`.

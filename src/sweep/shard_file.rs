@@ -25,9 +25,6 @@ impl ShardFile {
 
     /// Hands on every row with its line feed, in order; `see` gives `None` for one that is not
     /// whole.
-    ///
-    /// # Errors
-    /// It names the first row that is missing or not whole.
     pub(crate) fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), Error> {
         let io = |source| Error::io(&self.path, source);
         let file = file::open(&self.path).map_err(io)?;

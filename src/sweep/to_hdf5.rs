@@ -202,9 +202,6 @@ struct FinishedTable {
 
 impl FinishedTable {
     /// Opens a finished file.
-    ///
-    /// # Errors
-    /// If it is no HDF5 file, or not the result of a sweep.
     fn open(path: &Path) -> Result<Self, Error> {
         let table = Table::open(path, FORMAT).map_err(|e| e.coded(ErrorCode::Sweep))?;
         let head = head(&table)?.ok_or_else(|| {

@@ -40,9 +40,6 @@ pub struct VariableSummary {
 }
 
 /// The variables of a plan, in order of their columns, and its design.
-///
-/// # Errors
-/// [`Error`] names the variable and key.
 pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, Design), Error> {
     if plan.vary.is_empty() {
         return Err(error!(Sweep, "[sweep] varies nothing: add [[sweep.vary]]"));

@@ -26,9 +26,6 @@ impl FeTrain {
     }
 
     /// Reads what a scenario's reference names; `path` is the scenario's.
-    ///
-    /// # Errors
-    /// It names the file, node or component.
     pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(&reference.file);

@@ -47,9 +47,6 @@ fn groups(path: &Path, scenario: &Scenario) -> Result<BTreeMap<String, (Case, Ve
 }
 
 /// Every method in the scenario, in the order of the table.
-///
-/// # Errors
-/// It names the curve or group.
 pub(super) fn methods(
     path: &Path,
     scenario: &Scenario,

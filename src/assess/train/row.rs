@@ -16,9 +16,6 @@ use crate::signal::{derivative, integral, l1_ratio};
 
 /// Runs a method's scenario and compares the vehicles with FE's at `time_s`, the first times of
 /// FE's run.
-///
-/// # Errors
-/// It names the vehicle or curve.
 pub(super) fn row(
     path: &Path,
     method: Method,

@@ -17,7 +17,6 @@ pub(super) enum SpeedBy {
     Deck,
 }
 
-/// The impact speed and where it is from.
 pub(super) struct ImpactSpeed {
     pub speed: Speed,
     pub by: SpeedBy,

@@ -34,8 +34,6 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// # Errors
-    /// If a law has too many points, or numbers that are not finite.
     pub(super) fn new(law: &ForceLaw, token: &str) -> Result<Self, Error> {
         let LawTables { deflection_m, force_n, slope_n_per_m, work_j, memory, .. } = law.tables();
         let LawTables { shape_length, shape_force, shape_rest, .. } = law.tables();
@@ -135,9 +133,6 @@ impl Table {
     }
 
     /// A ready binary with this table in its block.
-    ///
-    /// # Errors
-    /// If it has not exactly one block of this layout.
     pub(super) fn written_into(
         &self,
         binary: &[u8],

@@ -9,7 +9,6 @@ use super::{ExportCurve, Exported, Options, TargetUnloading};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// Columns of a title.
 const TITLE_WIDTH: usize = 80;
 /// Most points to which LS-DYNA is asked to resample a curve.
 const MOST_RESAMPLED: usize = 20_000;
@@ -32,12 +31,10 @@ pub enum Material {
 pub(super) struct InUnits(pub UnitSystem);
 
 impl InUnits {
-    /// A length in m.
     pub(super) fn length(self, m: f64) -> String {
         nine_digits(m / self.0.length_m)
     }
 
-    /// A force in N.
     pub(super) fn force(self, n: f64) -> String {
         nine_digits(n / self.0.force())
     }

@@ -58,9 +58,7 @@ pub(super) struct Columns {
 /// Where the points of a curve stand.
 #[derive(Clone, Debug)]
 pub(super) enum Places {
-    /// In these lines.
     Lines(Vec<u64>),
-    /// In the rows of a matrix.
     Rows,
 }
 
@@ -92,9 +90,6 @@ impl Columns {
     }
 
     /// The curve of these columns. A record over time keeps its signs, which its motion tells.
-    ///
-    /// # Errors
-    /// It names the first point that does not fit.
     pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {

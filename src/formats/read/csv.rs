@@ -18,9 +18,6 @@ use crate::unit::UnitSystem;
 /// Reads a curve that drives an interface from a CSV file, as it stands: increasing deflections
 /// from 0, forces of 0 or above, no titles above the header. Which columns it takes and what of the
 /// `# key: value` lines: [`super`].
-///
-/// # Errors
-/// With line and field.
 pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, Error> {
     let (bytes, _) = open(path)?;
     let read = || {

@@ -77,9 +77,6 @@ pub struct Facts {
 impl Facts {
     /// Takes what a comment `key: value` says; other comments say nothing. `mark` is the
     /// comment's, for messages.
-    ///
-    /// # Errors
-    /// If the key is known and the value is none of its.
     pub(super) fn take(&mut self, mark: &str, comment: &str, place: Place) -> Result<(), Error> {
         let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
         let (key, value) = (key.trim(), value.trim());

@@ -87,11 +87,9 @@ pub(super) struct Frame {
 pub(super) enum Fit {
     /// It names a deflection and a force, and numbers follow.
     Header,
-    /// It names both.
     Named,
     /// Numbers follow.
     Above,
-    /// It is a row of numbers.
     Numbers,
 }
 
@@ -103,7 +101,6 @@ struct Line<'a> {
     text: Cow<'a, str>,
 }
 
-/// Titles that are kept.
 const TITLES: usize = 3;
 
 impl Frame {

@@ -13,9 +13,6 @@ use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
 
 /// Reads a predicted curve and checks its promises.
-///
-/// # Errors
-/// With line and column, or with the promise that is broken.
 pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, Error> {
     let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|source| {
         error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)

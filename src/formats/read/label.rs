@@ -211,9 +211,6 @@ impl Label {
     }
 
     /// SI value of one unit: the label's own, else that of the given system.
-    ///
-    /// # Errors
-    /// the error, or the error without either.
     pub(super) fn size(
         &self,
         text: &str,

@@ -25,7 +25,6 @@ struct Column {
     field: usize,
     name: String,
     label: Label,
-    /// Of its unit.
     line: u64,
 }
 

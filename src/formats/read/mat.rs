@@ -117,7 +117,6 @@ impl Matrix<'_> {
 /// What the integers in front of a matrix say.
 struct Head {
     is_big: bool,
-    /// Bytes of one number.
     number: usize,
     /// Whether it is full or a text, and of doubles.
     is_read: bool,

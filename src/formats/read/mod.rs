@@ -61,7 +61,6 @@ enum Read {
     Binary(fn(&Input<'_>) -> Result<Columns, Error>),
     /// Columns of a text, of which the curve is made.
     Columns(fn(&Input<'_>) -> Result<Columns, Error>),
-    /// The curve itself.
     Curve(fn(&Input<'_>) -> Result<ReadCurve, Error>),
 }
 

@@ -73,7 +73,6 @@ struct Table {
     sizes: Option<(f64, f64)>,
     /// What the comments in front of it say.
     facts: Facts,
-    /// Row by row.
     values: Vec<f64>,
     /// Line of each row's first value.
     lines: Vec<u64>,

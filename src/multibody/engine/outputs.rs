@@ -100,9 +100,6 @@ impl Recent {
 
 impl Engine<'_> {
     /// Records the state, with `v` in step with `x`.
-    ///
-    /// # Errors
-    /// [`SimulationError::Diverged`] names the first body whose speed is not finite.
     #[inline(always)]
     pub(super) fn output<const N: usize>(
         &mut self,

@@ -37,7 +37,6 @@ impl<'a> Bytes<'a> {
         Ok((place.payload.kind, header, bytes))
     }
 
-    /// The bytes of a text.
     pub(crate) fn text(&self, place: DataRecord) -> io::Result<Vec<u8>> {
         self.whole(place).map(|(_, _, bytes)| bytes)
     }

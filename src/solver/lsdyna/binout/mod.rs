@@ -41,9 +41,6 @@ pub(crate) fn recognises(head: &[u8]) -> bool {
 
 /// Reads the selected histories of every section, or of the one selected. Empty if no
 /// section is one of a binout.
-///
-/// # Errors
-/// Those of reading the sources.
 pub(crate) fn read(
     parts: &[Box<dyn Source>],
     selection: &Selection,

@@ -50,7 +50,6 @@ pub(super) enum Kind {
     Unread(&'static str),
 }
 
-/// The kind of a keyword.
 pub(super) fn kind(keyword: &Keyword) -> Kind {
     let words: Vec<&str> = keyword.name.split('_').collect();
     match words.as_slice() {

@@ -43,7 +43,6 @@ pub(super) enum Defined {
     /// It was there with another value. Which of them holds depends on
     /// `*PARAMETER_DUPLICATION` and on the release, so neither is kept.
     Contradicts,
-    /// The list is full.
     Full,
 }
 
