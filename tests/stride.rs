@@ -298,10 +298,10 @@ fn blocks_and_maps_give_the_same() {
     assert_eq!(left.len(), 4, "{left:?}");
 }
 
-/// Its dimensions have names, each component's those of its own nodes.
+/// The nodes of each component stand in a dataset of their own.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
-fn h5py_finds_the_dimensions_of_what_was_written_state_by_state() {
+fn h5py_finds_the_nodes_of_what_was_written_state_by_state() {
     let folder = tempfile::tempdir().unwrap();
     let written = Written { nodes: 9_000, states: 20, ..Written::default() };
     let path = folder.path().join("nodout");
@@ -310,13 +310,11 @@ fn h5py_finds_the_dimensions_of_what_was_written_state_by_state() {
     crumple_ok(folder.path(), &["histories", "nodout", "-o", "a.h5", "--units", "mm-t-s"]);
     let look = "import h5py\n\
         file = h5py.File('a.h5')\n\
-        assert file['time'].attrs['units'] == 's' and h5py.h5ds.is_scale(file['time'].id)\n\
+        assert file['time'].attrs['units'] == 's'\n\
         for name in file:\n\
         \x20   data = file[name]\n\
         \x20   if isinstance(data, h5py.Group) or data.ndim < 2: continue\n\
-        \x20   assert data.dims[0][0] == file['time'], name\n\
-        \x20   nodes = data.dims[1][0]\n\
-        \x20   assert nodes == file['node_2' if name.startswith('r') else 'node'], name\n\
+        \x20   nodes = file['node_2' if name.startswith('r') else 'node']\n\
         \x20   ids = data.attrs['ids'] if 'ids' in data.attrs else file['ids'][name]\n\
         \x20   assert (nodes[:] == ids[:]).all() and len(nodes) == data.shape[1], name\n\
         assert file['x_velocity'].attrs['units'] == 'mm/s'\n\

@@ -9,11 +9,10 @@ use std::path::Path;
 
 use super::foreign::{self, Item, is_of_dimensions, listed};
 use super::group::{self, GROUP_ATTRIBUTES};
-use super::layout::{self, CASE_ATTRIBUTES, Columns, Content, ORIGINAL, VERSION};
+use super::layout::{self, CASE_ATTRIBUTES, Content, ORIGINAL, VERSION};
 use super::{CasePath, Database};
 use crate::curve::Case;
-use crate::file::{self, write_by_path};
-use crate::hdf5::dimensions::{DimensionError, Dimensions};
+use crate::file::write_by_path;
 use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Group};
 
 /// Writes a database over the file at `path` with all that others have put into it, which is
@@ -44,7 +43,6 @@ pub(super) fn write_keeping(
         });
         edited.map_err(|e| match e {
             EditError::Hdf5(e) => would_drop(format!("{} ({e})", listed(&before))),
-            EditError::Dimensions(e) => would_drop(format!("{} ({e})", listed(&before))),
             EditError::Content(e) => e,
         })?;
         // Whatever went wrong in it is seen here, before the old file is replaced.
@@ -63,7 +61,6 @@ pub(super) fn write_keeping(
 
 enum EditError {
     Hdf5(hdf5::Error),
-    Dimensions(DimensionError),
     Content(Error),
 }
 
@@ -201,26 +198,19 @@ struct Edit<'a> {
 }
 
 impl Edit<'_> {
-    /// Makes the file at `path`, which holds the old database, hold the new one. All in one step,
-    /// so that every header that waits for a scale's address is there once.
+    /// Makes the file at `path`, which holds the old database, hold the new one.
     fn make(&self, path: &Path) -> Result<(), EditError> {
         let file = open(path)?;
         let root = file.root();
         for (name, value) in layout::root_attributes() {
             root.set_attr(name, value)?;
         }
-        let mut dimensions = Dimensions::default();
-        self.put(&root, &mut dimensions)?;
+        self.put(&root)?;
         drop(root);
-        file.commit()?;
-        file.close()?;
-        let io = |source| Error::io(path, source);
-        let mut bytes = file::read(path, u64::MAX - 1).map_err(io)?;
-        dimensions.finish(&mut bytes).map_err(EditError::Dimensions)?;
-        Ok(fs::write(path, bytes).map_err(io)?)
+        Ok(file.close()?)
     }
 
-    fn put(&self, root: &Group, dimensions: &mut Dimensions) -> Result<(), EditError> {
+    fn put(&self, root: &Group) -> Result<(), EditError> {
         let there: HashSet<String> = root.groups()?.into_iter().collect();
         let moved: HashSet<&CasePath> = self.moves.all.values().collect();
         for name in self.new.groups() {
@@ -235,7 +225,7 @@ impl Edit<'_> {
             for case in self.new.cases(name) {
                 let content = || layout::with_hashes(self.new, case);
                 let Some(before) = before.get(&*case.id.name) else {
-                    add(&group, case, content()?, dimensions)?;
+                    add(&group, case, content()?)?;
                     continue;
                 };
                 let is_in_place = self.is_current && !moved.contains(&CasePath::of(case));
@@ -245,7 +235,7 @@ impl Edit<'_> {
                 let found = group.group(&case.id.name)?;
                 let content = content()?;
                 if !(has_same_curves(before, case) && is_in_place) {
-                    replace_curves(&found, &content, dimensions)?;
+                    replace_curves(&found, &content)?;
                 }
                 replace_attributes(&found, content)?;
             }
@@ -254,20 +244,16 @@ impl Edit<'_> {
     }
 }
 
-fn add(
-    group: &Group,
-    case: &Case,
-    content: Content<'_>,
-    dimensions: &mut Dimensions,
-) -> Result<(), EditError> {
+fn add(group: &Group, case: &Case, content: Content<'_>) -> Result<(), EditError> {
     group.create_group_with(&case.id.name, |group| {
         for (name, value) in content.attributes {
             group.set_attr(name, value);
         }
         group.create_group(ORIGINAL);
-        let mut columns = Columns { dimensions, time: None };
         for (path, values) in content.datasets {
-            group.create_dataset(&path, |dataset| columns.fill(dataset, &path, &values));
+            group.create_dataset(&path, |dataset| {
+                dataset.with_f64_data(&values);
+            });
         }
     })?;
     Ok(())
@@ -325,13 +311,8 @@ fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditErro
     Ok(())
 }
 
-/// Writes the datasets of a case anew: their headers refer to the place where their scale then is.
-fn replace_curves(
-    case: &Group,
-    content: &Content<'_>,
-    dimensions: &mut Dimensions,
-) -> Result<(), EditError> {
-    let mut columns = Columns { dimensions, time: None };
+/// Writes the datasets of a case anew, with the attributes that others have given them.
+fn replace_curves(case: &Group, content: &Content<'_>) -> Result<(), EditError> {
     for (path, values) in &content.datasets {
         // Absent in files of earlier versions.
         let mut theirs = HashMap::new();
@@ -341,7 +322,7 @@ fn replace_curves(
             case.delete(path)?;
         }
         case.create_dataset(path, |dataset| {
-            columns.fill_beside(dataset, path, values, theirs.len());
+            dataset.with_f64_data(values);
             for (name, value) in theirs {
                 dataset.set_attr(&name, value);
             }

@@ -7,7 +7,7 @@ use std::fmt;
 use super::CasePath;
 use super::group::GROUP_ATTRIBUTES;
 use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, FoundGroup, ORIGINAL, Opened, ROOT};
-use crate::hdf5::{self, Dataset, Group, dimensions};
+use crate::hdf5::{self, Dataset, Group};
 
 /// Something of others: what it is, and its path in the file.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -134,7 +134,7 @@ impl Foreign {
     }
 }
 
-/// Whether an attribute of a dataset is of its dimensions.
+/// Whether an attribute of a dataset is of its dimension scales, which earlier versions wrote.
 pub(super) fn is_of_dimensions(name: &str) -> bool {
-    dimensions::ATTRIBUTES.contains(&name)
+    ["CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"].contains(&name)
 }

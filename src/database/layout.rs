@@ -15,10 +15,7 @@ use crate::curve::{
     RecordedCurves, SourceFile,
 };
 use crate::file;
-use crate::hdf5::dimensions::{DimensionError, Dimensions, Scale};
-use crate::hdf5::{
-    self, AttrValue, DatasetBuilder, File, FileBuilder, Group, OpenError, declared_bytes,
-};
+use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
@@ -27,7 +24,7 @@ pub(crate) const FORMAT: &str = "crumple curve database";
 pub(crate) const VERSION: i64 = 3;
 /// Value of the root attribute `written_by`.
 const WRITTEN_BY: &str = concat!("crumple ", env!("CARGO_PKG_VERSION"));
-/// The oldest it reads: that one has no body force, dates, origins, tags and dimension scales.
+/// The oldest it reads: that one has no body force, dates, origins and tags.
 pub(crate) const OLDEST: i64 = 2;
 
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
@@ -231,52 +228,9 @@ pub(crate) fn case_names(cases: &[Case]) -> AttrValue {
     AttrValue::VarLenStringArray(cases.iter().map(|c| c.id.name.clone()).collect())
 }
 
-/// Attributes that the header of a dataset itself holds.
-const HEADER_ATTRIBUTES: usize = 8;
-/// Name of the scale of a curve's dimension.
-const TIME: &str = "time_s";
-
-/// Fills the datasets of a case, in the order of its content: of each curve the times, which are
-/// the scale of its dimension, then the other columns.
-pub(crate) struct Columns<'a> {
-    pub dimensions: &'a mut Dimensions,
-    pub time: Option<Scale>,
-}
-
-impl Columns<'_> {
-    pub(crate) fn fill(&mut self, dataset: &mut DatasetBuilder, path: &str, values: &[f64]) {
-        self.fill_beside(dataset, path, values, 0);
-    }
-
-    /// The same for a dataset that has so many attributes of others.
-    pub(crate) fn fill_beside(
-        &mut self,
-        dataset: &mut DatasetBuilder,
-        path: &str,
-        values: &[f64],
-        theirs: usize,
-    ) {
-        dataset.with_f64_data(values);
-        // A header with more is written in another way, in which nobody finds what comes later.
-        let has_room = theirs + 2 <= HEADER_ATTRIBUTES;
-        if path.rsplit('/').next() == Some(TIME) {
-            self.time = has_room.then(|| self.dimensions.scale(dataset, TIME));
-        } else if let Some(time) = self.time.filter(|_| has_room) {
-            self.dimensions.attach(dataset, &[time]);
-        }
-    }
-}
-
-impl From<DimensionError> for Error {
-    fn from(error: DimensionError) -> Self {
-        not_encoded(error)
-    }
-}
-
 /// Encodes a database as the bytes of an HDF5 file.
 pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
     let mut file = FileBuilder::new();
-    let mut dimensions = Dimensions::default();
     for (name, value) in root_attributes() {
         file.set_attr(name, value);
     }
@@ -292,23 +246,19 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
                 builder.set_attr(name, value);
             }
             let mut original = builder.create_group(ORIGINAL);
-            let mut columns = Columns { dimensions: &mut dimensions, time: None };
             for (path, values) in content.datasets {
                 let dataset = match path.strip_prefix("original/") {
                     Some(name) => original.create_dataset(name),
                     None => builder.create_dataset(&path),
                 };
-                columns.fill(dataset, &path, &values);
+                dataset.with_f64_data(&values);
             }
             builder.add_group(original.finish());
             group.add_group(builder.finish());
         }
         file.add_group(group.finish());
     }
-    let encoded = file.finish();
-    let mut bytes = encoded.map_err(not_encoded)?;
-    dimensions.finish(&mut bytes)?;
-    Ok(bytes)
+    file.finish().map_err(not_encoded)
 }
 
 /// A database file that was opened.

@@ -3,8 +3,6 @@
 //! The names below are all that the program uses of that crate: whoever replaces it finds here
 //! what the replacement has to offer.
 
-mod checksum;
-pub(crate) mod dimensions;
 pub(crate) mod skeleton;
 pub(crate) mod table;
 

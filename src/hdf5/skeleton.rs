@@ -16,7 +16,6 @@ use std::io::{self, Write};
 
 use hdf5_pure::{Datatype, make_f64_type};
 
-use super::dimensions::{Dimensions, Piece};
 use super::{DatasetBuilder, FileBuilder};
 
 /// First bytes of the values that come later; the number of the dataset follows.
@@ -57,58 +56,15 @@ impl Skeleton {
     /// Writes everything but the values; where those of each dataset begin. `None` if the
     /// encoder did not hand all of them over in one piece.
     pub(crate) fn write(&self, builder: FileBuilder, file: &File) -> io::Result<Option<Vec<u64>>> {
-        let mut put = |at: u64, bytes: &[u8]| write_all_at(file, bytes, at);
-        let (offsets, end) = self.place(builder, &mut put)?;
-        finish(offsets, end, file)
-    }
-
-    /// The same, with names of the dimensions, which are put into the headers before they are
-    /// written.
-    pub(crate) fn write_with(
-        &self,
-        builder: FileBuilder,
-        dimensions: &Dimensions,
-        file: &File,
-    ) -> io::Result<Option<Vec<u64>>> {
-        let mut pieces: Vec<Piece> = Vec::new();
-        let mut put = |at: u64, bytes: &[u8]| {
-            match pieces.last_mut() {
-                Some(last) if last.at + last.bytes.len() as u64 == at => last.bytes.extend(bytes),
-                _ => pieces.push(Piece { at, bytes: bytes.to_vec() }),
-            }
-            Ok(())
-        };
-        let (offsets, end) = self.place(builder, &mut put)?;
-        dimensions.finish_pieces(&mut pieces, end).map_err(io::Error::other)?;
-        let mut file_end = end;
-        for Piece { at, bytes } in &pieces {
-            write_all_at(file, bytes, *at)?;
-            file_end = file_end.max(at + bytes.len() as u64);
-        }
-        finish(offsets, file_end, file)
-    }
-
-    /// Hands on everything but the values; where those of each dataset begin, and the file ends.
-    fn place(&self, builder: FileBuilder, put: &mut Put<'_>) -> io::Result<(Places, u64)> {
-        let mut offsets = vec![None; self.lengths.len()];
-        let mut sink = Sink { lengths: &self.lengths, put, at: 0, offsets: &mut offsets };
+        let mut sink =
+            Sink { lengths: &self.lengths, file, at: 0, offsets: vec![None; self.lengths.len()] };
         builder.finish_to(&mut sink).map_err(io::Error::other)?;
-        let end = sink.at;
-        Ok((offsets, end))
+        let offsets: Option<Vec<u64>> = sink.offsets.into_iter().collect();
+        if offsets.is_some() {
+            allocate(file, sink.at)?;
+        }
+        Ok(offsets)
     }
-}
-
-/// Takes bytes for a position of the file.
-type Put<'a> = dyn FnMut(u64, &[u8]) -> io::Result<()> + 'a;
-/// Where the values of each dataset begin, as far as that is known.
-type Places = Vec<Option<u64>>;
-
-fn finish(offsets: Places, end: u64, file: &File) -> io::Result<Option<Vec<u64>>> {
-    let offsets: Option<Vec<u64>> = offsets.into_iter().collect();
-    if offsets.is_some() {
-        allocate(file, end)?;
-    }
-    Ok(offsets)
 }
 
 /// Reserves the file's blocks at once, which makes writing them cheaper.
@@ -128,21 +84,21 @@ fn mark(number: usize) -> [u8; MARK_BYTES] {
 }
 
 /// Takes the encoder's bytes and leaves out those that are marked.
-struct Sink<'a, 'b> {
+struct Sink<'a> {
     lengths: &'a [usize],
-    put: &'a mut Put<'b>,
+    file: &'a File,
     at: u64,
-    offsets: &'a mut [Option<u64>],
+    offsets: Vec<Option<u64>>,
 }
 
-impl Write for Sink<'_, '_> {
+impl Write for Sink<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let marked = bytes.get(16..MARK_BYTES).filter(|_| bytes.starts_with(MARK));
         let number = marked.and_then(|n| n.try_into().ok()).map(u64::from_le_bytes);
         let number = number.and_then(|n| usize::try_from(n).ok());
         match number.filter(|&n| self.lengths.get(n) == Some(&bytes.len())) {
             Some(number) => self.offsets[number] = Some(self.at),
-            None => (self.put)(self.at, bytes)?,
+            None => write_all_at(self.file, bytes, self.at)?,
         }
         self.at += bytes.len() as u64;
         Ok(bytes.len())

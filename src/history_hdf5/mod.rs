@@ -13,7 +13,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::file::{write_at, write_whole};
-use crate::hdf5::dimensions::{Dimensions, Scale};
 use crate::hdf5::skeleton::{Skeleton, write_all_at};
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
 use crate::history::{EntityId, History, Side};
@@ -97,10 +96,9 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
 /// `/ids/<component>`, of more than 4 000 the sides in `/sides/<component>`. A component whose
 /// name cannot be a dataset's has `_` in it, and its own name in the attribute `component`.
 ///
-/// The dimensions are named: `time`, and for the entities a word such as `node`, whose dataset
-/// holds the ids and has the attributes `ids`, `sides` and `titles`, where there are any (of more
-/// than 4 000 entities the dataset `/titles/node`). Components of other entities have a dimension
-/// of their own, `node_2`. Where the units are known, every dataset whose name tells what it is of
+/// Beside `time` a dataset that is called by the word for the entities, such as `node`, holds the
+/// ids and has the attributes `ids`, `sides` and `titles`, where there are any (of more than 4 000
+/// entities the dataset `/titles/node`). Other entities have one of their own, `node_2`. Where the units are known, every dataset whose name tells what it is of
 /// has the attribute `units`.
 ///
 /// # Errors
@@ -133,10 +131,7 @@ pub fn encode(
         }
         dataset.with_f64_data(&rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
     }
-    let (out, dimensions) = layout.finish()?;
-    let mut bytes = out.finish().map_err(not_encoded)?;
-    dimensions.finish(&mut bytes).map_err(not_encoded)?;
-    Ok(bytes)
+    layout.finish()?.finish().map_err(not_encoded)
 }
 
 fn not_encoded(error: impl std::fmt::Display) -> ConvertError {
@@ -146,14 +141,12 @@ fn not_encoded(error: impl std::fmt::Display) -> ConvertError {
 /// A file of histories under work: everything but the values of components.
 struct Layout {
     out: FileBuilder,
-    dimensions: Dimensions,
-    time: Scale,
     names: Names,
     /// Section of the solver's file.
     section: String,
     units: Option<UnitSystem>,
     titles: HashMap<EntityId, String>,
-    entities: Vec<(Vec<EntityId>, Scale)>,
+    entities: Vec<Vec<EntityId>>,
     /// Components, and dimensions with titles, of more entities than an attribute holds texts of.
     long: Vec<(String, Vec<EntityId>)>,
     titles_of: Vec<(String, Vec<EntityId>)>,
@@ -177,9 +170,7 @@ impl Layout {
         let stated = || beside.deck?.units.as_ref()?.system;
         let units = beside.units.or_else(stated);
         units.iter().for_each(|units| attr("units", &units.to_string()));
-        let mut dimensions = Dimensions::default();
         let dataset = out.create_dataset(TIME);
-        let time = dimensions.scale(dataset, TIME);
         dataset.with_f64_data(&file.time);
         if let Some(units) = units {
             dataset.set_attr(UNITS, AttrValue::VarLenString(units.names().2.into()));
@@ -191,8 +182,6 @@ impl Layout {
         let titles = entities.into_iter().filter_map(|e| Some((e.id, e.title?)));
         Self {
             out,
-            dimensions,
-            time,
             names: Names::default(),
             section: file.section.clone(),
             units,
@@ -205,8 +194,9 @@ impl Layout {
 
     /// The dataset of a component, with everything but its values.
     fn component(&mut self, component: &str, entities: &[EntityId]) -> &mut DatasetBuilder {
-        let mut scales = vec![self.time];
-        scales.extend((!entities.is_empty()).then(|| self.dimension(entities)));
+        if !entities.is_empty() && !self.entities.iter().any(|known| known == entities) {
+            self.entities(entities);
+        }
         let name = self.names.of(component);
         if entities.len() > MAX_TEXTS {
             self.long.push((name.clone(), entities.to_vec()));
@@ -220,14 +210,11 @@ impl Layout {
             dataset.set_attr(UNITS, AttrValue::VarLenString(unit));
         }
         describe(dataset, entities);
-        self.dimensions.attach(dataset, &scales);
         dataset
     }
 
-    fn dimension(&mut self, entities: &[EntityId]) -> Scale {
-        if let Some((_, scale)) = self.entities.iter().find(|(known, _)| known == entities) {
-            return *scale;
-        }
+    /// The dataset with the ids of these entities.
+    fn entities(&mut self, entities: &[EntityId]) {
         let word = solver::entity_word(&self.section).replace(' ', "_");
         let name = match self.entities.len() {
             0 => word,
@@ -235,24 +222,22 @@ impl Layout {
         };
         let name = self.names.of(&name);
         let dataset = self.out.create_dataset(&name);
-        let scale = self.dimensions.scale(dataset, &name);
         dataset.with_i64_data(&ids(entities));
         describe(dataset, entities);
         let title = |e: &EntityId| self.titles.get(e).map_or("", String::as_str);
         let titles: Vec<&str> = entities.iter().map(title).collect();
         if titles.iter().any(|title| !title.is_empty()) {
             if titles.len() <= MAX_TEXTS {
-                drop(dataset.set_attr(TITLES, texts(&titles)));
+                dataset.set_attr(TITLES, texts(&titles));
             } else {
                 self.titles_of.push((name.clone(), entities.to_vec()));
             }
         }
-        self.entities.push((entities.to_vec(), scale));
-        scale
+        self.entities.push(entities.to_vec());
     }
 
     /// Adds what no attribute holds.
-    fn finish(mut self) -> Result<(FileBuilder, Dimensions), ConvertError> {
+    fn finish(mut self) -> Result<FileBuilder, ConvertError> {
         let many = |most: usize| self.long.iter().filter(move |(_, e)| e.len() > most);
         let with_ids: Vec<_> = many(MAX_IDS).collect();
         if !with_ids.is_empty() {
@@ -277,7 +262,7 @@ impl Layout {
             }
             self.out.add_group(group.finish());
         }
-        Ok((self.out, self.dimensions))
+        Ok(self.out)
     }
 }
 
@@ -357,11 +342,11 @@ fn stream(
         let dataset = layout.component(&column.component, &column.entities);
         skeleton.reserve(dataset, states, column.entities.len());
     }
-    let (out, dimensions) = layout.finish()?;
+    let out = layout.finish()?;
     let failed_read = |source| ReadError::Io { path: PathBuf::from(input), source };
     let mut read_error = None;
     let written = write_at(output, |file| {
-        let Some(offsets) = skeleton.write_with(out, &dimensions, file)? else { return Ok(None) };
+        let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
         match fill(&blocks, &offsets, file) {
             Ok(whole) => Ok(whole.then_some(())),
             Err(Trouble::Writing(error)) => Err(error),
