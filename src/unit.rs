@@ -64,6 +64,47 @@ impl fmt::Display for Speed {
     }
 }
 
+/// How the values of a column are written: all in the unit that fits the largest of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shown {
+    unit: &'static str,
+    size: f64,
+    decimals: usize,
+}
+
+impl Shown {
+    fn fitting(largest: f64, scales: &[(f64, &'static str, usize)]) -> Self {
+        let fits = |(size, ..): &&(f64, &str, usize)| largest.abs() >= 0.1 * size;
+        let last = scales.len() - 1;
+        let &(size, unit, decimals) = scales.iter().find(fits).unwrap_or(&scales[last]);
+        Self { unit, size, decimals }
+    }
+
+    /// In MN, kN or N.
+    pub(crate) fn force(largest_n: f64) -> Self {
+        Self::fitting(largest_n, &[(1e6, "MN", 3), (1e3, "kN", 3), (1.0, "N", 2)])
+    }
+
+    /// In t or kg.
+    pub(crate) fn mass(largest_kg: f64) -> Self {
+        Self::fitting(largest_kg, &[(1e3, "t", 2), (1.0, "kg", 2)])
+    }
+
+    /// In MJ, kJ or J.
+    pub(crate) fn energy(largest_j: f64) -> Self {
+        Self::fitting(largest_j, &[(1e6, "MJ", 3), (1e3, "kJ", 3), (1.0, "J", 2)])
+    }
+
+    /// In MN/m or kN/m.
+    pub(crate) fn stiffness(largest_n_per_m: f64) -> Self {
+        Self::fitting(largest_n_per_m, &[(1e6, "MN/m", 1), (1e3, "kN/m", 1)])
+    }
+
+    pub(crate) fn text(self, value: f64) -> String {
+        format!("{:.*} {}", self.decimals, value / self.size, self.unit)
+    }
+}
+
 /// A speed as people in the field read it: `36 km/h`, at most two decimals.
 pub fn km_per_h(m_per_s: f64) -> String {
     let rounded = (m_per_s / M_PER_S_PER_KM_PER_H * 100.0).round() / 100.0;
@@ -464,6 +505,18 @@ mod tests {
         );
         t(&MASS, "t24", "mass \"t24\" is not a number with a unit: write for example 24t");
         t(&SPEED, "1e999m/s", "speed \"1e999m/s\" is out of range: it must be finite");
+    }
+
+    #[test]
+    fn the_largest_value_chooses_the_unit() {
+        assert_eq!(Shown::force(2.4e6).text(3e4), "0.030 MN");
+        assert_eq!(Shown::force(1.1e3).text(1.1e3), "1.100 kN");
+        assert_eq!(Shown::force(99e3).text(99e3), "99.000 kN");
+        assert_eq!(Shown::force(f64::NAN).text(0.5), "0.50 N");
+        assert_eq!(Shown::mass(24.0).text(24.0), "24.00 kg");
+        assert_eq!(Shown::mass(24e3).text(24e3), "24.00 t");
+        assert_eq!(Shown::energy(1.2e6).text(1.2e6), "1.200 MJ");
+        assert_eq!(Shown::stiffness(8e7).text(8e7), "80.0 MN/m");
     }
 
     #[test]

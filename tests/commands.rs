@@ -963,3 +963,42 @@ fn scenarios_choose_the_force() {
     let error = crumple_fails(here, 1, &["export", "a.json", "--to", "csv", "--units", "in-kg-s"]);
     assert!(error.contains("lengths in mm, cm, m, forces in N, kN, MN"), "{error}");
 }
+
+/// With -q a result is not printed: only errors, and what was asked for on standard output.
+#[test]
+fn quiet_commands_print_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-pair");
+    std::fs::write(here.join("c.csv"), "d_m,force_N\n0,0\n0.1,1e6\n").unwrap();
+    let run = fixture("fe/lead-car-pair/48kmh");
+    let run = run.to_str().unwrap();
+    let nodout = format!("{run}/nodout");
+    for arguments in [
+        &["validate", "curves.h5"][..],
+        &["train", "curves.h5", "--model", "rate", "-o", "m.model"],
+        &["predict", "m.model", "--speed", "50km/h"],
+        &["predict", "m.model", "--speed", "50km/h", "-o", "c.json"],
+        &["export", "c.json", "-o", "c.k"],
+        &["db", "ls", "curves.h5"],
+        &["db", "show", "curves.h5", "--case", "48kmh"],
+        &["db", "check", "curves.h5"],
+        &["db", "copy", "curves.h5", "--to", "d.h5"],
+        &["inspect", run],
+        &["rate", "c.csv", "c.csv", "--column", "force_N"],
+        &["plot", "curves.h5", "-o", "p.svg"],
+        &["histories", &nodout, "-o", "n.csv"],
+    ] {
+        let output = crumple_in(here, &[arguments, &["-q"]].concat());
+        assert!(
+            output.stdout.is_empty(),
+            "{arguments:?}: {}",
+            String::from_utf8_lossy(&output.stdout)
+        );
+    }
+    let printed = crumple_ok(here, &["predict", "m.model", "--speed", "50km/h", "-o", "-", "-q"]);
+    assert!(printed.starts_with('{'), "{printed}");
+    assert!(crumple_ok(here, &["db", "ls", "curves.h5", "-q", "--json"]).starts_with('{'));
+    let error = crumple_fails(here, 1, &["db", "show", "curves.h5", "--case", "x", "-q"]);
+    assert!(error.starts_with("error: "), "{error}");
+}

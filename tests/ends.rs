@@ -352,7 +352,7 @@ fn ends_are_all_that_a_user_writes() {
     let zones: Vec<bool> = bodies.iter().map(|b| b["is_crush_zone"].as_bool().unwrap()).collect();
     assert_eq!(zones, [false, true, true, false, true], "vehicle, front, rear");
     // In a table there are vehicles only.
-    let table = crumple_ok(MODELS.path(), &["simulate", "ends.toml", "-q"]);
+    let table = crumple_ok(MODELS.path(), &["simulate", "ends.toml"]);
     assert!(!table.contains("\nA1 front  ") && table.contains("\nA1  "), "{table}");
     assert!(table.contains(" damped; largest imbalance"), "{table}");
 }

@@ -913,7 +913,7 @@ fn the_choice_for_trains_counts_the_ends() {
     assert!(error.contains("model crush-law needs runs that tell the mass"), "{error}");
     assert!(!demo.path().join("no.model").exists());
     // That a group is not for one of the models is said, but is nothing to be warned of.
-    let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict"];
+    let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict", "-v"];
     let table = crumple_ok(demo.path(), &validated);
     assert!(table.contains("lead-car-pair: without crush-law: "), "{table}");
 }
@@ -978,12 +978,19 @@ fn validate_prints_and_tells_what_to_run_next() {
     let here = folder.path();
     build_fixture(here, "lead-car-wall");
     let arguments = ["validate", "curves.h5", "--group", "lead-car-wall", "--next"];
-    let text = crumple_ok(here, &arguments);
+    let text = crumple_ok(here, &[&arguments[..], &["-v"]].concat());
     for expected in
         ["means over 5 inner speeds", "extrapolation", "FE body (check)", "next run: ", "band ±"]
     {
         assert!(text.contains(expected), "{text}\nlacks {expected}");
     }
+    // Without -v: a table of the models, the choice, a line for each band, and the next run.
+    let text = crumple_ok(here, &arguments);
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "lead-car-wall: mean errors over 5 inner speeds left out in turn");
+    assert!(lines[9].starts_with("crush-law chosen (*): mean force error "), "{text}");
+    assert_eq!(lines.iter().filter(|line| line.starts_with("band of the ")).count(), 4, "{text}");
+    assert!(lines.len() == 17 && lines[15].starts_with("next run: "), "{text}");
     let found: Value =
         serde_json::from_str(&crumple_ok(here, &[&arguments[..], &["--json"]].concat())).unwrap();
     let group = &found["groups"][0];

@@ -232,7 +232,7 @@ fn every_command_takes_replicates() {
     database_of(&here.join("c.h5"), &[("made", cases.clone())]);
     assert!(crumple_ok(here, &["db", "ls", "c.h5"]).contains("\nb "));
     assert!(!crumple_ok(here, &["db", "check", "c.h5"]).contains("same speed"));
-    let printed = crumple_ok(here, &["validate", "c.h5", "--next"]);
+    let printed = crumple_ok(here, &["validate", "c.h5", "--next", "-v"]);
     let line = "made: scatter of 2 runs at 43.2 km/h: force 1.";
     assert!(printed.contains(line) && printed.contains(": no model can remove this part"));
     // Beside the means, and at the speed itself.

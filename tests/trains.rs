@@ -367,7 +367,7 @@ fn a_run_that_ends_while_loading_is_said() {
     let text = scenario(nose, cars, "").replace("300ms", "30ms");
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
     crumple_fails(folder.path(), 3, &["simulate", "s.toml", "--strict"]);
-    let text = crumple_ok(folder.path(), &["simulate", "s.toml", "-q"]);
+    let text = crumple_ok(folder.path(), &["simulate", "s.toml"]);
     assert!(text.contains(" g so far"), "{text}");
 }
 

@@ -1,5 +1,6 @@
 //! Curves in the terminal, drawn with Braille characters of 2 by 4 dots.
 
+use crate::unit::Shown;
 use std::io::{self, Write};
 
 use super::terminal;
@@ -11,12 +12,12 @@ const LEAST: usize = 20;
 /// Bits of a Braille character's dots, by row and column.
 const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 
-/// Draws force (N, shown in MN) over deflection (m, increasing); the force axis includes 0.
+/// Draws force in N over deflection in m, which increases; the force axis includes 0.
 pub(super) fn curve(out: &mut dyn Write, deflection_m: &[f64], force_n: &[f64]) -> io::Result<()> {
     let end_m = deflection_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let low = force_n.iter().copied().fold(0.0, f64::min);
     let high = force_n.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let labels = [high, low].map(|force| format!(" {:.3} MN", force / 1e6));
+    let labels = [high, low].map(|force| format!(" {}", Shown::force(high.max(-low)).text(force)));
     let beside = labels.iter().map(String::len).max().unwrap_or(0);
     let room = terminal::width().map_or(SIZE.0, |width| width.saturating_sub(beside));
     let across = room.clamp(LEAST, SIZE.0);

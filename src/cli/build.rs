@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
 use crate::database::CasePath;
 use crate::plural::counted;
+use crate::unit::Shown;
 use serde::Serialize;
 
 use super::db::CaseRow;
@@ -117,7 +118,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&Document::of(report, database, runs))?;
     } else {
-        output::print(|out| print(out, &Document::of(report, database, runs)))?;
+        options.print(|out| print(out, &Document::of(report, database, runs)))?;
     }
     Ok(outcome)
 }
@@ -146,7 +147,8 @@ impl Document {
 fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     let Document { database, group, runs, removed, moved, earlier_groups } = document;
     let heading: Vec<&str> = ["run"].into_iter().chain(CaseRow::HEADING).collect();
-    output::table(out, &heading, &runs.iter().map(row).collect::<Vec<_>>())?;
+    let units = CaseRow::units(runs.iter().filter_map(|run| run.case.as_ref()));
+    output::table(out, &heading, &runs.iter().map(|run| row(run, units)).collect::<Vec<_>>())?;
     for run in runs {
         for note in run.case.iter().flat_map(|c| &c.notes) {
             writeln!(out, "note: {}: {note}", run.name)?;
@@ -206,9 +208,9 @@ fn run_report(report: &BuildReport, run: &BuiltRun) -> RunReport {
     RunReport { name: run.name.clone(), outcome: word, error, case, renamed }
 }
 
-fn row(run: &RunReport) -> Vec<String> {
+fn row(run: &RunReport, units: [Shown; 3]) -> Vec<String> {
     let cells = match &run.case {
-        Some(case) => case.cells(),
+        Some(case) => case.cells(units),
         None => CaseRow::HEADING.iter().map(|_| "-".to_string()).collect(),
     };
     [format!("{} ({})", run.name, run.outcome)].into_iter().chain(cells).collect()

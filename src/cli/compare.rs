@@ -12,7 +12,7 @@ use crate::database::Database;
 use crate::nsdm::Start;
 use crate::rating::Rating;
 use crate::scenario;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
@@ -130,14 +130,14 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         if options.json {
             output::print_json(comparison)?;
         } else {
-            output::print(|out| print(out, comparison))?;
+            options.print(|out| print(out, comparison))?;
         }
     } else {
         let document = Document { means: means(&comparisons), comparisons };
         if options.json {
             output::print_json(&document)?;
         } else {
-            output::print(|out| {
+            options.print(|out| {
                 for comparison in &document.comparisons {
                     print(out, comparison)?;
                     writeln!(out)?;
@@ -157,11 +157,11 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
     let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!(", run in {t:.0} s"));
     writeln!(
         out,
-        "{} at {} ({}), left out; FE: peak force {:.3} MN, max crush {:.4} m{fe_time}",
+        "{} at {} ({}), left out; FE: peak force {}, max crush {:.4} m{fe_time}",
         comparison.group,
         km_per_h(comparison.speed_m_per_s),
         comparison.speed_kind.name(),
-        comparison.reference_peak_force_n / 1e6,
+        Shown::force(comparison.reference_peak_force_n).text(comparison.reference_peak_force_n),
         comparison.reference_max_crush_m
     )?;
     let rows: Vec<Vec<String>> = comparison.rows.iter().map(cells).collect();
@@ -203,7 +203,7 @@ fn cells(row: &Row) -> Vec<String> {
         format!("{} ({unfiltered:.2})", percent(row.acceleration_l1)),
         format!("{}/{}", score(&row.velocity), score(&row.acceleration)),
         row.force_l1.map_or("-".into(), percent),
-        format!("{:.3} MN", row.peak_force_n / 1e6),
+        Shown::force(row.peak_force_n).text(row.peak_force_n),
         format!("{:.4} m", row.max_crush_m),
         format!("{:.1} ms", row.fit_time_s * 1e3),
         format!("{:.2} ms", row.predict_time_s * 1e3),
@@ -360,8 +360,8 @@ fn trains(
     match (&document.trains[..], options.json) {
         ([one], true) => output::print_json(&one.comparison)?,
         (_, true) => output::print_json(&document)?,
-        ([one], false) => output::print(|out| print_train(out, &one.comparison))?,
-        (_, false) => output::print(|out| {
+        ([one], false) => options.print(|out| print_train(out, &one.comparison))?,
+        (_, false) => options.print(|out| {
             for train in &document.trains {
                 writeln!(out, "{}", train.scenario.display())?;
                 print_train(out, &train.comparison)?;

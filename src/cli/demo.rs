@@ -18,7 +18,7 @@ use crate::scenario;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::predict::predict_beyond;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
-use crate::unit::{M_PER_S_PER_KM_PER_H, km_per_h};
+use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
 
@@ -64,6 +64,8 @@ struct Document {
     validations: Vec<Validation>,
     prediction: Prediction,
     files: Vec<String>,
+    #[serde(skip)]
+    folder: String,
     seconds: f64,
 }
 
@@ -126,6 +128,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             simulated_energy_error: run.ledger.max_energy_error,
         },
         files: files.iter().map(|p| p.display().to_string()).collect(),
+        folder: args.output.display().to_string(),
         seconds: start.elapsed().as_secs_f64(),
     };
     for warning in &curve.warnings {
@@ -134,7 +137,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&document)?;
     } else {
-        output::print(|out| print(out, &document))?;
+        options.print(|out| print(out, &document, options.verbose))?;
     }
     Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }
@@ -275,7 +278,9 @@ fn case_line(group: &str, case: &Case) -> CaseLine {
     }
 }
 
-fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
+fn print(out: &mut dyn Write, document: &Document, verbose: bool) -> io::Result<()> {
+    let largest_n = document.cases.iter().map(|case| case.peak_force_n).fold(0.0, f64::max);
+    let force = Shown::force(largest_n);
     let rows: Vec<Vec<String>> = document
         .cases
         .iter()
@@ -283,33 +288,40 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
             vec![
                 case.group.clone(),
                 km_per_h(case.speed_m_per_s),
-                format!("{:.3} MN", case.peak_force_n / 1e6),
+                force.text(case.peak_force_n),
                 format!("{:.4} m", case.max_deflection_m),
-                format!("{:.4}", case.work_over_energy),
+                format!("{:.3}", case.work_over_energy),
             ]
         })
         .collect();
     output::table(out, &["FE run", "speed", "peak force", "max crush", "W/E"], &rows)?;
     writeln!(out)?;
     for validation in &document.validations {
-        super::validate::print_means(out, validation)?;
+        if verbose {
+            super::validate::print_means(out, validation)?;
+        } else {
+            super::validate::print_summary(out, validation)?;
+        }
         writeln!(out)?;
     }
     let p = &document.prediction;
     writeln!(
         out,
-        "errors as sum|p-r|/sum|r|: force along FE's crush; velocity and acceleration (CFC 60; in brackets not filtered) in one multi-body model to 30 ms after max crush\n\
-         {GROUP} at {} by the model {}: peak force {:.3} MN, max crush {:.4} m, energy {:.2} %; multi-body run: crush {:.4} m, energy off by {:.0e}\n",
+        "{GROUP} at {} by the model {}: peak force {}, max crush {:.4} m, energy {:.1} %; crush in the multi-body run {:.4} m\n",
         km_per_h(p.speed_m_per_s),
         p.model,
-        p.peak_force_n / 1e6,
+        Shown::force(p.peak_force_n).text(p.peak_force_n),
         p.max_deflection_m,
         p.energy_over_kinetic * 100.0,
         p.simulated_max_crush_m,
-        p.simulated_energy_error,
     )?;
-    for file in &document.files {
-        writeln!(out, "wrote {file}")?;
+    if verbose {
+        document.files.iter().try_for_each(|file| writeln!(out, "wrote {file}"))?;
     }
-    writeln!(out, "in {:.2} s", document.seconds)
+    let (files, folder) = (document.files.len(), &document.folder);
+    writeln!(
+        out,
+        "wrote {files} files into {folder} in {:.1} s; open {folder}/report.html",
+        document.seconds
+    )
 }

@@ -66,7 +66,7 @@ impl Destination<'_> {
                 warnings: self.warnings,
             });
         }
-        output::print(|out| files.iter().try_for_each(|f| writeln!(out, "wrote {}", f.display())))
+        options.print(|out| files.iter().try_for_each(|f| writeln!(out, "wrote {}", f.display())))
     }
 
     fn print(&self, exported: &Exported, options: GlobalOptions) -> Result<(), Failure> {

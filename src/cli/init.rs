@@ -126,7 +126,7 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
         if options.json {
             output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?;
         } else {
-            output::print(|out| {
+            options.print(|out| {
                 writeln!(
                     out,
                     "wrote {scenario}: put your trains in, then crumple simulate {scenario}"
@@ -184,7 +184,7 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
             proposal: &proposal,
         })?;
     } else {
-        output::print(|out| print(out, &proposal, output))?;
+        options.print(|out| print(out, &proposal, output))?;
     }
     let is_clean = warnings(&proposal).is_empty() && proposal.left_out.is_empty();
     Ok(if is_clean { Outcome::Clean } else { Outcome::Warned })

@@ -121,7 +121,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let files = inspected.iter().flat_map(reports).collect();
         output::print_json(&Document { files })?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             inspected.iter().try_for_each(|one| match &one.run {
                 None => reports(one).iter().try_for_each(|file| print(out, file)),
                 Some(folder) => {

@@ -33,6 +33,7 @@ mod validate;
 
 use std::error::Error;
 use std::ffi::OsString;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 #[cfg(unix)]
@@ -70,9 +71,12 @@ pub struct GlobalOptions {
     /// Print one JSON document on standard output instead of text
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub json: bool,
-    /// Print no progress and no warnings
+    /// Print errors only, and what --json or -o - writes to standard output
     #[arg(short, long, global = true, help_heading = GLOBAL)]
     pub quiet: bool,
+    /// Print every table and line of a result
+    #[arg(short, long, global = true, help_heading = GLOBAL, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// Exit with code 3 if there was damage or a warning
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub strict: bool,
@@ -159,6 +163,11 @@ fn is_stdout(output: &Path) -> bool {
 }
 
 impl GlobalOptions {
+    /// The text of a result on standard output.
+    fn print(self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+        if self.quiet { Ok(()) } else { output::print(write) }
+    }
+
     /// A warning on standard error.
     pub fn warn(self, text: &str) {
         if !self.quiet {

@@ -170,7 +170,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&document)?;
     } else if to_stdout == 0 {
-        output::print(|out| print(out, &document))?;
+        options.print(|out| print(out, &document))?;
     }
     Ok(Outcome::Clean)
 }

@@ -11,7 +11,7 @@ use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::predict_beyond;
 use crate::surrogate::{Model, PredictedCurve, Query};
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         });
         output::print_json(&Document { curve, exports: exports.collect() })?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             print(out, curve)?;
             args.output.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
         })?;
@@ -174,8 +174,8 @@ fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()
     let unloading = |out: &mut dyn Write, kind: ForceKind, stiffness: f64| {
         writeln!(
             out,
-            "  unloading            {:.1} MN/m of the {} force, which drives {}",
-            stiffness / 1e6,
+            "  unloading            {} of the {} force, which drives {}",
+            Shown::stiffness(stiffness).text(stiffness),
             kind.name(),
             kind.drives()
         )
@@ -228,9 +228,10 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         curve.speed_kind.name(),
         curve.model
     )?;
+    let energy = Shown::energy(provenance.kinetic_energy_j);
     let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
     let kind = provenance.force_kind.name();
-    writeln!(out, "  peak force           {:.3} MN ({kind})", peak / 1e6)?;
+    writeln!(out, "  peak force           {} ({kind})", Shown::force(peak).text(peak))?;
     writeln!(
         out,
         "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
@@ -243,13 +244,13 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     )?;
     writeln!(
         out,
-        "  energy               {:.4} MJ, {:.2} % of the impact's {:.4} MJ",
-        curve.energy_j / 1e6,
+        "  energy               {}, {:.1} % of the impact's {}",
+        energy.text(curve.energy_j),
         provenance.energy_over_kinetic * 100.0,
-        provenance.kinetic_energy_j / 1e6
+        energy.text(provenance.kinetic_energy_j)
     )?;
     if let Some(share) = provenance.body_energy_over_kinetic {
-        writeln!(out, "  energy of body force {:.2} %", share * 100.0)?;
+        writeln!(out, "  energy of body force {:.1} %", share * 100.0)?;
     }
     print_unloading(out, curve)?;
     print_bands(out, curve)?;
@@ -261,6 +262,6 @@ fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     for warning in &curve.warnings {
         writeln!(out, "  warning              {warning}")?;
     }
-    writeln!(out, "\nforce [MN] over deflection [m]")?;
+    writeln!(out, "\nforce over deflection")?;
     super::braille::curve(out, &curve.deflection_m, &curve.force_n)
 }

@@ -247,7 +247,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&rating)?;
     } else {
-        output::print(|out| print(out, &rating))?;
+        options.print(|out| print(out, &rating))?;
     }
     let clean = rating.warnings.is_empty() && reference.problems + prediction.problems == 0;
     Ok(if clean { Outcome::Clean } else { Outcome::Warned })

@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&document)?;
     } else {
-        output::print(|out| print(out, &document))?;
+        options.print(|out| print(out, &document))?;
     }
     Ok(outcome(warnings))
 }

@@ -123,7 +123,7 @@ fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&Pages { written })?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
         })?;
     }

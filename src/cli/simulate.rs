@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::file::write_whole;
 use crate::multibody::{BodyHistory, Ledger, Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::scenario::{self, Prepared};
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -125,7 +125,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     } else if to_stdout {
         output::print_data(|out| write_csv(out, &columns))?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             print(out, &summary, &run.ledger)?;
             match &args.output {
                 Some(path) => writeln!(out, "wrote {}", path.display()),
@@ -260,16 +260,18 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
 }
 
 fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<()> {
+    let largest_n = summary.interfaces.iter().map(|i| i.peak_force_n).fold(0.0, f64::max);
+    let force = Shown::force(largest_n);
     let rows: Vec<Vec<String>> = summary
         .interfaces
         .iter()
         .map(|i| {
             vec![
                 i.name.clone(),
-                format!("{:.6} MN", i.peak_force_n / 1e6),
-                format!("{:.7} m", i.max_deflection_m),
-                format!("{:.3} ms", i.max_deflection_time_s * 1e3),
-                i.restitution.map_or("-".into(), |e| format!("{e:.4}")),
+                force.text(i.peak_force_n),
+                format!("{:.4} m", i.max_deflection_m),
+                format!("{:.1} ms", i.max_deflection_time_s * 1e3),
+                i.restitution.map_or("-".into(), |e| format!("{e:.3}")),
                 i.curve_force.unwrap_or("unknown").into(),
                 i.curve_speed_m_per_s.map_or("-".into(), km_per_h),
             ]
@@ -285,13 +287,13 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
         .map(|b| {
             vec![
                 b.name.clone(),
-                format!("{:.6} m/s", b.final_v_m_per_s),
+                format!("{:.3} m/s", b.final_v_m_per_s),
                 format!(
-                    "{:.4} g{}",
+                    "{:.2} g{}",
                     b.mean_deceleration_g,
                     if b.still_loaded_at_end { " so far" } else { "" }
                 ),
-                b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.4} g")),
+                b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.2} g")),
             ]
         })
         .collect();
@@ -304,18 +306,19 @@ fn print(out: &mut dyn Write, summary: &Summary, ledger: &Ledger) -> io::Result<
 }
 
 fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
+    let energy = Shown::energy(ledger.initial_kinetic_j);
     // What only some trains have.
     let further = [("damped", ledger.damped_j), ("resisted", ledger.resisted_j)];
     let further = further.into_iter().filter(|(_, energy_j)| *energy_j != 0.0);
     let further: String =
-        further.map(|(what, energy_j)| format!(", {:.6} {what}", energy_j / 1e6)).collect();
+        further.map(|(what, energy_j)| format!(", {} {what}", energy.text(energy_j))).collect();
     writeln!(
         out,
-        "energy of {:.6} MJ: {:.6} kinetic, {:.6} stored, {:.6} dissipated{further}; largest imbalance {:.1e}",
-        ledger.initial_kinetic_j / 1e6,
-        ledger.kinetic_j / 1e6,
-        ledger.stored_j / 1e6,
-        ledger.dissipated_j / 1e6,
+        "energy of {}: {} kinetic, {} stored, {} dissipated{further}; largest imbalance {:.1e}",
+        energy.text(ledger.initial_kinetic_j),
+        energy.text(ledger.kinetic_j),
+        energy.text(ledger.stored_j),
+        energy.text(ledger.dissipated_j),
         ledger.max_energy_error
     )
 }

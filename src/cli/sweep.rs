@@ -251,7 +251,7 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
     if global.json {
         output::print_json(document)?;
     } else if !to_stdout {
-        output::print(|out| {
+        global.print(|out| {
             table(out, &report.columns)?;
             let resumed = match report.resumed {
                 0 => String::new(),
@@ -324,7 +324,7 @@ fn dry_run(sweep: &Sweep, shard: Shard, global: GlobalOptions) -> CommandResult 
         output::print_json(&preview)?;
         return Ok(Outcome::Clean);
     }
-    output::print(|out| {
+    global.print(|out| {
         writeln!(out, "{}", counted(preview.items, "item"))?;
         if shard != Shard::WHOLE {
             let (index, count) = (shard.index(), shard.count());

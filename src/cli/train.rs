@@ -12,7 +12,7 @@ use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind};
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 
@@ -209,19 +209,27 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
             validation: &model.leave_one_out,
         })?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             let speeds: Vec<String> = speeds().map(km_per_h).collect();
             writeln!(out, "{} on {}", model.name(), speeds.join(", "))?;
             if let Some(oob) = out_of_bag {
                 let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
-                writeln!(out, "out-of-bag: rmse {:.1} kN, r² {r2}", oob.rmse / 1e3)?;
+                writeln!(
+                    out,
+                    "out-of-bag: rmse {}, r² {r2}",
+                    Shown::force(oob.rmse).text(oob.rmse)
+                )?;
             }
             let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
             if let Some(stopped) = stopped.filter(|stopped| stopped.is_told()) {
                 writeln!(out, "{}", stopped_mass::said(stopped, model.speed_kind))?;
             }
             if let Some(validation) = &model.leave_one_out {
-                super::validate::print_means(out, validation)?;
+                if options.verbose {
+                    super::validate::print_means(out, validation)?;
+                } else {
+                    super::validate::print_summary(out, validation)?;
+                }
             }
             writeln!(out, "wrote {}", path.display())
         })?;

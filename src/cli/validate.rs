@@ -28,6 +28,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome};
   crumple validate curves.h5
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
+Without --verbose only the mean errors, the choice and the bands are printed.
 Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (in
 the means by each rule for the crush, the model's own marked); peaks are the first two of FE's curve
 (force and place); velocity and acceleration (CFC 60; in brackets not filtered) are those of a
@@ -94,14 +95,21 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&report)?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             let mut first = true;
             for group in &report.groups {
                 let GroupReport::Validated { validation, next_run } = group else { continue };
                 if !std::mem::take(&mut first) {
                     writeln!(out)?;
                 }
-                print_group(out, validation, next_run.as_ref())?;
+                if options.verbose {
+                    print_group(out, validation)?;
+                } else {
+                    print_summary(out, validation)?;
+                }
+                if let Some(next) = next_run {
+                    print_next(out, next)?;
+                }
             }
             Ok(())
         })?;
@@ -158,11 +166,8 @@ fn signed(error: f64) -> String {
     format!("{:+.1} %", error * 100.0)
 }
 
-fn print_group(
-    out: &mut dyn Write,
-    validation: &Validation,
-    next: Option<&NextRun>,
-) -> io::Result<()> {
+/// Every table and line of a validation.
+fn print_group(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     print_means(out, validation)?;
     for (inner, title) in [
         (true, "every inner speed left out"),
@@ -193,19 +198,51 @@ fn print_group(
             output::table(out, &heading, &rows)?;
         }
     }
-    match next {
-        Some(next) => {
-            writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
-            let then = next.other_gaps.iter().filter_map(|gap| {
-                let (low, high) = gap.between_m_per_s;
-                let error = gap.expected_force_l1? * 100.0;
-                Some(format!("{} to {} ({error:.1} %)", km_per_h(low), km_per_h(high)))
-            });
-            let then: Vec<String> = then.collect();
-            if then.is_empty() { Ok(()) } else { writeln!(out, "then: {}", then.join(", ")) }
-        }
-        None => Ok(()),
+    Ok(())
+}
+
+fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {
+    writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+    let then = next.other_gaps.iter().filter_map(|gap| {
+        let (low, high) = gap.between_m_per_s;
+        let error = gap.expected_force_l1? * 100.0;
+        Some(format!("{} to {} ({error:.1} %)", km_per_h(low), km_per_h(high)))
+    });
+    let then: Vec<String> = then.collect();
+    if then.is_empty() { Ok(()) } else { writeln!(out, "then: {}", then.join(", ")) }
+}
+
+/// The mean errors of each model, which is chosen and why, and a line for each band.
+pub(super) fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
+    let group = &validation.group;
+    if let Some(first) = validation.means.first() {
+        writeln!(out, "{group}: mean errors over {} inner speeds left out in turn", first.speeds)?;
+        let of_model = |m: &Means| {
+            let mark = if m.model == validation.chosen { " *" } else { "" };
+            let errors = [m.force_l1, m.max_crush_error, m.velocity_l1, m.acceleration_l1];
+            [format!("{}{mark}", m.model)].into_iter().chain(errors.map(percent)).collect()
+        };
+        let rows: Vec<Vec<String>> = validation.means.iter().map(of_model).collect();
+        output::table(out, &["model", "force", "crush", "velocity", "acceleration"], &rows)?;
     }
+    writeln!(out, "{} chosen (*): {}", validation.chosen, validation.reason)?;
+    for (force, band) in bands(validation) {
+        let span = km_per_h(band.span_m_per_s);
+        let place = match band.left_out {
+            LeftOutSpeeds::Inner => format!("in a gap of {span}"),
+            LeftOutSpeeds::Ends => format!("{span} outside"),
+        };
+        let coverage = match band.coverage {
+            Some(share) => format!("covers {:.0} % of the points left out", share * 100.0),
+            None => "not checked".into(),
+        };
+        writeln!(
+            out,
+            "band of the {force} {place}: ±{:.0} %, {coverage}",
+            band.pointwise_share * 100.0
+        )?;
+    }
+    Ok(())
 }
 
 fn row(row: &LeftOut, chosen: &str) -> Vec<String> {

@@ -43,10 +43,10 @@ pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Resu
         time_s: curve.time_s.as_deref(),
         body_force_n: curve.body_force_n.as_deref(),
     };
-    let (curves, made) = from_table(&table, &impact)
+    let made = from_table(&table, &impact)
         .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
     let recipe = recipe(item, settings, &curve, reader.name, &said);
-    Ok(assembled(name, settings, &curve, reader.name, said, curves, made, recipe))
+    Ok(assembled(name, settings, &curve, reader.name, said, made, recipe))
 }
 
 fn assembled(
@@ -55,8 +55,7 @@ fn assembled(
     curve: &ReadCurve,
     format: &str,
     said: Said,
-    curves: RecordedCurves,
-    made: Quality,
+    (curves, made): (RecordedCurves, Quality),
     recipe: String,
 ) -> Case {
     let mut hash = blake3::Hasher::new();

@@ -1,7 +1,7 @@
 //! What the report says of a group: its runs, how good predictions are, a prediction, the methods.
 
 use super::figure::Figure;
-use super::text::{energy, mega_newton, metres, percent, signed_percent, tonnes};
+use super::text::{energy, force, mass, metres, percent, signed_percent};
 use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::choose::{Purpose, Selection, next_run};
@@ -94,7 +94,7 @@ fn runs(group: &str, cases: &[Case]) -> Table {
             case.id.name.as_str().into(),
             km_per_h(case.conditions.speed.m_per_s).into(),
             masses(case).into(),
-            mega_newton(case.peak_force_n()).into(),
+            force(case.peak_force_n()).into(),
             metres(case.max_deflection_m()).into(),
             energy(case.quality.audit.work_j).into(),
             format!("{:.3}", case.quality.audit.ratio()).into(),
@@ -113,9 +113,9 @@ fn runs(group: &str, cases: &[Case]) -> Table {
 }
 
 fn masses(case: &Case) -> String {
-    let body = tonnes(case.conditions.masses.body_kg);
+    let body = mass(case.conditions.masses.body_kg);
     match case.conditions.masses.other_kg {
-        Some(other) => format!("{body} on {}", tonnes(other)),
+        Some(other) => format!("{body} on {}", mass(other)),
         None => body,
     }
 }
@@ -253,7 +253,7 @@ impl Validated<'_> {
         let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
-            ("largest force".into(), mega_newton(peak)),
+            ("largest force".into(), force(peak)),
             ("largest crush".into(), metres(curve.max_deflection_m)),
             ("energy of the curve".into(), energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),

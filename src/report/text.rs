@@ -1,5 +1,6 @@
 //! Numbers as the page writes them.
 
+use crate::unit::Shown;
 use std::path::Path;
 
 /// The last part of a path.
@@ -19,16 +20,13 @@ pub(super) fn signed_percent(share: f64) -> String {
 }
 
 /// `3.214 MN`.
-pub(super) fn mega_newton(force_n: f64) -> String {
-    format!("{:.3} MN", force_n / 1e6)
+pub(super) fn force(force_n: f64) -> String {
+    Shown::force(force_n).text(force_n)
 }
 
 /// `2.31 MJ`, `25.1 kJ`.
 pub(super) fn energy(energy_j: f64) -> String {
-    match energy_j.abs() {
-        e if e >= 1e6 => format!("{:.3} MJ", energy_j / 1e6),
-        _ => format!("{:.1} kJ", energy_j / 1e3),
-    }
+    Shown::energy(energy_j).text(energy_j)
 }
 
 /// `1.087 m`.
@@ -37,6 +35,6 @@ pub(super) fn metres(length_m: f64) -> String {
 }
 
 /// `24.00 t`.
-pub(super) fn tonnes(mass_kg: f64) -> String {
-    format!("{:.2} t", mass_kg / 1e3)
+pub(super) fn mass(mass_kg: f64) -> String {
+    Shown::mass(mass_kg).text(mass_kg)
 }

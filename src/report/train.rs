@@ -4,7 +4,7 @@ use crate::error::Error;
 use std::path::Path;
 
 use super::figure::Figure;
-use super::text::{energy, file_name, mega_newton, metres, percent, tonnes};
+use super::text::{energy, file_name, force, mass, metres, percent};
 use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
@@ -80,7 +80,7 @@ fn vehicles(prepared: &Prepared, run: &Run) -> Table {
         let so_far = if history.is_loaded_at_end { " so far" } else { "" };
         vec![
             body.name.as_str().into(),
-            tonnes(body.mass_kg).into(),
+            mass(body.mass_kg).into(),
             format!("{:.2} m/s", body.speed_m_per_s).into(),
             format!("{:.2} m/s", history.final_v_m_per_s).into(),
             format!("{}{so_far}", in_g(history.mean_deceleration_m_per_s2)).into(),
@@ -108,7 +108,7 @@ fn interfaces(prepared: &Prepared, run: &Run) -> Table {
         let last = |values: &[f64]| values.last().copied().unwrap_or_default();
         vec![
             interface.name.as_str().into(),
-            mega_newton(history.peak_force_n).into(),
+            force(history.peak_force_n).into(),
             metres(history.max_deflection_m).into(),
             format!("{:.1} ms", 1e3 * history.max_deflection_time_s).into(),
             energy(last(&history.dissipated_j)).into(),

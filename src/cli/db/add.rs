@@ -117,7 +117,7 @@ fn report(cases: &[Case], database: &str, group: &str, options: GlobalOptions) -
         output::print_json(&Document { database, group, cases: rows })?;
         return Ok(outcome);
     }
-    output::print(|out| {
+    options.print(|out| {
         print_group(out, "case", &rows)?;
         for (case, row) in cases.iter().zip(&rows) {
             for note in &row.notes {

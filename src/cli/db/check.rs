@@ -13,7 +13,7 @@ pub(super) fn run(path: &Path, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&checked)?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             for f in findings {
                 writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
             }

@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let database = args.database.display().to_string();
         output::print_json(&Document { database, cases: cases.len(), files })?;
     } else {
-        output::print(|out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
+        options.print(|out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
     }
     Ok(Outcome::Clean)
 }

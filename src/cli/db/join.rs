@@ -138,7 +138,7 @@ fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -
     if options.json {
         output::print_json(&document)?;
     } else {
-        output::print(|out| print(out, &document))?;
+        options.print(|out| print(out, &document))?;
     }
     Ok(if joined.not_taken.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }

@@ -101,7 +101,7 @@ fn run(
         output::print_json(&Document { database, cases: labelled.collect() })?;
         return Ok(Outcome::Clean);
     }
-    output::print(|out| {
+    options.print(|out| {
         for case in &cases {
             let tags = if case.provenance.tags.is_empty() {
                 "no tags".into()

@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if options.json {
         output::print_json(&Groups { groups, stopped_mass, warnings })?;
     } else {
-        output::print(|out| {
+        options.print(|out| {
             groups.iter().try_for_each(|(group, rows)| {
                 print_group(out, group, rows)?;
                 if let Some(stopped) = stopped_mass.get(group) {
@@ -78,8 +78,10 @@ pub(super) fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) ->
     let is_tagged = rows.iter().any(|row| !row.tags.is_empty());
     let mut heading: Vec<&str> = [group].into_iter().chain(CaseRow::HEADING).collect();
     heading.extend(is_tagged.then_some("tags"));
+    let units = CaseRow::units(rows.iter());
     let cells = |row: &CaseRow| {
-        let mut cells: Vec<String> = [row.name.clone()].into_iter().chain(row.cells()).collect();
+        let mut cells: Vec<String> =
+            [row.name.clone()].into_iter().chain(row.cells(units)).collect();
         cells.extend(is_tagged.then(|| row.tags.join(", ")));
         cells
     };

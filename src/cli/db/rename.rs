@@ -48,7 +48,7 @@ pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult
         output::print_json(&Removed { database, removed, dry_run })?;
         return Ok(Outcome::Clean);
     }
-    output::print(|out| {
+    options.print(|out| {
         for cases in cases.chunk_by(|a, b| a.id.group == b.id.group) {
             let rows: Vec<CaseRow> = cases.iter().map(CaseRow::of).collect();
             print_group(out, &cases[0].id.group, &rows)?;
@@ -102,7 +102,7 @@ pub(super) fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult
         output::print_json(&Renamed { database, from: Some(from), to, cases })?;
     } else {
         let count = output::counted(cases.len(), "case");
-        output::print(|out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))?;
+        options.print(|out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))?;
     }
     Ok(Outcome::Clean)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::curve::{Case, ForceKind, Origin, Parameter, SourceFile};
-use crate::unit::{SpeedKind, km_per_h};
+use crate::unit::{Shown, SpeedKind, km_per_h};
 use serde::Serialize;
 
 use super::Failure;
@@ -72,18 +72,30 @@ impl CaseRow {
         }
     }
 
-    pub(crate) fn cells(&self) -> Vec<String> {
+    /// The units of mass, force and stiffness in a table of these rows.
+    pub(crate) fn units<'a>(rows: impl Iterator<Item = &'a Self>) -> [Shown; 3] {
+        let mut largest = [0.0_f64; 3];
+        for row in rows {
+            let stiffness = row.unloading_stiffness_n_per_m.unwrap_or(0.0);
+            let values = [row.mass_kg, row.peak_force_n, stiffness];
+            largest.iter_mut().zip(values).for_each(|(most, value)| *most = most.max(value));
+        }
+        let [mass_kg, force_n, stiffness_n_per_m] = largest;
+        [Shown::mass(mass_kg), Shown::force(force_n), Shown::stiffness(stiffness_n_per_m)]
+    }
+
+    pub(crate) fn cells(&self, [mass, force, stiffness]: [Shown; 3]) -> Vec<String> {
         vec![
             format!("{} ({})", km_per_h(self.speed_m_per_s), self.speed_kind.name()),
-            format!("{:.2} t", self.mass_kg / 1e3),
-            format!("{:.3} MN", self.peak_force_n / 1e6),
+            mass.text(self.mass_kg),
+            force.text(self.peak_force_n),
             format!(
                 "{:.4} m{}",
                 self.max_deflection_m,
                 if self.truncated { " (truncated)" } else { "" }
             ),
             format!("{:.4}", self.work_over_energy),
-            self.unloading_stiffness_n_per_m.map_or("-".into(), |k| format!("{:.1} MN/m", k / 1e6)),
+            self.unloading_stiffness_n_per_m.map_or("-".into(), |k| stiffness.text(k)),
         ]
     }
 }

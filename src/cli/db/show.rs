@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::curate::{self, Difference, Selection};
 use crate::curve::{Case, Parameter};
 use crate::database::Database;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 use super::super::braille;
 use super::chosen::Chosen;
@@ -87,7 +87,7 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
         })?;
         return Ok(Outcome::Clean);
     }
-    output::print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
+    options.print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
     Ok(Outcome::Clean)
 }
 
@@ -156,7 +156,7 @@ fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
             [name.to_string()].into_iter().chain(cells).collect()
         })
         .collect();
-    output::print(|out| output::table(out, &heading, &rows))?;
+    options.print(|out| output::table(out, &heading, &rows))?;
     Ok(Outcome::Clean)
 }
 
@@ -169,17 +169,17 @@ const QUANTITIES: [Quantity; 7] = [
         with_difference(speed, c.speed_difference, first)
     }),
     ("mass", |c, first| {
-        with_difference(format!("{:.2} t", c.mass_kg / 1e3), c.mass_difference, first)
+        with_difference(Shown::mass(c.mass_kg).text(c.mass_kg), c.mass_difference, first)
     }),
     ("max crush", |c, first| {
         let crush = format!("{:.4} m", c.max_deflection_m);
         with_difference(crush, c.max_deflection_difference, first)
     }),
     ("energy", |c, first| {
-        with_difference(format!("{:.4} MJ", c.work_j / 1e6), c.work_difference, first)
+        with_difference(Shown::energy(c.work_j).text(c.work_j), c.work_difference, first)
     }),
     ("peak force", |c, first| {
-        let force = format!("{:.3} MN", c.peak_force_n / 1e6);
+        let force = Shown::force(c.peak_force_n).text(c.peak_force_n);
         with_difference(force, c.peak_force_difference, first)
     }),
     ("force L1", |c, first| match c.force_l1.filter(|_| !first) {
