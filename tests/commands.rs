@@ -996,7 +996,10 @@ fn quiet_commands_print_nothing() {
             String::from_utf8_lossy(&output.stdout)
         );
     }
-    let printed = crumple_ok(here, &["predict", "m.model", "--speed", "50km/h", "-o", "-", "-q"]);
+    let printed = crumple_ok(
+        here,
+        &["predict", "m.model", "--speed", "50km/h", "-o", "-", "--to", "json", "-q"],
+    );
     assert!(printed.starts_with('{'), "{printed}");
     assert!(crumple_ok(here, &["db", "ls", "curves.h5", "-q", "--json"]).starts_with('{'));
     let error = crumple_fails(here, 1, &["db", "show", "curves.h5", "--case", "x", "-q"]);
