@@ -117,7 +117,7 @@ impl Row {
     }
 }
 
-/// What separates the columns of the first line of `text` that is no comment (`#`): the first
+/// What separates the columns of the first line of `text` that is not a comment (`#`): the first
 /// comma, semicolon or tab outside of quotes.
 pub(crate) fn separator(text: &[u8]) -> u8 {
     let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);

@@ -213,9 +213,9 @@ fn cases_and_groups_get_other_names() {
     fails(
         here,
         "db rename curves.h5 --group nose --case 12kmh --to a/b",
-        "\"a/b\" is no name of a case: it may not contain \"/\"",
+        "\"a/b\" is not a name of a case: it may not contain \"/\"",
     );
-    fails(here, "db rename curves.h5 --group nose --to .", "\".\" is no name of a group");
+    fails(here, "db rename curves.h5 --group nose --to .", "\".\" is not a name of a group");
     fails(
         here,
         "db rename curves.h5 --group nase --to x",
@@ -540,7 +540,7 @@ fn copies_go_to_groups_and_databases() {
     fails(
         here,
         "db copy curves.h5 --case inner/36kmh --to c.h5 --to-group a/b",
-        "\"a/b\" is no name of a group",
+        "\"a/b\" is not a name of a group",
     );
     assert!(!here.join("c.h5").exists());
 }
@@ -593,10 +593,14 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
         "db tag curves.h5 --case 12kmh --remove c",
         "none of the 1 chosen cases has the tag \"c\": they have \"b\", \"reviewed\"",
     );
-    fails(here, "db tag curves.h5 --case 12kmh --add a;b", "\"a;b\" is no tag: it may not contain");
+    fails(
+        here,
+        "db tag curves.h5 --case 12kmh --add a;b",
+        "\"a;b\" is not a tag: it may not contain",
+    );
     let blank =
         crumple_fails(here, 1, &["db", "note", "curves.h5", "--case", "12kmh", "--add", " "]);
-    assert!(blank.contains("\" \" is no note: it is blank"), "{blank}");
+    assert!(blank.contains("\" \" is not a note: it is blank"), "{blank}");
     assert!(ok(here, "db check curves.h5").contains("8 cases checked"));
 }
 

@@ -1,4 +1,4 @@
-//! Files and databases: what is no file is refused, sizes are bounded, what is half-written or
+//! Files and databases: what is not a file is refused, sizes are bounded, what is half-written or
 //! altered is found, and what others have put into a database stays.
 
 use std::fs;
@@ -172,7 +172,7 @@ fn sizes_are_bounded() {
     soon_fails(here, &["simulate", "t.toml"], &most(64 << 20));
     // Within its bound, but more than there is memory for.
     sparse("m.model", 1 << 30);
-    let there_is_none = format!("m.model: there is no memory for its {} bytes", 1u64 << 30);
+    let there_is_none = format!("m.model: not enough memory to read {} bytes", 1u64 << 30);
     soon_fails(here, &["predict", "m.model", "--speed", "40km/h"], &there_is_none);
     assert_eq!(entries(here), ["c.csv", "c.json", "m.model", "r.csv", "s.toml", "t.toml"]);
 }
@@ -263,7 +263,8 @@ fn the_stopped_mass_stands_in_the_database() {
     let pair = Hdf5::open(&path).unwrap().root().group("lead-car-pair").unwrap().attrs().unwrap();
     assert_eq!(pair.keys().collect::<Vec<_>>(), ["cases"], "its noses bend into each other");
     let listed = crumple_ok(here, &["db", "ls", "curves.h5"]);
-    let said = format!("the crush zone stops {:.0} kg over ", m[m.len() - 1]);
+    let said =
+        format!("crush law: {:.0} kg of the crush zone come to rest within ", m[m.len() - 1]);
     assert_eq!(listed.matches(&said).count(), 1, "{listed}");
     // Written anew, then edited because something of others is in it.
     crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "72kmh"]);
@@ -493,7 +494,7 @@ fn other_layouts_are_refused() {
     }
 }
 
-/// One case is read by itself: damage of another is no hindrance.
+/// One case is read by itself: damage of another is not a hindrance.
 #[test]
 fn a_case_is_shown_without_reading_the_others() {
     let folder = tempfile::tempdir().unwrap();

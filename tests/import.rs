@@ -460,14 +460,14 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.json",
         "{}",
         None,
-        &["this is no predicted curve", "give a JSON file made by crumple predict"],
+        &["this is not a predicted curve", "give a JSON file made by crumple predict"],
     );
     t("a.json", "{\"deflection_m\": [0, 1", None, &["line 1 column 22"]);
     t(
         "a.bin",
         [0u8, 159, 146, 150],
         None,
-        &["neither content nor extension tell the format", "--from"],
+        &["the format of this file follows neither from its content", "--from"],
     );
     for empty in ["a.csv", "a.json", "a.k", "a.txt", "a.mat", "a.cur", "a.mme"] {
         t(empty, "", None, &["expected a curve, found an empty file"]);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::curve::Case;
 use crumple::database::Database;
-use crumple::init::{Given, Request, propose};
+use crumple::init::{Request, UserHints, propose};
 use serde_json::Value;
 use toml::Table;
 
@@ -306,7 +306,7 @@ fn half_models_are_asked_for() {
     let output = crumple_in(&here, &["init", "--half-model", "--strict"]);
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
     assert_eq!(output.status.code(), Some(0));
-    // Two bodies are no half model, one body is no pair.
+    // Two bodies are not a half model, one body is not a pair.
     let pair = group(&fixture("fe/lead-car-pair"), TEXTS);
     let there = pair.path().join("lead-car-pair");
     let error = crumple_fails(&there, 1, &["init", "--half-model"]);
@@ -564,7 +564,7 @@ fn masses_are_never_made_up() {
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
-        said.contains("fill in mass of 50kmh: no force and no energy tells it; say --mass"),
+        said.contains("fill in mass of 50kmh: it follows from no force and no energy; say --mass"),
         "{said}"
     );
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
@@ -852,7 +852,7 @@ fn wrong_units_are_not_believed() {
     let (_folder, here) = four_runs();
     let error = crumple_fails(&here, 1, &["init", "--units", "SI"]);
     assert!(error.contains("crumple build would refuse it"), "{error}");
-    assert!(error.contains("units: SI as given would make an impact at 6944 m/s, which is no crash; mm-t-s would fit"), "{error}");
+    assert!(error.contains("units: SI as given would make an impact at 6944 m/s, which is not a crash; mm-t-s would fit"), "{error}");
     assert!(!here.join("study.toml").exists());
     crumple_fails(&here, 2, &["init", "--units", "mm-t-fortnight"]);
     // A deck that states them is read; one that cannot be right is named.
@@ -911,7 +911,7 @@ fn what_the_caller_knows_stands_above_what_is_found() {
     let error = crumple_fails(&here, 1, &["init", "--node", "4", "-o", "x.toml"]);
     assert!(error.contains("it has no moving node 4; there"), "{error}");
     let error = crumple_fails(&here, 2, &["init", "--force", "nodout:1", "-o", "x.toml"]);
-    assert!(error.contains("is no force: write FILE:ID[:SIDE][:COMPONENT]"), "{error}");
+    assert!(error.contains("is not a force: write FILE:ID[:SIDE][:COMPONENT]"), "{error}");
     crumple_fails(&here, 2, &["init", "--scenario", "--mass", "1t", "a.model"]);
     let error = crumple_fails(&here, 1, &["init", "--force", "rcforc:9", "-o", "x.toml"]);
     assert!(
@@ -954,7 +954,7 @@ fn damaged_files_give_a_study_or_a_reason() {
     let request = Request {
         folders: vec![run.clone()],
         study: folder.path().join("study.toml"),
-        given: Given::default(),
+        given: UserHints::default(),
     };
     let (mut studies, mut reasons) = (0, 0);
     for k in 0..if is_thorough() { 2_000 } else { 150 } {

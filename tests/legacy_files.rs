@@ -101,7 +101,7 @@ fn headers_of_instruments() {
     t("Traverse: Weg (mm)\tKraft F1 (kN)", "\t");
     t("Extension (mm),Load (kN)", ",");
     t("dist. travel [mm]  Fz [kN]", "  ");
-    // Edges, bounds and rates are no second force, and a whole name is better than a word within one.
+    // Edges, bounds and rates are not a second force, and a whole name is better than a word within one.
     for other in
         ["Force max [kN]", "Force rate [kN/s]", "force_low_kN", "Force, filtered [kN]", "Kraft"]
     {
@@ -130,7 +130,7 @@ fn a_column_of_several_is_chosen() {
         table("a.csv", text.as_bytes(), &chosen(force));
     }
     let error = refused("a.csv", text.as_bytes(), &chosen("Force C"));
-    assert!(error.contains("line 1: --force-column \"Force C\" is no column: expected a number from 1, or one of \"No\", \"Displacement LVDT [mm]\""), "{error}");
+    assert!(error.contains("line 1: --force-column \"Force C\" is not a column: expected a number from 1, or one of \"No\", \"Displacement LVDT [mm]\""), "{error}");
     assert!(refused("a.csv", text.as_bytes(), &chosen("9")).contains("--force-column \"9\""));
     // Columns that no header names, and those of a table without one.
     let by = |deflection: &str, force: &str, units| ReadOptions {
@@ -177,7 +177,7 @@ fn tables_with_blanks_and_tabs_under_any_name() {
             let (curve, _) = read_bytes(name, text.as_bytes(), &given(units)).unwrap();
             is_points(&curve, &format!("{name} {head}"));
         }
-        // A title of as many words is no header; columns that are named otherwise can be chosen.
+        // A title of as many words is not a header; columns that are named otherwise can be chosen.
         let text = format!("Test 12\n{si}");
         is_points(&read_bytes(name, text.as_bytes(), &given(Some("SI"))).unwrap().0, &text);
         let odd = ReadOptions {
@@ -598,7 +598,7 @@ fn a_legacy_curve_is_exported_directly() {
     t(
         1,
         &texts(&export(&["--to", "csv", "--force-column", "9"])),
-        "nose.csv: line 2: --force-column \"9\" is no column",
+        "nose.csv: line 2: --force-column \"9\" is not a column",
     );
     fs::write(here.join("bare.csv"), rows(1.0, 1.0, ",", ".")).unwrap();
     let bare = [&["export", "bare.csv", "--to", "csv", "--speed", &v][..], &WALL].concat();

@@ -105,7 +105,7 @@ fn errors_of_a_study_show_their_place() {
     let speed = "speed = \"25km/h\"";
     study("name  = \"s\"", "nam   = \"s\"", "2:1", "nam", "did you mean \"name\"?");
     study("\"mm-t-s\"", "\"mm-t-sec\"", "3:9", "\"mm-t-sec\"", "did you mean \"mm-t-s\"?");
-    study("name  = \"s\"", "name  = \" \"", "2:9", "\" \"", "is no name");
+    study("name  = \"s\"", "name  = \" \"", "2:9", "\" \"", "is not a name");
     study("group = \"g\"", "group = \"a/b\"", "4:9", "\"a/b\"", "may not contain");
     study("name  = \"s\"", "name  = \"imported\"", "2:9", "\"imported\"", "the name of the curves");
     study(wall, "kind  = \"pair\"", "5:9", "\"pair\"", "a pair needs the other body");
@@ -117,7 +117,7 @@ fn errors_of_a_study_show_their_place() {
     let other = "speed = \"25km/h\"\nother_mass = \"2t\"";
     study(speed, other, "16:1", "other_mass", "needs kind = \"pair\"");
     let parameter = |text: &str| format!("speed = \"25km/h\"\nparameters = {{ {text} }}");
-    study(speed, &parameter("\" \" = 1"), "16:16", "\" \"", "is no name");
+    study(speed, &parameter("\" \" = 1"), "16:16", "\" \"", "is not a name");
     study(speed, &parameter("mass_kg = 1"), "16:16", "mass_kg", "has a key of its own");
     study(speed, &parameter("a = inf"), "16:20", "inf", "is not finite");
     study("path  = \"25kmh\"", "path  = \"\"", "14:9", "\"\"", "an empty path");
@@ -350,7 +350,7 @@ fn global_options_have_their_heading_and_every_command_its_page() {
     while let Some(command) = left.pop() {
         let words: Vec<&str> = command.iter().map(String::as_str).collect();
         let help = crumple_ok(folder.path(), &[&words[..], &["--help"]].concat());
-        assert!(!help.contains('\\'), "quotes of the source are no part of the help: {help}");
+        assert!(!help.contains('\\'), "quotes of the source are not part of the help: {help}");
         let global = help.split("\nGlobal options:\n").nth(1).unwrap_or_else(|| panic!("{help}"));
         for option in ["--json", "--quiet", "--strict", "--help", "--version"] {
             assert!(global.contains(option), "{words:?} {option}: {help}");

@@ -186,7 +186,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     fails(&["runs/36kmh", "runs/49kmh"], "runs/49kmh: No such file");
     fails(&["runs/49kmh"], "did you mean runs/48kmh?");
     fails(&["elsewhere"], "elsewhere: No such file or directory (os error 2)\n");
-    fails(&["runs/36kmh/nodout"], "this is no folder: give a run's folder, or one above runs");
+    fails(&["runs/36kmh/nodout"], "this is not a folder: give a run's folder, or one above runs");
     // A file with another name than the solver's.
     fs::rename(here.join("runs/48kmh/nodout"), here.join("runs/48kmh/Nodout.txt")).unwrap();
     fails(&["runs/48kmh"], "it has rwforc; if Nodout.txt is the nodout, name it so");

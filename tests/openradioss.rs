@@ -80,7 +80,7 @@ fn t01_and_text_of_every_run_agree() {
     assert!(runs >= 17, "{runs} runs");
 }
 
-/// Nodes that stand on a wall for one state are no damage.
+/// Nodes that stand on a wall for one state are not damage.
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn every_t01_of_the_fe_runs_is_clean() {

@@ -213,7 +213,7 @@ fn wrong_input_says_where_and_what_to_do() {
         1,
         "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must rise strictly",
     );
-    t(&["a.csv", "few.csv"], 1, "few.csv: a: 2 samples are no history: at least 5 are needed");
+    t(&["a.csv", "few.csv"], 1, "few.csv: a: a signal needs at least 5 samples, found 2");
     t(&["a.csv", "empty.csv"], 1, "empty.csv: the table is empty");
     t(
         &["a.csv", "late.csv"],
@@ -230,12 +230,12 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv,time=h", "a.csv"],
         2,
-        "invalid value 'a.csv,time=h' for '<A>': \"h\" is no unit of time",
+        "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time",
     );
     t(
         &["a.csv,scale=0", "a.csv"],
         2,
-        "invalid value 'a.csv,scale=0' for '<A>': \"0\" is no factor",
+        "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor",
     );
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
     assert!(
@@ -257,7 +257,7 @@ fn wrong_input_says_where_and_what_to_do() {
     let nodout = nodout.to_str().unwrap();
     t(&[nodout, nodout, "--id=1"], 1, &format!("{nodout}: nodout has no node 1"));
     let address = format!("{nodout}:nodout:x:x_velocity");
-    t(&[&address, nodout], 2, "\"nodout:x:x_velocity\": \"x\" is no id");
+    t(&[&address, nodout], 2, "\"nodout:x:x_velocity\": \"x\" is not an id");
     t(&[nodout, nodout], 1, &format!("{nodout}: 12 histories fit, from x_displacement[900001]"));
     t(
         &[nodout, nodout, "--component=x_velocity", "--column=x"],

@@ -253,7 +253,7 @@ fn every_command_takes_replicates() {
     crumple_ok(here, &all);
     crumple_ok(here, &["report", "c.h5", "-o", "r.html"]);
     assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Equal runs lie apart"));
-    // Another recipe is no replicate.
+    // Another recipe is not a replicate.
     cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);
     crumple_fails(here, 1, &["validate", "d.h5"]);

@@ -638,7 +638,7 @@ fn another_sweeps_file_is_not_taken_up() {
     }
     let error = folder.fails(1, "sweep s.toml -q --shard 1/2 -o out.csv");
     assert!(error.contains("it is shard 1/1, this is 1/2"), "{error}");
-    // Comments are no change.
+    // Comments are not a change.
     folder.put("s.toml", &format!("# a comment\n{text}"));
     folder.ok("sweep s.toml -q -o out.csv");
     // A complete one of another plan, and files that are none.
@@ -654,7 +654,7 @@ fn another_sweeps_file_is_not_taken_up() {
         let error =
             folder.fails(1, &format!("sweep s.toml -q -o {}", name.trim_end_matches(".part")));
         assert!(
-            error.contains(&format!("{name} is there and is no sweep's: --restart")),
+            error.contains(&format!("{name} exists and is not a sweep result: use --restart")),
             "{error}"
         );
         assert_eq!(folder.text(name), "my own numbers\n");
@@ -755,9 +755,9 @@ fn only_all_shards_of_one_sweep_are_merged() {
         fs::write(folder.path().join("cut.csv"), &whole[..8]).unwrap();
         fails("p1.* cut.* p3.*", "cut.csv");
         folder.put("s.csv", "d_m,force_N\n0,0\n1,1\n");
-        fails("s.csv", "s.csv is no result of crumple sweep");
+        fails("s.csv", "s.csv is not a result of crumple sweep");
         folder.put("empty.csv", "");
-        fails("empty.csv", "empty.csv is no result of crumple sweep");
+        fails("empty.csv", "empty.csv is not a result of crumple sweep");
         fails("no.csv", "no.csv: No such file");
     }
     folder.ok("sweep s.toml -q -o finished.h5");
@@ -835,7 +835,7 @@ fn wrong_plans_are_named_by_file_and_key() {
     );
     vary(
         "what = \"mass\", vehicle = \"A1\", factor = true, values = [\"1t\"]",
-        "values: \"1t\" is no number",
+        "values: \"1t\" is not a number",
     );
     vary(
         "what = \"gap\", interface = \"A1|A2\", values = [\"1mm\"]",
@@ -922,8 +922,8 @@ fn wrong_plans_are_named_by_file_and_key() {
         ("sweep", "SCENARIO"),
         ("sweep s.toml -o out.xyz", "-o out.xyz: results are written as .csv, .h5 or .hdf5"),
         ("sweep s.toml --shard 1/3 -o a.h5", "-o a.h5: a shard is written as .csv, which merge"),
-        ("sweep s.toml --shard 0/3 -o a.csv", "\"0/3\" is no shard: write for example 2/3"),
-        ("sweep s.toml --shard 4/3 -o a.csv", "\"4/3\" is no shard"),
+        ("sweep s.toml --shard 0/3 -o a.csv", "\"0/3\" is not a shard: write for example 2/3"),
+        ("sweep s.toml --shard 4/3 -o a.csv", "\"4/3\" is not a shard"),
         ("sweep s.toml --json -o -", "both write to standard output"),
         ("sweep merge -o all.csv", "SHARDS"),
     ] {

@@ -100,7 +100,7 @@ fn manifests() {
     t(
         "component = \"normal_force\"",
         "component = \"mass\"",
-        "\"mass\" of a wall or contact is no force: use normal_force",
+        "\"mass\" of a wall or contact is not a force: use normal_force",
     );
     t("kind  = \"wall\"", "kind  = \"pair\"", "a pair needs the other body: deflection.minus_node");
     t("[study]", "[study", "study.toml:2:");
@@ -240,9 +240,9 @@ fn files_that_are_not_ours() {
         assert!(error.contains(expected), "{arguments:?} said:\n{error}");
         assert_eq!(entries(here), before);
     }
-    t(here, &["db", "ls", "text.h5"], "text.h5: this is no HDF5 file");
-    t(here, &["db", "ls", "histories.h5"], "histories.h5: this HDF5 file is no curve database");
-    t(here, &["build", study, "-o", "text.h5"], "text.h5: this is no HDF5 file");
+    t(here, &["db", "ls", "text.h5"], "text.h5: this is not an HDF5 file");
+    t(here, &["db", "ls", "histories.h5"], "histories.h5: this HDF5 file is not a curve database");
+    t(here, &["build", study, "-o", "text.h5"], "text.h5: this is not an HDF5 file");
     assert_eq!(
         fs::read(here.join("text.h5")).unwrap(),
         b"hello\n",
@@ -257,9 +257,9 @@ fn files_that_are_not_ours() {
     t(
         here,
         &["predict", "curves.h5", "--speed", "50km/h"],
-        "curves.h5: line 1, column 1: this is no model file",
+        "curves.h5: line 1, column 1: this is not a model file",
     );
-    t(here, &["export", "m.model", "--to", "json", "--speed", "500km/h"], "with --extrapolate");
+    t(here, &["export", "m.model", "--to", "json", "--speed", "500km/h"], "use --extrapolate");
     let error = crumple_fails(here, 2, &["export", "curves.h5", "--to", "onnx"]);
     assert!(error.contains("onnx takes a model: crumple train"), "{error}");
     t(
@@ -498,7 +498,7 @@ fn foreign_files_of_h5py_are_refused() {
     assert!(python().arg("-c").arg(script).current_dir(folder.path()).status().unwrap().success());
     for name in ["earliest.h5", "latest.h5"] {
         let error = crumple_fails(folder.path(), 1, &["db", "ls", name]);
-        assert!(error.contains("is no curve database"), "{error}");
+        assert!(error.contains("is not a curve database"), "{error}");
     }
 }
 
@@ -511,7 +511,8 @@ fn a_named_format_that_does_not_fit_is_an_error() {
     for format in ["rcforc", "glstat", "t01"] {
         for command in ["histories", "inspect"] {
             let error = crumple_fails(here, 1, &[command, nodout, "--format", format]);
-            let expected = format!("this is no {format}: it looks like a nodout, read it as that");
+            let expected =
+                format!("this is not a {format}: it looks like a nodout, read it as that");
             assert!(error.contains(&expected), "{error}");
         }
     }
@@ -564,7 +565,7 @@ fn files_that_are_not_plain_say_what_they_are() {
         error.contains("this is a folder: name a file in it, such as nodout or runT01 or rwforc"),
         "{error}"
     );
-    // A header that is cut is no text file with another section.
+    // A header that is cut is not text file with another section.
     let cut = [&84u32.to_be_bytes()[..], &4021u32.to_be_bytes(), &[b' '; 40]].concat();
     fs::write(folder.path().join("cutT01"), cut).unwrap();
     let output = crumple_in(folder.path(), &["histories", "cutT01", "--section", "nodout"]);

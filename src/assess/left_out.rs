@@ -23,7 +23,7 @@ const STEPS: usize = 400;
 /// What to ask a model of this group's so that it predicts the case.
 pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
     let mut parameters = case.conditions.parameters.clone();
-    // What all training cases share is no parameter of the model.
+    // What all training cases share is not a parameter of the model.
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
     if let Some(other) = case.conditions.masses.other_kg {
         parameters.insert(OTHER_MASS.into(), Parameter::Number(other));
@@ -117,7 +117,7 @@ impl<'a> LeftOutCase<'a> {
     }
 
     /// Predicts the case by one model and every rule for the maximal crush.
-    pub(super) fn trial(&self, kind: ModelKind) -> Trial<'_> {
+    pub(super) fn trial(&self, kind: ModelKind) -> LeftOutRun<'_> {
         let to_text = |error: Error| error.to_string();
         let answers = || -> Result<Answers, Error> {
             let model = Model::fit_curves(&self.rest, kind)
@@ -131,7 +131,7 @@ impl<'a> LeftOutCase<'a> {
         let answers = answers().unwrap_or_else(|error| {
             MaxCrushRule::ALL.map(|rule| (rule, Err(error.to_string()))).into()
         });
-        Trial { model: kind.name(), held: self, answers }
+        LeftOutRun { model: kind.name(), held: self, answers }
     }
 
     /// A predicted curve with its errors of crush and energy.
@@ -145,12 +145,12 @@ impl<'a> LeftOutCase<'a> {
         if answer.energy_error.is_finite() && answer.max_crush_error.is_finite() {
             Ok(answer)
         } else {
-            Err(error!(Validation, "its errors against FE are no finite numbers"))
+            Err(error!(Validation, "its errors against FE are not finite numbers"))
         }
     }
 
     /// The row of an answer of `model`, but for the coverage and the other rules.
-    fn judged(&self, model: &str, answer: &Answer) -> Result<Judged, Error> {
+    fn judged(&self, model: &str, answer: &Answer) -> Result<Score, Error> {
         let Answer { curve, energy_error, max_crush_error } = answer;
         let envelope = curve.envelope()?;
         let along = grid(self.own.envelope.end_m(), STEPS);
@@ -158,7 +158,7 @@ impl<'a> LeftOutCase<'a> {
             (forces_n(&self.own.envelope, &along), forces_n(&envelope, &along));
         let force_l1 = l1_ratio(&reference, &predicted);
         if !force_l1.is_finite() {
-            return Err(error!(Validation, "its errors against FE are no finite numbers"));
+            return Err(error!(Validation, "its errors against FE are not finite numbers"));
         }
         let driven_by = |force| -> Result<MotionErrors, Error> {
             self.reference.errors_with(&curve.driving(force)?)
@@ -185,7 +185,7 @@ impl<'a> LeftOutCase<'a> {
             contact_acceleration_l1: contact.map(|c| c.acceleration_l1),
             coverage: None,
         };
-        Ok(Judged { row, residuals: self.residuals(curve, &along)? })
+        Ok(Score { row, residuals: self.residuals(curve, &along)? })
     }
 
     /// Residuals of each force of a predicted curve `along` FE's crush, in m.
@@ -235,36 +235,36 @@ pub(super) struct Answer {
 pub(super) type Answers = BTreeMap<MaxCrushRule, Result<Answer, String>>;
 
 /// A row of the table, and what bands are made of.
-pub(super) struct Judged {
+pub(super) struct Score {
     pub row: LeftOut,
     pub residuals: BTreeMap<ForceKind, Residuals>,
 }
 
 /// A model at a left-out case.
-pub(super) struct Trial<'a> {
+pub(super) struct LeftOutRun<'a> {
     pub model: &'static str,
     pub held: &'a LeftOutCase<'a>,
     pub answers: Answers,
 }
 
-impl Trial<'_> {
+impl LeftOutRun<'_> {
     pub(crate) fn answer(&self, rule: MaxCrushRule) -> Option<&Answer> {
         self.answers.get(&rule)?.as_ref().ok()
     }
 
     /// Its row by a rule: only this one's curve is run and compared along the crush.
-    pub(crate) fn judged(&self, rule: MaxCrushRule) -> Result<Judged, String> {
+    pub(crate) fn judged(&self, rule: MaxCrushRule) -> Result<Score, String> {
         let judged = match self.answers.get(&rule) {
             Some(Ok(answer)) => self.held.judged(self.model, answer).map_err(|e| e.to_string()),
             Some(Err(error)) => Err(error.clone()),
             None => Err(format!("the rule {} was not asked", rule.name())),
         };
         let speed = km_per_h(self.held.own.speed_m_per_s);
-        let Judged { row, residuals } =
+        let Score { row, residuals } =
             judged.map_err(|error| format!("{} at {speed}: no row: {error}", self.model))?;
         let crush = |rule| Some((rule, self.answer(rule)?.max_crush_error));
         let max_crush_errors = MaxCrushRule::ALL.into_iter().filter_map(crush).collect();
-        Ok(Judged { row: LeftOut { max_crush_errors, ..row }, residuals })
+        Ok(Score { row: LeftOut { max_crush_errors, ..row }, residuals })
     }
 }
 

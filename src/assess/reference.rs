@@ -105,7 +105,7 @@ impl Reference {
         if all.iter().all(|e| e.is_finite()) {
             Ok(errors)
         } else {
-            Err(error!(Comparison, "its errors against FE are no finite numbers"))
+            Err(error!(Comparison, "its errors against FE are not finite numbers"))
         }
     }
 

@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{NextRun, Purpose, Selection, choose};
-use super::left_out::{Answers, Judged, LeftOutCase, Trial, query_of};
+use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
@@ -73,7 +73,7 @@ pub enum Choice {
 /// Fits the chosen model to a group, with its validation.
 ///
 /// # Errors
-/// If the cases are no training set, or too few for the model.
+/// If the cases are not a training set, or too few for the model.
 pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error> {
     match choice {
         Choice::Auto { purpose, seed, trees } => {
@@ -104,7 +104,7 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
 /// it, hence no band, and ends of the range are not left out.
 pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, _) = those_that_fit(&set, &ModelKind::candidates(seed));
+    let (fitting, _) = fittable(&set, &ModelKind::candidates(seed));
     let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials = trials(&fitting, &left_out);
@@ -149,7 +149,7 @@ pub(crate) fn train_chosen(
 /// train one without an answer at an end.
 ///
 /// # Errors
-/// If the cases are no training set.
+/// If the cases are not a training set.
 pub fn validate(
     group: &str,
     cases: &[Case],
@@ -157,7 +157,7 @@ pub fn validate(
     selection: Selection<'_>,
 ) -> Result<Validation, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, unsuited) = those_that_fit(&set, candidates);
+    let (fitting, unsuited) = fittable(&set, candidates);
     let (left_out, mut notes) =
         left_out_cases(&set).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
     let scatter = scatter(&set, cases);
@@ -216,7 +216,7 @@ fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
 }
 
 /// The candidates that can be fitted to the set, and why the others cannot.
-fn those_that_fit(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec<String>) {
+fn fittable(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec<String>) {
     let (mut fitting, mut unsuited) = (Vec::new(), Vec::new());
     for &kind in candidates {
         match Model::check_fits(set, kind) {
@@ -247,7 +247,7 @@ fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String
 }
 
 /// Every model at every case, in this order.
-fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<Trial<'a>> {
+fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<LeftOutRun<'a>> {
     let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
         kinds.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
     pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect()
@@ -266,13 +266,14 @@ impl Tables {
     /// With the declared force and its scatter.
     fn of(
         fitting: &[ModelKind],
-        trials: &[Trial<'_>],
+        trials: &[LeftOutRun<'_>],
         inner_speeds: usize,
         declared: (ForceKind, Option<ForceScatter>),
     ) -> Self {
         let mut all = Self::default();
         for kind in fitting {
-            let own: Vec<&Trial<'_>> = trials.iter().filter(|t| t.model == kind.name()).collect();
+            let own: Vec<&LeftOutRun<'_>> =
+                trials.iter().filter(|t| t.model == kind.name()).collect();
             let Some(table) = ModelTable::of(kind, &own, declared) else { continue };
             all.notes.extend(table.failures);
             match mean(kind.name(), table.rule, &table.rows) {
@@ -324,7 +325,7 @@ impl ModelTable {
     /// With the declared force and its scatter; `None` without any trial.
     fn of(
         kind: &ModelKind,
-        trials: &[&Trial<'_>],
+        trials: &[&LeftOutRun<'_>],
         (declared, scatter): (ForceKind, Option<ForceScatter>),
     ) -> Option<Self> {
         let rule = best_rule(kind, trials)?;
@@ -334,7 +335,7 @@ impl ModelTable {
         let judged: Vec<_> = trials.par_iter().map(|trial| trial.judged(rule)).collect();
         for judged in judged {
             match judged {
-                Ok(Judged { row, residuals: of }) => {
+                Ok(Score { row, residuals: of }) => {
                     for (force, of) in of {
                         let left_out = LeftOutSpeeds::of(row.inner);
                         residuals.entry((force, left_out)).or_default().push(of);
@@ -380,7 +381,7 @@ pub(crate) fn add_nested(
     // Cases that cannot be left out have been noted.
     let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
     left_out.retain(|case| case.inner);
-    let trials: Vec<Trial<'_>> = left_out
+    let trials: Vec<LeftOutRun<'_>> = left_out
         .par_iter()
         .map(|held| {
             let v = held.own.speed_m_per_s;
@@ -399,11 +400,11 @@ pub(crate) fn add_nested(
                 |error| (MaxCrushRule::Motion, Err(error.to_string())),
                 |(rule, answer)| (rule, Ok(answer)),
             );
-            Trial { model: "auto", held, answers: Answers::from([answer]) }
+            LeftOutRun { model: "auto", held, answers: Answers::from([answer]) }
         })
         .collect();
     // Each has one rule.
-    let of = |trial: &Trial<'_>| trial.answers.keys().next().copied();
+    let of = |trial: &LeftOutRun<'_>| trial.answers.keys().next().copied();
     let (mut rows, mut failures) = (Vec::new(), Vec::new());
     for trial in &trials {
         match trial.judged(of(trial).expect("it has one")) {
@@ -436,7 +437,7 @@ fn without_validation(fitting: &[ModelKind]) -> (String, String) {
 /// The rule with the smallest mean error of crush and energy over the inner speeds, as the
 /// crush decides both; the reference method keeps its spline. A rule with an answer at more speeds
 /// goes before; `None` without any trial.
-fn best_rule(kind: &ModelKind, trials: &[&Trial<'_>]) -> Option<MaxCrushRule> {
+fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRule> {
     let errors = |rule: MaxCrushRule, of_inner: bool| -> Vec<f64> {
         let of = trials.iter().filter(|t| t.held.inner == of_inner).filter_map(|t| t.answer(rule));
         of.map(|j| j.max_crush_error.abs() + j.energy_error.abs()).collect()

@@ -156,13 +156,13 @@ fn previous(
     located: &[Result<LocatedRun<'_>, RunError>],
     database: &Database,
 ) -> Previous {
-    let made_of = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.made_of();
+    let source_hash = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.source_hash();
     let runs = study.runs().iter().zip(located);
     let named = Named {
         study: study.name(),
         group: study.group(),
         manifest: &study.path(),
-        runs: runs.map(|(entry, run)| (entry.case_name(), made_of(run))).collect(),
+        runs: runs.map(|(entry, run)| (entry.case_name(), source_hash(run))).collect(),
     };
     named.previous(database)
 }

@@ -68,15 +68,15 @@ impl Named<'_> {
             }
         }
         // Made of each, for runs that have no case of their name.
-        let mut made_of: HashMap<Option<String>, Vec<&Case>> = HashMap::new();
+        let mut source_hash: HashMap<Option<String>, Vec<&Case>> = HashMap::new();
         for case in without {
-            made_of.entry(case.made_of()).or_default().push(case);
+            source_hash.entry(case.source_hash()).or_default().push(case);
         }
         for (name, made) in &self.runs {
             if previous.of_run.contains_key(name) || made.is_none() {
                 continue;
             }
-            if let Some(case) = made_of.get_mut(made).and_then(Vec::pop) {
+            if let Some(case) = source_hash.get_mut(made).and_then(Vec::pop) {
                 let place = (CasePath::of(case), self.place(case, name));
                 previous.of_run.insert(name.clone(), place);
             }
@@ -91,7 +91,7 @@ impl Named<'_> {
             };
             previous.earlier = built.iter().filter(is_ours).map(|c| c.id.group.clone()).collect();
         }
-        previous.left = made_of.into_values().flatten().map(CasePath::of).collect();
+        previous.left = source_hash.into_values().flatten().map(CasePath::of).collect();
         previous.left.sort();
         previous
     }
@@ -99,7 +99,7 @@ impl Named<'_> {
     /// The cases that this study had under another name or in another group.
     fn renamed<'a>(&self, built: &[&'a Case]) -> Vec<&'a Case> {
         let ours: HashSet<&String> =
-            self.runs.iter().filter_map(|(_, made_of)| made_of.as_ref()).collect();
+            self.runs.iter().filter_map(|(_, source_hash)| source_hash.as_ref()).collect();
         // Of one study and group, so that whoever has two under one path loses neither.
         let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
         for &case in built {
@@ -113,8 +113,8 @@ impl Named<'_> {
             then == now || !then.exists() || file::is_same(then, now)
         });
         let same = |cases: &[&Case]| {
-            let made_of = cases.iter().filter_map(|case| case.made_of());
-            made_of.filter(|made_of| ours.contains(made_of)).count()
+            let source_hash = cases.iter().filter_map(|case| case.source_hash());
+            source_hash.filter(|source_hash| ours.contains(source_hash)).count()
         };
         let counted = found.into_values().map(|cases| (same(&cases), cases));
         let most = counted.filter(|(same, _)| *same > 0).max_by_key(|(same, _)| *same);

@@ -73,7 +73,7 @@ impl Motion {
     /// Of the CSV file of a result, as `crumple simulate -o` writes it.
     ///
     /// # Errors
-    /// If it has other columns, or fields that are no finite numbers.
+    /// If it has other columns, or fields that are not finite numbers.
     pub fn of_csv(text: &[u8]) -> Result<Self, Error> {
         let mut table = CsvTable::open(text, 0).map_err(not_csv)?;
         let header: Vec<String> = table.header().iter().map(String::from).collect();

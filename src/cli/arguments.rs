@@ -20,7 +20,7 @@ pub(super) fn parameter(text: &str) -> Result<(String, Parameter), String> {
     let (name, value) = text
         .split_once('=')
         .filter(|(name, value)| !name.is_empty() && !value.is_empty())
-        .ok_or_else(|| format!("\"{text}\" is no parameter: write NAME=VALUE"))?;
+        .ok_or_else(|| format!("\"{text}\" is not a parameter: write NAME=VALUE"))?;
     let value = match value.parse::<f64>() {
         Ok(number) if number.is_finite() => Parameter::Number(number),
         Ok(_) => return Err(format!("\"{value}\" is not finite")),

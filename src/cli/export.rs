@@ -28,7 +28,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
   crumple export test12.csv --speed 50km/h --kind wall --mass 24t --to lsdyna -o test12.k
   crumple export --list
 
-Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model tells them,
+Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model has them,
 else at the level of the curve's last tenth to 1.5 times the maximal crush, and then rising with the
 unloading stiffness. --tail changes that.
 

@@ -47,7 +47,7 @@ pub(super) struct Args {
     /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck beside it]
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Replace an HDF5 file that is no file of histories, such as a curve database
+    /// Replace an HDF5 file that is not a file of histories, such as a curve database
     #[arg(long)]
     force: bool,
 }

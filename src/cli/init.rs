@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::file::write_whole;
 use crate::init::{
-    self, Given, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal,
+    self, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal, UserHints,
 };
 use crate::study::StudyKind;
 use crate::unit::{UnitSystem, km_per_h};
@@ -144,7 +144,7 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let request = Request {
         folders,
         study: if is_stdout(output) { "study.toml".into() } else { output.into() },
-        given: Given {
+        given: UserHints {
             units: known.units,
             kind: known.kind,
             half_model: known.half_model,

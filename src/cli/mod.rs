@@ -25,7 +25,6 @@ mod report;
 mod run_channels;
 mod shell;
 mod simulate;
-mod stopped_mass;
 mod sweep;
 mod terminal;
 mod train;

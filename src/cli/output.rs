@@ -24,7 +24,7 @@ pub(super) fn print_data<T, E: Error + 'static>(
     if io::stdout().is_terminal() {
         return print_with(|_| REPLACED.into(), write);
     }
-    let mut out = BufWriter::new(Named(io::stdout().lock()));
+    let mut out = BufWriter::new(NamedStdout(io::stdout().lock()));
     let written = write(&mut out)?;
     out.flush()?;
     Ok(written)
@@ -44,15 +44,15 @@ fn print_with<T, E: Error + 'static>(
     instead: impl Fn(u8) -> String,
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
-    let out = Named(io::stdout().lock());
-    let mut out = BufWriter::new(Plain { out, instead, held: false });
+    let out = NamedStdout(io::stdout().lock());
+    let mut out = BufWriter::new(ControlFilter { out, instead, held: false });
     let written = write(&mut out)?;
     out.flush()?;
     Ok(written)
 }
 
 /// Standard output, whose errors say so.
-struct Named<'a>(io::StdoutLock<'a>);
+struct NamedStdout<'a>(io::StdoutLock<'a>);
 
 fn of_stdout(e: io::Error) -> io::Error {
     match e.kind() {
@@ -61,7 +61,7 @@ fn of_stdout(e: io::Error) -> io::Error {
     }
 }
 
-impl Write for Named<'_> {
+impl Write for NamedStdout<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.write(bytes).map_err(of_stdout)
     }
@@ -77,7 +77,7 @@ pub(super) fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
 
-/// Characters of a file's line that are shown where no terminal bounds them: a log is no place for
+/// Characters of a file's line that are shown where no terminal bounds them: a log is not place for
 /// a file of one long line.
 const WIDEST: usize = 200;
 
@@ -104,7 +104,7 @@ const REPLACED: &str = "\u{fffd}";
 
 /// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
 /// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
-struct Plain<W, F> {
+struct ControlFilter<W, F> {
     out: W,
     /// What stands for a control character of that code.
     instead: F,
@@ -119,7 +119,7 @@ fn is_control(byte: u8) -> bool {
     byte.is_ascii_control() && byte != b'\n' && byte != b'\t'
 }
 
-impl<W: Write, F: Fn(u8) -> String> Write for Plain<W, F> {
+impl<W: Write, F: Fn(u8) -> String> Write for ControlFilter<W, F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if !self.held && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
             self.out.write_all(bytes)?;
@@ -298,7 +298,7 @@ mod tests {
 
     fn passed(chunks: &[&[u8]], instead: impl Fn(u8) -> String) -> String {
         let mut out = Vec::new();
-        let mut plain = Plain { out: &mut out, instead, held: false };
+        let mut plain = ControlFilter { out: &mut out, instead, held: false };
         chunks.iter().for_each(|chunk| plain.write_all(chunk).unwrap());
         plain.flush().unwrap();
         String::from_utf8(out).unwrap()

@@ -35,7 +35,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple plot result.csv --quantity crush -o crush.svg
   crumple plot train-set.toml --train -o train.svg                      # FE's train and the methods
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
-What the file is, its content tells. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
+The content says what the file is. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
 pub(super) struct Args {
     /// Database, model, predicted curve, scenario, result (CSV) or solver file
     file: PathBuf,

@@ -95,7 +95,7 @@ impl Address {
                 scale = factor(value)?;
             } else if let Some(value) = last.strip_prefix("time=") {
                 unit = Some(TimeUnit::named(value).ok_or_else(|| {
-                    format!("\"{value}\" is no unit of time here: write s, ms or us")
+                    format!("\"{value}\" is not a unit of time here: write s, ms or us")
                 })?);
             } else {
                 break;
@@ -137,7 +137,8 @@ impl<'a> History<'a> {
         }
         let (section, id) = match before.split_once(':') {
             Some((section, id)) => {
-                let wrong = |e| format!("\"{text}\": \"{id}\" is no id ({e}): write ID:COMPONENT");
+                let wrong =
+                    |e| format!("\"{text}\": \"{id}\" is not an id ({e}): write ID:COMPONENT");
                 (section, Some(id.parse().map_err(wrong)?))
             }
             None => (before, None),
@@ -196,7 +197,7 @@ fn time(text: &str) -> Result<f64, String> {
 
 fn factor(text: &str) -> Result<f64, String> {
     let factor = text.parse::<f64>().ok().filter(|f| f.is_finite() && *f != 0.0);
-    factor.ok_or_else(|| format!("\"{text}\" is no factor: write for example 0.001 or -1"))
+    factor.ok_or_else(|| format!("\"{text}\" is not a factor: write for example 0.001 or -1"))
 }
 
 /// Where one signal stands, by its address and the options for both.

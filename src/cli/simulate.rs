@@ -251,7 +251,7 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
             .map(|(_, b)| b.name.clone())
             .collect(),
         statement: format!(
-            "mean decelerations are survival-independent figures of a one-dimensional model; this is no statement of conformity with {}:{}",
+            "mean decelerations come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
             limits.standard, limits.edition
         ),
     });

@@ -78,7 +78,7 @@ fn shard(text: &str) -> Result<Shard, String> {
         .split_once('/')
         .and_then(|(index, count)| Shard::new(index.parse().ok()?, count.parse().ok()?));
     parsed.ok_or_else(|| {
-        format!("\"{text}\" is no shard: write for example 2/3, the second of three")
+        format!("\"{text}\" is not a shard: write for example 2/3, the second of three")
     })
 }
 

@@ -6,20 +6,21 @@ use std::path::{Path, PathBuf};
 
 use crate::assess::choose::Purpose;
 use crate::assess::validate::{self, Choice};
+use crate::curve::StoppedMass;
 use crate::database::Database;
 use crate::forest::{StopRule, Thresholds};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind};
-use crate::unit::{Shown, km_per_h};
+use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 
 use super::arguments::one_of;
 use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input, stopped_mass};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
 
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
@@ -221,8 +222,8 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
                 )?;
             }
             let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
-            if let Some(stopped) = stopped.filter(|stopped| stopped.is_told()) {
-                writeln!(out, "{}", stopped_mass::said(stopped, model.speed_kind))?;
+            if let Some(stopped) = stopped.filter(|stopped| stopped.is_known()) {
+                writeln!(out, "{}", stopped_mass_line(stopped, model.speed_kind))?;
             }
             if let Some(validation) = &model.leave_one_out {
                 if options.verbose {
@@ -235,4 +236,17 @@ fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Res
         })?;
     }
     Ok(())
+}
+
+/// How much of the crush zone stops before the body, over which deflection, and how well the runs agree.
+pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind) -> String {
+    let (end_m, all_kg) = stopped.in_all();
+    let of = match kind {
+        SpeedKind::Wall => "of the crush zone",
+        SpeedKind::Closing => "of reduced mass, half of what one of two equal ends has,",
+    };
+    let scatter_kg = stopped.residual_kg;
+    format!(
+        "crush law: {all_kg:.0} kg {of} come to rest within {end_m:.3} m of crush (scatter {scatter_kg:.0} kg RMS)"
+    )
 }

@@ -274,7 +274,7 @@ fn peak(peak: &PeakError) -> String {
 }
 
 /// What the row of FE's own curve is called. That of the body's force is made from FE's speeds, so
-/// it is no floor for predictions.
+/// it is not a floor for predictions.
 fn own_curve(force: &str) -> String {
     match force {
         "body" => "FE body (check)".into(),

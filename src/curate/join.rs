@@ -203,7 +203,7 @@ impl Join {
         }
         self.database.change(|case| {
             if let Some((tags, notes)) = doubles.remove(&CasePath::of(case)) {
-                unite(case, tags, notes);
+                merge_labels(case, tags, notes);
             }
         });
         self.database.replace_all(new);
@@ -244,7 +244,7 @@ fn free_name(path: &CasePath, taken: &HashSet<CasePath>) -> String {
 }
 
 /// Gives a case the tags and notes of its double.
-fn unite(case: &mut Case, tags: Vec<String>, notes: Vec<String>) {
+fn merge_labels(case: &mut Case, tags: Vec<String>, notes: Vec<String>) {
     case.provenance.tags.extend(tags);
     case.provenance.tags.sort();
     case.provenance.tags.dedup();

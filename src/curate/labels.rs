@@ -33,7 +33,7 @@ const MAX_NOTE: usize = 10_000;
 /// The error of a text that cannot be a tag or note.
 fn refused(what: &str, text: &str, why: &str) -> Error {
     let text: String = text.chars().take(MAX_TAG).collect();
-    error!(Database, "\"{}\" is no {what}: {why}", text.escape_debug())
+    error!(Database, "\"{}\" is not a {what}: {why}", text.escape_debug())
 }
 
 impl Labels {

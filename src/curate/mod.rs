@@ -37,13 +37,13 @@ pub(crate) use tables::write_tables;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Effect {
     Written,
-    OnlySaid,
+    DryRun,
 }
 
 /// Writes a database, unless it is only to be said.
 fn write(database: &Database, path: &Path, effect: Effect) -> Result<(), Error> {
     match effect {
         Effect::Written => Ok(database.write(path)?),
-        Effect::OnlySaid => Ok(()),
+        Effect::DryRun => Ok(()),
     }
 }

@@ -20,7 +20,7 @@ pub struct BodyMotion {
 }
 
 /// Stiffness in N/m of the straight line on which a body of `mass_kg` leaves a force of `top_n`
-/// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is no stiffness.
+/// at `rebound_m_per_s`: `F²/(m v²)`, as `F²/2k = m v²/2`. `None` if that is not a stiffness.
 pub(crate) fn rebound_stiffness_n_per_m(
     top_n: f64,
     mass_kg: f64,
@@ -47,7 +47,7 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
 ///
 /// It differs from the contact force by the mass that the crush zone stops before the body
 /// (an impact's first spike is the nose being stopped). Filtered with CFC 60 unless the
-/// sampling is too coarse for it. `None` if the sampled states make no loading branch.
+/// sampling is too coarse for it. `None` if the samples contain no loading branch.
 pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     let sampled = &case.curves.sampled;
     let speeds = &case.curves.closing_speed_m_per_s;
@@ -98,7 +98,7 @@ const LAST_SHARE: f64 = 0.005;
 
 /// The mean force between two states from the change of kinetic energy over the change of
 /// deflection, `−m Δ(v²)/2Δd`: a body that runs on it has the recorded speeds at the recorded
-/// deflections. `None` if the sampled states make no loading branch.
+/// deflections. `None` if the samples contain no loading branch.
 pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
     let (t, d) = (case.curves.sampled.time_s(), case.curves.sampled.deflection_m());
     let v = &case.curves.closing_speed_m_per_s;

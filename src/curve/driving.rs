@@ -44,12 +44,12 @@ pub enum CurveUnloading {
 
 /// Why a case has no curve of the force that was asked for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(crate) enum NoDrivingCurve {
-    /// Its loading branch is no envelope.
+pub(crate) enum DrivingCurveError {
+    /// Its loading branch is not an envelope.
     #[error("{0}")]
     Envelope(#[from] Error),
     /// Its body force cannot be told from its speeds.
-    #[error("its sampled states make no loading branch")]
+    #[error("its samples contain no loading branch")]
     NoMotion,
 }
 
@@ -72,7 +72,7 @@ impl DrivingCurve {
     }
 
     /// The force that moved the body of a case, with the recorded unloading; `None` if the
-    /// sampled states make no loading branch.
+    /// samples contain no loading branch.
     pub fn recorded(case: &Case) -> Option<Self> {
         let recorded = recorded_force(case)?;
         let unloading = match recorded.unloading_stiffness_n_per_m {
@@ -94,10 +94,10 @@ impl DrivingCurve {
 
     /// The curve of a case: the recipe's force, or for [`ForceKind::Body`] beside a contact
     /// force the recorded one of the body's motion.
-    pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, NoDrivingCurve> {
+    pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, DrivingCurveError> {
         let is_other = force == ForceKind::Body && case.curves.force_kind == ForceKind::Contact;
         if is_other && !case.moves_by_its_force() {
-            return Self::recorded(case).ok_or(NoDrivingCurve::NoMotion);
+            return Self::recorded(case).ok_or(DrivingCurveError::NoMotion);
         }
         Ok(Self {
             unloading: CurveUnloading::of(case.curves.unloading_stiffness_n_per_m),

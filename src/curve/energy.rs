@@ -40,7 +40,7 @@ const NEAR_TWO: f64 = 1.2;
 
 /// What a run's record says of its energy and momentum.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Claim<'a> {
+pub(crate) struct StatedConditions<'a> {
     pub curve: &'a Curve,
     pub masses: Masses,
     pub speed: Speed,
@@ -57,7 +57,7 @@ pub(crate) struct Claim<'a> {
 
 /// What the record gives in ratio to what the impact asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Balance {
+pub(crate) struct EnergyBalance {
     /// Work of the loading branch over the kinetic energy that it stopped.
     pub work: Option<f64>,
     /// Impulse of the loading branch over the change of momentum.
@@ -70,12 +70,12 @@ pub(crate) struct Balance {
     "{found}: such an impact cannot be; {}. Correct the manifest, or take the run as it is with accept_energy = true",
     cause.of_run()
 )]
-pub struct Impossible {
+pub struct ImpossibleRun {
     found: String,
     cause: Cause,
 }
 
-impl Impossible {
+impl ImpossibleRun {
     /// What was found, without its cause.
     pub(crate) fn found(&self) -> &str {
         &self.found
@@ -148,11 +148,11 @@ impl Cause {
     }
 }
 
-impl Claim<'_> {
+impl StatedConditions<'_> {
     /// Work and impulse against the impact's, over the loading branch. A record that ends
     /// while loading is held against the speed that it has reached; without recorded speeds
     /// there is nothing to hold it against.
-    pub(crate) fn balance(&self) -> Balance {
+    pub(crate) fn balance(&self) -> EnergyBalance {
         let end = loading_end(self.curve);
         let mass = self.masses.effective_kg();
         let truncated = end + 1 == self.curve.time_s().len();
@@ -169,14 +169,14 @@ impl Claim<'_> {
         // Next to nothing may be off by any factor: a record cut right after contact.
         let ratio = |is: f64, lost: f64, whole: f64| (lost > 0.1 * whole).then(|| is / lost);
         let recorded = self.recorded_m_per_s.unwrap_or(v);
-        Balance {
+        EnergyBalance {
             work: lost_j.and_then(|j| ratio(work_to_end(self.curve), j, 0.5 * mass * v * v)),
             impulse: lost_ns.and_then(|j| ratio(impulse_ns, j, mass * recorded)),
         }
     }
 
     /// Refuses what no crash can be, with the likely cause.
-    pub(crate) fn check(&self) -> Result<Balance, Impossible> {
+    pub(crate) fn check(&self) -> Result<EnergyBalance, ImpossibleRun> {
         let balance = self.balance();
         let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);
         let fits = |ratio: Option<f64>| ratio.is_none_or(possible);
@@ -210,7 +210,7 @@ impl Claim<'_> {
                 significant(impulse)
             ));
         }
-        Err(Impossible { found: found.join(", "), cause: self.cause(balance) })
+        Err(ImpossibleRun { found: found.join(", "), cause: self.cause(balance) })
     }
 
     fn shown_mass(&self) -> String {
@@ -222,7 +222,7 @@ impl Claim<'_> {
     }
 
     /// The likely cause.
-    fn cause(&self, balance: Balance) -> Cause {
+    fn cause(&self, balance: EnergyBalance) -> Cause {
         let used = self.speed.m_per_s;
         let work = balance.work.unwrap_or(1.0);
         let near = |a: f64, b: f64, factor: f64| a > 0.0 && (a / b).ln().abs() < factor.ln();
@@ -273,7 +273,7 @@ impl Claim<'_> {
     }
 
     /// A unit system that would make work, impulse and speed fit, if the declared one does not.
-    fn fitting_units(&self, balance: Balance) -> Option<&'static str> {
+    fn fitting_units(&self, balance: EnergyBalance) -> Option<&'static str> {
         let end = loading_end(self.curve);
         let (crush_m, loading_s) = (self.curve.deflection_m()[end], self.curve.time_s()[end]);
         let scale = |units: &UnitSystem| {

@@ -60,7 +60,7 @@ pub struct Impact {
     pub accept_energy: bool,
 }
 
-fn impossible_table(impossible: energy::Impossible) -> Error {
+fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     let (found, cause) = (impossible.found(), impossible.cause_in_file());
     error!(
         Other,
@@ -71,10 +71,10 @@ fn impossible_table(impossible: energy::Impossible) -> Error {
 /// What an error of the extraction says of a table, which has no recipe.
 fn of_table(error: ExtractError) -> Error {
     match error {
-        ExtractError::Impossible(found) => impossible_table(found),
+        ExtractError::ImpossibleRun(found) => impossible_table(found),
         ExtractError::NoContact { largest_n, .. } => error!(
             Other,
-            "the largest force of the record is {largest_n} N, which is no contact: look at the column and the unit of the force"
+            "the largest force of the record is {largest_n} N, which is not a contact: look at the column and the unit of the force"
         ),
         ExtractError::NoDeflection => error!(
             Other,
@@ -123,7 +123,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
     let motion = retrace(table, impact, interval_s)?;
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
     let original = Curve::new(motion.time_s, motion.deflection_m, motion.force_n)?;
-    let claim = energy::Claim {
+    let claim = energy::StatedConditions {
         curve: &original,
         masses: impact.masses,
         speed: impact.speed,

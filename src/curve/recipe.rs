@@ -193,7 +193,7 @@ impl TryFrom<ForceTable> for ForceSource {
         let ForceTable { file, id, side, node, component, times } = table;
         match (id, node, times.as_deref()) {
             (Some(_), None, None) if !component.ends_with("_force") => Err(format!(
-                "\"{component}\" of a wall or contact is no force: use normal_force, x_force, y_force or z_force"
+                "\"{component}\" of a wall or contact is not a force: use normal_force, x_force, y_force or z_force"
             )),
             (Some(id), None, None) => {
                 let side = side
@@ -216,7 +216,7 @@ impl TryFrom<ForceTable> for ForceSource {
                     "x_velocity" | "y_velocity" | "z_velocity" => RecordedMotion::Velocity,
                     _ => {
                         return Err(format!(
-                            "\"{component}\" times mass is no force: use x_acceleration, or x_velocity to differentiate it"
+                            "\"{component}\" times mass is not a force: use x_acceleration, or x_velocity to differentiate it"
                         ));
                     }
                 };

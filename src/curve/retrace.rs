@@ -64,7 +64,8 @@ pub(super) fn retrace(
     let v0 = impact.speed.m_per_s;
     let step_s = (interval_s / FINER).max(2.0 * d[end] / v0 / STEPS);
     let mass = 2.0 * work[end] / (v0 * v0);
-    let mut march = March { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
+    let mut march =
+        MotionBuilder { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
     march.motion.notes.push(
         "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
             .into(),
@@ -114,7 +115,7 @@ impl Path<'_> {
 type Branch = (Vec<f64>, Vec<f64>, Vec<f64>);
 
 /// A motion that is being made.
-struct March {
+struct MotionBuilder {
     motion: Motion,
     step_s: f64,
     /// Shortest step.
@@ -123,7 +124,7 @@ struct March {
     mass: f64,
 }
 
-impl March {
+impl MotionBuilder {
     fn begin(&mut self, d: f64, f: f64, v: f64) {
         self.motion.time_s.push(0.0);
         self.push_columns(d, f, v);
@@ -214,7 +215,7 @@ impl March {
                     ));
                 }
                 self.motion.warnings.push(format!(
-                    "unloading: neither file nor --unloading tell it; the steepest rise stands for it, {:.4} MN/m: say --unloading …MN/m",
+                    "unloading: neither the file nor --unloading gives it; the steepest rise, {:.4} MN/m, is used: say --unloading …MN/m",
                     steepest / 1e6
                 ));
                 steepest

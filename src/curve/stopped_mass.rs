@@ -94,7 +94,7 @@ impl StoppedMass {
     }
 
     /// Whether the runs agree on one.
-    pub(crate) fn is_told(&self) -> bool {
+    pub(crate) fn is_known(&self) -> bool {
         self.stopped_kg.iter().any(|&m| m > 0.0)
     }
 
@@ -254,11 +254,11 @@ mod tests {
             residual_kg: 1.0,
         };
         let sound = made([0.0, 100.0, 200.0]);
-        assert!(sound.is_sound() && sound.is_told());
+        assert!(sound.is_sound() && sound.is_known());
         assert_eq!((sound.at(0.05), sound.at(3.0)), (50.0, 200.0));
         assert_eq!((sound.rate_kg_per_m(0.15), sound.rate_kg_per_m(3.0)), (1000.0, 0.0));
         assert_eq!(sound.in_all(), (0.2, 200.0));
         assert!(!made([0.0, 200.0, 100.0]).is_sound() && !made([1.0, 2.0, 3.0]).is_sound());
-        assert!(!sound.without_any().is_told());
+        assert!(!sound.without_any().is_known());
     }
 }

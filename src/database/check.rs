@@ -356,11 +356,11 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     };
     for pair in cases.windows(2) {
         let (one, other) = (&pair[0], &pair[1]);
-        let is_like = one.conditions.speed == other.conditions.speed
+        let same_value = one.conditions.speed == other.conditions.speed
             && one.conditions.masses == other.conditions.masses
             && one.conditions.parameters == other.conditions.parameters;
         // Equal runs of one recipe are replicates.
-        if is_like && !one.is_measured_as(other) {
+        if same_value && !one.is_measured_as(other) {
             let message = format!("has the same speed as {}, but another recipe", one.id.name);
             add(&pair[1].id.name, "equal_speeds", message);
         }

@@ -51,7 +51,7 @@ pub(super) fn write_keeping(
         if !lost.is_empty() {
             return Err(would_drop(listed(&lost)));
         }
-        if layout::decode(draft)?.holds_what(database) {
+        if layout::decode(draft)?.same_content(database) {
             Ok(())
         } else {
             Err(would_drop(listed(&before)))

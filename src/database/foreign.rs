@@ -24,7 +24,7 @@ impl Item {
         self.place.split_once('/').map_or("", |(group, _)| group)
     }
 
-    /// The case that it is in, or might be: nothing is in what is no case.
+    /// The case that it is in, or might be: nothing is in what is not a case.
     pub(super) fn case(&self) -> Option<CasePath> {
         let (group, rest) = self.place.split_once('/')?;
         let (name, _) = rest.split_once('/')?;

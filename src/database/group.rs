@@ -36,7 +36,7 @@ pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
                 && c.conditions.parameters == first.conditions.parameters
         });
     let set = may_tell.then(|| TrainingSet::new(name, cases).ok())??;
-    set.stopped_mass().filter(StoppedMass::is_told)
+    set.stopped_mass().filter(StoppedMass::is_known)
 }
 
 fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
@@ -62,10 +62,10 @@ pub(super) fn differs(
         return None;
     }
     let told = stopped_mass(name, cases).map(|stopped| of_stopped_mass(&stopped));
-    let Some(told) = told else { return Some((STOPPED, "the cases tell none")) };
+    let Some(told) = told else { return Some((STOPPED, "the cases give none")) };
     told.into_iter().find_map(|(name, value)| match found.get(name) {
         None => Some((name, "it is missing")),
-        Some(there) if !is_like(there, &value) => Some((name, "the cases tell another")),
+        Some(there) if !same_value(there, &value) => Some((name, "the cases give another")),
         Some(_) => None,
     })
 }
@@ -73,7 +73,7 @@ pub(super) fn differs(
 /// Share of the largest number by which stored numbers may differ from what the cases tell.
 const LIKE: f64 = 1e-6;
 
-fn is_like(a: &AttrValue, b: &AttrValue) -> bool {
+fn same_value(a: &AttrValue, b: &AttrValue) -> bool {
     let (a, b) = (numbers(a), numbers(b));
     let scale = b.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= LIKE * scale)

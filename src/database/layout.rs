@@ -178,13 +178,13 @@ impl<'a> Content<'a> {
 }
 
 /// Attributes that say what the curves of a case are of.
-const OF_THE_RECORD: [&str; 6] =
+const RECORD_ATTRIBUTES: [&str; 6] =
     ["speed_m_per_s", "speed_kind", "mass_kg", "other_mass_kg", "parameters", "force_kind"];
 
 impl Content<'_> {
     /// BLAKE3 of the recorded curves and of what they are of.
     pub(crate) fn record_hash(self) -> String {
-        let attributes = self.attributes.into_iter().filter(|(n, _)| OF_THE_RECORD.contains(n));
+        let attributes = self.attributes.into_iter().filter(|(n, _)| RECORD_ATTRIBUTES.contains(n));
         let datasets = self.datasets.into_iter().filter(|(path, _)| path != BODY_FORCE);
         let record = Self { attributes: attributes.collect(), datasets: datasets.collect() };
         let mut hash = blake3::Hasher::new();
@@ -316,11 +316,11 @@ impl<'a> Opened<'a> {
     pub(crate) fn of(path: &'a Path, file: File) -> Result<Self, Error> {
         let attrs = file.root().attrs();
         let attrs =
-            attrs.map_err(|e| not_hdf5(path, format_args!("this is no HDF5 file ({e})")))?;
+            attrs.map_err(|e| not_hdf5(path, format_args!("this is not an HDF5 file ({e})")))?;
         if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
             return Err(error!(
                 Database,
-                "{}: this HDF5 file is no curve database (its root has no attribute format = \"{FORMAT}\"): give one made by crumple build",
+                "{}: this HDF5 file is not a curve database (its root has no attribute format = \"{FORMAT}\"): give one made by crumple build",
                 path.display()
             ));
         }
@@ -344,7 +344,7 @@ impl<'a> Opened<'a> {
         result.map_err(|e| self.damaged(place, e))
     }
 
-    /// Groups that hold cases, with these. What other programs put beside them is no group of ours.
+    /// Groups that hold cases, with these. What other programs put beside them is not a group of ours.
     pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, Error> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
@@ -399,7 +399,7 @@ impl<'a> Opened<'a> {
             // The only group there is, if others have put none beside it.
             None => <[String; 1]>::try_from(root.groups().ok()?).ok()?.into_iter().next()?,
         };
-        // A name is no path.
+        // A name is not a path.
         if [&*name, case].iter().any(|name| name.contains('/') || ["", "."].contains(name)) {
             return None;
         }

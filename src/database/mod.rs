@@ -317,7 +317,7 @@ impl Database {
     }
 
     /// Whether both hold the same cases, altered in the same way.
-    fn holds_what(&self, other: &Self) -> bool {
+    fn same_content(&self, other: &Self) -> bool {
         self.groups == other.groups && self.altered == other.altered
     }
 }

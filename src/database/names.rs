@@ -3,7 +3,7 @@
 /// Longest name of a case or group, in bytes.
 const MAX_NAME: usize = 200;
 
-/// Why a text is no name of a group or case, as a message says it of "it".
+/// Why a text is not a name of a group or case, as a message says it of "it".
 pub(crate) fn check(name: &str) -> Result<(), &'static str> {
     if name.trim().is_empty() || name == "." || name == ".." {
         Err("it is none")

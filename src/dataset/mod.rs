@@ -217,11 +217,11 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
     let mut found: Vec<Runs<'a>> = Vec::new();
     for case in cases {
         let values = feature_values(features, &parameters(case))?;
-        let is_like = |(of, runs): &&mut Runs<'a>| {
+        let same_value = |(of, runs): &&mut Runs<'a>| {
             *of == values
                 && is_same_speed(case.conditions.speed.m_per_s, runs[0].conditions.speed.m_per_s)
         };
-        match found.iter_mut().rev().find(is_like) {
+        match found.iter_mut().rev().find(same_value) {
             None => found.push((values, vec![case])),
             Some((_, runs)) if runs[0].is_measured_as(case) => runs.push(case),
             Some((_, runs)) => {
@@ -230,7 +230,7 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
                 let (parameters, hint) = if alone { ("", hint) } else { (" and parameters", "") };
                 return Err(error!(
                     Dataset,
-                    "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are no replicates: keep one of them{hint}",
+                    "cases \"{first}\" and \"{second}\" have the same speed {speed}{parameters}, but different recipes, so that they are not replicates: keep one of them{hint}",
                     first = runs[0].id.name,
                     second = case.id.name,
                     speed = km_per_h(case.conditions.speed.m_per_s)
@@ -383,7 +383,7 @@ impl TrainingCase {
         let no_motion = || {
             error!(
                 Dataset,
-                "case \"{name}\": its sampled states make no loading branch: sample more states at a shorter interval",
+                "case \"{name}\": its samples contain no loading branch: sample more states at a shorter interval",
                 name = runs[0].id.name
             )
         };

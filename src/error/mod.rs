@@ -242,7 +242,7 @@ pub enum ErrorCode {
     Scenario,
     /// A plan of a sweep is wrong, or its results are of another sweep.
     Sweep,
-    /// A file is no curve database, is damaged, or has no such group or case.
+    /// A file is not a curve database, is damaged, or has no such group or case.
     Database,
     /// A solver's file cannot be read, or lacks what is asked of it.
     SolverFile,

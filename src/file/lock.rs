@@ -26,7 +26,7 @@ impl WriterLock {
             let source = explained(target, source);
             error!(
                 Io,
-                "cannot write {}, because no lock can be made beside it: {source}",
+                "cannot write {}, because its lock file cannot be created: {source}",
                 target.display()
             )
             .caused_by(source)

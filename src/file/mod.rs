@@ -95,7 +95,7 @@ pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
 
 /// Why that many bytes of memory cannot be had.
 pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
-    let message = format!("there is no memory for its {bytes} bytes");
+    let message = format!("not enough memory to read {bytes} bytes");
     io::Error::new(io::ErrorKind::OutOfMemory, message)
 }
 

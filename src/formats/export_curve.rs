@@ -77,7 +77,7 @@ impl ExportCurve {
                     softening = Some((own_peak_n, soft.peak_force_n()));
                     loading = soft;
                 }
-                Softened::Impossible => {
+                Softened::ImpossibleRun => {
                     return Err(error!(
                         Export,
                         "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",

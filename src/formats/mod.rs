@@ -37,7 +37,7 @@ pub use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::Reader;
-pub use read::curve::Facts;
+pub use read::curve::Metadata;
 pub use read::curve::ReadFile;
 pub use read::error::Place;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};

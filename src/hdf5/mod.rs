@@ -18,14 +18,14 @@ pub(crate) use hdf5_pure::{
 /// Why a file is not opened as HDF5.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OpenError {
-    /// It cannot be read, or is no file.
+    /// It cannot be read, or is not a file.
     #[error(transparent)]
     Io(#[from] io::Error),
     /// It does not begin as HDF5 does.
-    #[error("this is no HDF5 file (its signature is missing)")]
+    #[error("this is not an HDF5 file (its signature is missing)")]
     NoSignature,
     /// It begins as HDF5 and cannot be read as such.
-    #[error("this is no HDF5 file ({detail})")]
+    #[error("this is not an HDF5 file ({detail})")]
     Damaged {
         /// What is wrong, in the words of the library.
         detail: String,

@@ -193,7 +193,7 @@ impl Table {
         let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
         match table.attribute("format")? {
             Some(Attribute::Text(found)) if found == format => {}
-            _ => return Err(table.damaged("format", format!("this is no {format}"))),
+            _ => return Err(table.damaged("format", format!("this is not a {format}"))),
         }
         let names = table.file.dataset(COLUMNS).and_then(|d| {
             let bytes = declared_bytes(&d)?;

@@ -311,7 +311,7 @@ struct Names {
 }
 
 impl Names {
-    /// A dataset's name has no `/`, which would be a path, and is no name of this layout.
+    /// A dataset's name has no `/`, which would be a path, and is not a name of this layout.
     fn of(&mut self, component: &str) -> String {
         let mut name = component.replace(['/', '\0'], "_");
         while matches!(&*name, "" | "." | TIME | IDS | SIDES | TITLES) || self.taken.contains(&name)

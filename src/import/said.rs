@@ -3,7 +3,7 @@
 use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
 use crate::error::{Error, error};
-use crate::formats::read::{Facts, ReadCurve};
+use crate::formats::read::{Metadata, ReadCurve};
 use crate::unit::{Speed, SpeedKind, km_per_h};
 
 /// The impact of a curve, and which force it is.
@@ -24,8 +24,13 @@ impl Said {
         curve: &ReadCurve,
         group: Option<&Case>,
     ) -> Result<Self, Error> {
-        let mut both =
-            Both { item, settings, facts: &curve.facts, notes: Vec::new(), warnings: Vec::new() };
+        let mut both = StatedAndFound {
+            item,
+            settings,
+            facts: &curve.facts,
+            notes: Vec::new(),
+            warnings: Vec::new(),
+        };
         let kind = both.kind(group)?;
         let m_per_s = both.speed()?;
         let masses = both.masses(kind)?;
@@ -40,15 +45,15 @@ impl Said {
 const SAME: f64 = 0.01;
 
 /// Both sides, and what is to be said of them.
-struct Both<'a> {
+struct StatedAndFound<'a> {
     item: &'a Item,
     settings: &'a Settings,
-    facts: &'a Facts,
+    facts: &'a Metadata,
     notes: Vec<String>,
     warnings: Vec<String>,
 }
 
-impl Both<'_> {
+impl StatedAndFound<'_> {
     fn missing(&self, what: &'static str, option: &'static str) -> Error {
         error!(
             Usage,

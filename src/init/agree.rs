@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use super::Given;
+use super::UserHints;
 use super::explain::{self, Explanation, FOLLOWS, RELATED, size};
 use super::left_out::Reason;
 use super::survey::{ForceCandidate, NodeCandidate, Survey};
-use super::titles::is_centre;
+use super::titles::names_centre_of_gravity;
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::Side;
 use crate::study::StudyKind;
@@ -75,7 +75,7 @@ pub(crate) struct Alternative {
 type Key = (bool, &'static str, Option<(&'static str, i64)>);
 
 /// A run's survey with what explains it best.
-struct View<'a> {
+struct RunView<'a> {
     survey: &'a Survey,
     best: Option<Explanation>,
     /// Whether it has a say: the record holds the crash up to its end, or no run's does.
@@ -84,12 +84,12 @@ struct View<'a> {
 
 impl Agreed {
     /// The recipe of most of the runs; `None` if there are no runs.
-    pub(super) fn of(surveys: &[&Survey], given: &Given) -> Option<Self> {
+    pub(super) fn of(surveys: &[&Survey], given: &UserHints) -> Option<Self> {
         let single = given.half_model.then_some(StudyKind::Wall);
         // Whoever names a node of the other body has two.
         let two = given.minus_node.map(|_| StudyKind::Pair);
         let kind = single.or(given.kind).or(two);
-        let views = View::all(surveys, given, kind);
+        let views = RunView::all(surveys, given, kind);
         let mut votes: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
         for (k, view) in views.iter().enumerate().filter(|(_, view)| view.counts) {
             votes.entry(key(view)).or_default().push(k);
@@ -126,15 +126,15 @@ impl Agreed {
     /// Chooses a node for each body, and tells the runs that do not have it.
     fn choose_nodes(
         &mut self,
-        views: &[View<'_>],
+        views: &[RunView<'_>],
         explained: &[Result<Option<Explanation>, Reason>],
-        given: &Given,
+        given: &UserHints,
     ) {
         let bodies = if self.kind == StudyKind::Pair { 2 } else { 1 };
         let are_given = given.node.is_some() || given.force.is_some();
         let given = [given.node, given.minus_node];
         for (slot, given) in given.into_iter().take(bodies).enumerate() {
-            let of_runs: Vec<Vec<Judged<'_>>> = views
+            let of_runs: Vec<Vec<NodeVerdict<'_>>> = views
                 .iter()
                 .zip(explained)
                 .map(|(view, explained)| match explained {
@@ -158,7 +158,7 @@ impl Agreed {
 }
 
 /// What explains a run best, with the force that the caller names if he does.
-fn best(survey: &Survey, given: &Given, kind: Option<StudyKind>) -> Option<Explanation> {
+fn best(survey: &Survey, given: &UserHints, kind: Option<StudyKind>) -> Option<Explanation> {
     match &given.force {
         Some(named) => {
             let force = survey.force(&named.file, named.id)?;
@@ -168,7 +168,7 @@ fn best(survey: &Survey, given: &Given, kind: Option<StudyKind>) -> Option<Expla
     }
 }
 
-fn key(view: &View<'_>) -> Key {
+fn key(view: &RunView<'_>) -> Key {
     let direction = view.survey.direction.axis();
     match &view.best {
         Some(best) => {
@@ -179,9 +179,9 @@ fn key(view: &View<'_>) -> Key {
     }
 }
 
-impl<'a> View<'a> {
+impl<'a> RunView<'a> {
     /// All runs, each with what explains it best.
-    fn all(surveys: &[&'a Survey], given: &Given, kind: Option<StudyKind>) -> Vec<Self> {
+    fn all(surveys: &[&'a Survey], given: &UserHints, kind: Option<StudyKind>) -> Vec<Self> {
         let view = |survey: &&'a Survey| {
             let best = best(survey, given, kind);
             let counts = best.as_ref().is_some_and(|best| explain::reaches_the_end(survey, best));
@@ -203,7 +203,7 @@ impl<'a> View<'a> {
         explanation.force.map(|force| &self.survey.forces[force])
     }
 
-    /// Why a run is no member where one body moves and in the others two do, or the other way.
+    /// Why a run is not a member where one body moves and in the others two do, or the other way.
     fn other_kind(&self, is_pair: bool) -> Option<Reason> {
         let is_other = self.best.as_ref().is_some_and(|b| (b.kind == StudyKind::Pair) != is_pair)
             && self.counts;
@@ -221,7 +221,7 @@ impl<'a> View<'a> {
         &self,
         key: &Key,
         kind: Option<StudyKind>,
-        given: &Given,
+        given: &UserHints,
     ) -> Result<Option<Explanation>, Reason> {
         let other = |why: String| Err(Reason::OtherRecipe { why });
         let (is_pair, direction, force) = *key;
@@ -302,14 +302,18 @@ impl<'a> View<'a> {
 }
 
 /// A node of a body with what it leaves of the recipe's impulse.
-struct Judged<'a> {
+struct NodeVerdict<'a> {
     node: &'a NodeCandidate,
     residual: f64,
 }
 
 /// The nodes of one of the bodies that a force explains; without a force those of the body in
 /// that place.
-fn judged<'a>(survey: &'a Survey, explained: Option<&Explanation>, slot: usize) -> Vec<Judged<'a>> {
+fn judged<'a>(
+    survey: &'a Survey,
+    explained: Option<&Explanation>,
+    slot: usize,
+) -> Vec<NodeVerdict<'a>> {
     let (body, force) = match explained {
         Some(explained) => (explained.bodies.get(slot).copied(), explained.force),
         None => (Some(slot), None),
@@ -318,12 +322,15 @@ fn judged<'a>(survey: &'a Survey, explained: Option<&Explanation>, slot: usize) 
     let nodes = body.map(|body| &body.nodes[..]).unwrap_or_default();
     nodes
         .iter()
-        .map(|node| Judged { node, residual: force.map_or(0.0, |force| node.fits[force].residual) })
+        .map(|node| NodeVerdict {
+            node,
+            residual: force.map_or(0.0, |force| node.fits[force].residual),
+        })
         .collect()
 }
 
 /// What all runs say of a node.
-struct Sum<'a> {
+struct NodeTally<'a> {
     node: &'a NodeCandidate,
     /// In which it can stand for the body.
     runs: usize,
@@ -336,17 +343,21 @@ struct Sum<'a> {
 
 /// The node that can stand for the body in most runs: a centre of gravity first, then the one
 /// with the smoothest velocity.
-fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Option<ChosenNode> {
-    let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
+fn choose(
+    of_runs: &[Vec<NodeVerdict<'_>>],
+    given: Option<i64>,
+    by_force: bool,
+) -> Option<ChosenNode> {
+    let mut sums: BTreeMap<i64, NodeTally<'_>> = BTreeMap::new();
     for run in of_runs {
         let best = run.iter().map(|j| j.residual).fold(f64::INFINITY, f64::min);
-        for Judged { node, residual } in run {
-            let limit = if is_centre(node.title.as_deref()) {
+        for NodeVerdict { node, residual } in run {
+            let limit = if names_centre_of_gravity(node.title.as_deref()) {
                 best + CENTRE_AS_GOOD
             } else {
                 AS_GOOD.0 * best + AS_GOOD.1
             };
-            let empty = Sum { node, runs: 0, residual: 0.0, roughness: 0.0, seen: 0.0 };
+            let empty = NodeTally { node, runs: 0, residual: 0.0, roughness: 0.0, seen: 0.0 };
             let sum = sums.entry(node.id).or_insert(empty);
             sum.runs += usize::from(*residual <= limit);
             sum.residual = sum.residual.max(*residual);
@@ -354,10 +365,10 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Op
             sum.seen += 1.0;
         }
     }
-    let centre = |sum: &Sum<'_>| is_centre(sum.node.title.as_deref());
+    let centre = |sum: &NodeTally<'_>| names_centre_of_gravity(sum.node.title.as_deref());
     // Of equally smooth ones, such as the nodes of a rigid body, the one that follows best.
-    let roughness = |sum: &Sum<'_>| (sum.roughness / sum.seen * EVEN).round();
-    let mut sums: Vec<Sum<'_>> = sums.into_values().collect();
+    let roughness = |sum: &NodeTally<'_>| (sum.roughness / sum.seen * EVEN).round();
+    let mut sums: Vec<NodeTally<'_>> = sums.into_values().collect();
     sums.sort_by(|a, b| {
         (Some(b.node.id) == given)
             .cmp(&(Some(a.node.id) == given))
@@ -374,7 +385,7 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Op
         return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
     }
     let (first, others) = sums.split_first()?;
-    let about = |sum: &Sum<'_>| {
+    let about = |sum: &NodeTally<'_>| {
         let title = sum.node.title.as_ref().map_or(String::new(), |title| format!("\"{title}\", "));
         if by_force {
             format!("{title}follows the impulse within {} %", percent(sum.residual))
@@ -394,7 +405,7 @@ fn choose(of_runs: &[Vec<Judged<'_>>], given: Option<i64>, by_force: bool) -> Op
 
 /// The force that the members share, as the recipe names it; `None` if none moves them.
 fn chosen_force(
-    views: &[View<'_>],
+    views: &[RunView<'_>],
     explained: &[Result<Option<Explanation>, Reason>],
 ) -> Option<ChosenForce> {
     let of_members: Vec<(&Survey, &ForceCandidate)> = views

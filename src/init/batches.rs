@@ -8,7 +8,7 @@ use crate::solver::{SolverFile, WantedId};
 const MOST_VALUES: usize = 16_000_000;
 
 /// A source's histories, a bounded number of entities at a time.
-pub(super) struct Batches<'a> {
+pub(super) struct HistoryBatches<'a> {
     source: &'a Source,
     components: Vec<&'a str>,
     /// Ids of each piece; one piece of `None` is the whole.
@@ -17,7 +17,7 @@ pub(super) struct Batches<'a> {
     held: Option<SolverFile>,
 }
 
-impl<'a> Batches<'a> {
+impl<'a> HistoryBatches<'a> {
     pub(super) fn new(source: &'a Source, components: Vec<&'a str>) -> Self {
         let values_of_one = (source.states * components.len()).max(1);
         let at_once = (MOST_VALUES / values_of_one).max(1);

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use super::agree::{Agreed, percent};
 use super::evidence::{Evidence, Proposed};
 use super::explain::FOLLOWS;
-use super::given::Given;
+use super::given::UserHints;
 use super::left_out::Reason;
 use super::measure::Measured;
 use super::proposal::Proposal;
 use super::propose::Recorded;
 use super::sources::MOTION;
-use super::titles::is_centre;
+use super::titles::names_centre_of_gravity;
 use super::{describe_runs, sampling};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
 use crate::signal::cfc;
@@ -29,14 +29,14 @@ pub(super) type Seen<'a> = &'a dyn Fn(&PathBuf) -> Option<String>;
 /// The proposal for runs that were measured; `group`: name of the folder above them.
 pub(super) fn proposal(
     measured: &Measured<'_>,
-    given: &Given,
+    given: &UserHints,
     group: String,
     seen: Seen<'_>,
     warnings: &mut Vec<String>,
 ) -> Proposal {
     let agreed = measured.agreed;
     let group = match &given.group {
-        Some(name) => Proposed::found(name.clone(), Evidence::Given("by --group".into())),
+        Some(name) => Proposed::found(name.clone(), Evidence::UserHints("by --group".into())),
         None => {
             let from = "name of the folder above the runs".into();
             Proposed::found(group, Evidence::Guessed(from))
@@ -68,17 +68,17 @@ pub(super) fn proposal(
     }
 }
 
-fn kind(measured: &Measured<'_>, given: &Given) -> Proposed<StudyKind> {
+fn kind(measured: &Measured<'_>, given: &UserHints) -> Proposed<StudyKind> {
     let Agreed { kind, force, .. } = measured.agreed;
     if given.half_model {
         let from = "by --half-model: the other body is this one's mirror image".into();
-        return Proposed::found(StudyKind::Pair, Evidence::Given(from));
+        return Proposed::found(StudyKind::Pair, Evidence::UserHints(from));
     }
     if given.kind.is_some() {
-        return Proposed::found(*kind, Evidence::Given("by --kind".into()));
+        return Proposed::found(*kind, Evidence::UserHints("by --kind".into()));
     }
     if given.minus_node.is_some() {
-        return Proposed::found(*kind, Evidence::Given("by --minus-node".into()));
+        return Proposed::found(*kind, Evidence::UserHints("by --minus-node".into()));
     }
     let evidence = match (kind, force) {
         (StudyKind::Pair, Some(force)) => Evidence::Computed(format!(
@@ -96,13 +96,13 @@ fn kind(measured: &Measured<'_>, given: &Given) -> Proposed<StudyKind> {
             "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
         ),
         (StudyKind::Wall, _) => Evidence::Guessed(
-            "one body moves in the files: if what it meets moves too, give out a node of that".into(),
+            "one body moves in the files: if what it meets moves too, write one of its nodes to nodout".into(),
         ),
     };
     Proposed::found(*kind, evidence)
 }
 
-fn deflection(measured: &Measured<'_>, given: &Given) -> Proposed<DeflectionSource> {
+fn deflection(measured: &Measured<'_>, given: &UserHints) -> Proposed<DeflectionSource> {
     let agreed = measured.agreed;
     let Some(node) = agreed.nodes.first() else {
         return Proposed::missing("no node of the runs moves with the body: name one with --node");
@@ -114,7 +114,7 @@ fn deflection(measured: &Measured<'_>, given: &Given) -> Proposed<DeflectionSour
         component: agreed.direction,
     };
     if given.node.is_some() {
-        return Proposed::found(source, Evidence::Given("by --node".into()));
+        return Proposed::found(source, Evidence::UserHints("by --node".into()));
     }
     let mut because = vec![format!("the bodies start along {}", agreed.direction.axis())];
     let runs = measured.recorded.len();
@@ -129,7 +129,7 @@ fn deflection(measured: &Measured<'_>, given: &Given) -> Proposed<DeflectionSour
             percent(agreed.residual)
         ));
     }
-    if agreed.nodes.iter().all(|node| is_centre(node.title.as_deref())) {
+    if agreed.nodes.iter().all(|node| names_centre_of_gravity(node.title.as_deref())) {
         because.push("the title says centre of gravity".into());
     }
     let is_only = agreed.nodes.iter().all(|node| node.others.is_empty()) && agreed.force.is_some();
@@ -138,7 +138,7 @@ fn deflection(measured: &Measured<'_>, given: &Given) -> Proposed<DeflectionSour
     Proposed::found(source, evidence)
 }
 
-fn force(measured: &Measured<'_>, given: &Given) -> Proposed<ForceSource> {
+fn force(measured: &Measured<'_>, given: &UserHints) -> Proposed<ForceSource> {
     let agreed = measured.agreed;
     let Some(force) = &agreed.force else {
         let Some(node) = agreed.nodes.first() else {
@@ -164,7 +164,7 @@ fn force(measured: &Measured<'_>, given: &Given) -> Proposed<ForceSource> {
         component: named.and_then(|n| n.component.clone()).unwrap_or(force.component.clone()),
     };
     if named.is_some() {
-        return Proposed::found(source, Evidence::Given("by --force".into()));
+        return Proposed::found(source, Evidence::UserHints("by --force".into()));
     }
     let evidence = if force.others.is_empty() {
         Evidence::Computed("the only force along the motion, and the bodies follow it".into())

@@ -6,8 +6,8 @@ use super::describe::Seen;
 use super::evidence::{Evidence, Proposed};
 use super::explain::FOLLOWS;
 use super::folders::speed_in;
-use super::given::Given;
-use super::masses::{self, Weighed, is_near};
+use super::given::UserHints;
+use super::masses::{self, MassEstimates, is_near};
 use super::measure::{Measured, SAME_SPEED, SiRun};
 use super::proposal::ProposedRun;
 use super::propose::Recorded;
@@ -22,7 +22,7 @@ const UNEQUAL: f64 = 0.1;
 /// The runs by speed, then by name.
 pub(super) fn runs(
     measured: &Measured<'_>,
-    given: &Given,
+    given: &UserHints,
     truncated: &[Option<f64>],
     seen: Seen<'_>,
     warnings: &mut Vec<String>,
@@ -75,7 +75,7 @@ pub(super) fn runs(
 }
 
 /// Speed of a run, from its first velocities or those right before the contact.
-fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &Given) -> Proposed<f64> {
+fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &UserHints) -> Proposed<f64> {
     let (state, time_s) = run.state;
     let record = &run.recorded.record;
     let values: Vec<String> = record.velocities.iter().map(|v| v[state].to_string()).collect();
@@ -96,7 +96,7 @@ fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &Given) -> Proposed<f6
 }
 
 /// Whether the folders' names say twice the recorded speeds, of all runs whose name says one.
-fn names_say_half(measured: &Measured<'_>, given: &Given) -> bool {
+fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
     let said: Vec<bool> = measured
         .runs
         .iter()
@@ -138,7 +138,7 @@ fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
 /// Masses of the bodies and of the other bodies, where these are others.
 fn masses(
     measured: &Measured<'_>,
-    given: &Given,
+    given: &UserHints,
     warnings: &mut Vec<String>,
 ) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
     let agreed = measured.agreed;
@@ -146,28 +146,29 @@ fn masses(
     let is_part = agreed.force.as_ref().is_some_and(|force| force.file == "secforc");
     let why = match &agreed.force {
         Some(_) if is_weak => format!(
-            "impulse and change of velocity differ by {} %, so momentum tells no mass; say --mass",
+            "impulse and change of velocity differ by {} %, so no mass follows from momentum; say --mass",
             percent(agreed.residual)
         ),
         Some(_) if is_part => {
-            "a section may carry only part of what stops the body, so momentum tells no mass; say --mass".into()
+            "a section may carry only part of what stops the body, so no mass follows from momentum; say --mass".into()
         }
-        _ => "no force and no energy tells it; say --mass".into(),
+        _ => "it follows from no force and no energy; say --mass".into(),
     };
-    let of = |weighed: fn(&SiRun<'_>) -> Option<Weighed>| -> Option<Vec<(String, Weighed)>> {
-        let all = measured.runs.iter().map(|run| {
-            let weighed = match (is_weak, is_part) {
-                (true, _) => Weighed::default(),
-                (false, true) => Weighed { by_momentum: None, ..weighed(run)? },
-                (false, false) => weighed(run)?,
-            };
-            Some((run.recorded.run.name.clone(), weighed))
-        });
-        all.collect()
-    };
+    let of =
+        |weighed: fn(&SiRun<'_>) -> Option<MassEstimates>| -> Option<Vec<(String, MassEstimates)>> {
+            let all = measured.runs.iter().map(|run| {
+                let weighed = match (is_weak, is_part) {
+                    (true, _) => MassEstimates::default(),
+                    (false, true) => MassEstimates { by_momentum: None, ..weighed(run)? },
+                    (false, false) => weighed(run)?,
+                };
+                Some((run.recorded.run.name.clone(), weighed))
+            });
+            all.collect()
+        };
     let stated = |kg: Option<f64>, by: &str| {
         kg.map(|kg| {
-            let one = Proposed::found(kg, Evidence::Given(format!("by {by}")));
+            let one = Proposed::found(kg, Evidence::UserHints(format!("by {by}")));
             vec![one; measured.recorded.len()]
         })
     };
@@ -198,7 +199,7 @@ fn masses(
 fn by_ratio(
     bodies: &[Proposed<f64>],
     measured: &Measured<'_>,
-    given: &Given,
+    given: &UserHints,
     warnings: &mut Vec<String>,
 ) -> Option<Vec<Proposed<f64>>> {
     let times = digits(unequal(measured)?);

@@ -7,7 +7,7 @@ use serde::Serialize;
 #[serde(tag = "evidence", content = "from", rename_all = "snake_case")]
 pub(crate) enum Evidence {
     /// The caller gave it.
-    Given(String),
+    UserHints(String),
     /// It stands in a file.
     Read(String),
     /// It follows from what was read.
@@ -20,7 +20,7 @@ impl Evidence {
     /// `read`, `computed`, …: the word that stands for it in a proposal.
     pub(crate) fn word(&self) -> &'static str {
         match self {
-            Self::Given(_) => "given",
+            Self::UserHints(_) => "given",
             Self::Read(_) => "read",
             Self::Computed(_) => "computed",
             Self::Guessed(_) => "guessed",
@@ -29,7 +29,7 @@ impl Evidence {
 
     /// What the value was taken or made from.
     pub(crate) fn from(&self) -> &str {
-        let (Self::Given(from) | Self::Read(from) | Self::Computed(from) | Self::Guessed(from)) =
+        let (Self::UserHints(from) | Self::Read(from) | Self::Computed(from) | Self::Guessed(from)) =
             self;
         from
     }

@@ -9,7 +9,7 @@ use crate::unit::UnitSystem;
 
 /// What the caller already knows: it stands above what is found.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Given {
+pub struct UserHints {
     /// Units of the solver's files.
     pub units: Option<UnitSystem>,
     /// What hits what.
@@ -44,18 +44,18 @@ pub(crate) struct GivenForce {
 /// A text that names no force.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "\"{text}\" is no force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
+    "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
     FORCES.join(", ")
 )]
-pub(crate) struct NoForce {
+pub(crate) struct ForceSpecError {
     pub(crate) text: String,
 }
 
 impl FromStr for GivenForce {
-    type Err = NoForce;
+    type Err = ForceSpecError;
 
-    fn from_str(text: &str) -> Result<Self, NoForce> {
-        let wrong = || NoForce { text: text.into() };
+    fn from_str(text: &str) -> Result<Self, ForceSpecError> {
+        let wrong = || ForceSpecError { text: text.into() };
         let mut parts = text.split(':');
         let file = parts.next().filter(|file| FORCES.contains(file)).ok_or_else(wrong)?;
         let id = parts.next().and_then(|id| id.parse().ok()).ok_or_else(wrong)?;

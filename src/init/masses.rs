@@ -10,14 +10,14 @@ const SAME_MASS: f64 = 0.03;
 
 /// What a run says of a mass, in kg.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Weighed {
+pub(super) struct MassEstimates {
     pub by_momentum: Option<f64>,
     /// Whether that was taken behind the contact.
     pub in_free_flight: bool,
     pub by_energy: Option<f64>,
 }
 
-impl Weighed {
+impl MassEstimates {
     /// The mass, and whether it is that by energy.
     fn kg(&self) -> Option<(f64, bool)> {
         match (self.by_momentum, self.by_energy) {
@@ -54,7 +54,7 @@ impl Weighed {
 ///
 /// `why`: why a run has none. Warns where the two ways differ.
 pub(super) fn agree(
-    runs: &[(String, Weighed)],
+    runs: &[(String, MassEstimates)],
     why: &str,
     warnings: &mut Vec<String>,
 ) -> Vec<Proposed<f64>> {
@@ -84,7 +84,7 @@ pub(super) fn agree(
 }
 
 /// Where momentum and kinetic energy give two masses.
-fn doubt(name: &str, weighed: &Weighed) -> Option<String> {
+fn doubt(name: &str, weighed: &MassEstimates) -> Option<String> {
     let (momentum, energy) = (weighed.by_momentum?, weighed.by_energy?);
     (!is_near(momentum, energy, SAME_BY_ENERGY)).then(|| {
         format!(
@@ -132,8 +132,8 @@ pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn by_momentum(kg: f64) -> Weighed {
-        Weighed { by_momentum: Some(kg), in_free_flight: true, by_energy: None }
+    fn by_momentum(kg: f64) -> MassEstimates {
+        MassEstimates { by_momentum: Some(kg), in_free_flight: true, by_energy: None }
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn kinetic_energy_is_exact_where_both_agree() {
-        let both = |energy| Weighed { by_energy: Some(energy), ..by_momentum(23_500.0) };
+        let both = |energy| MassEstimates { by_energy: Some(energy), ..by_momentum(23_500.0) };
         let mut warnings = Vec::new();
         let found = agree(&[("a".into(), both(24_000.0))], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&24_000.0));

@@ -2,8 +2,8 @@
 
 use super::Proposed;
 use super::agree::Agreed;
-use super::given::Given;
-use super::masses::{Weighed, is_near};
+use super::given::UserHints;
+use super::masses::{MassEstimates, is_near};
 use super::propose::Recorded;
 use super::record::{RawMasses, Record};
 use super::sampling::{Times, interval};
@@ -32,8 +32,8 @@ pub(super) struct SiRun<'a> {
     pub state: (usize, f64),
     pub crush_m: f64,
     pub times: Times,
-    pub body: Weighed,
-    pub other: Option<Weighed>,
+    pub body: MassEstimates,
+    pub other: Option<MassEstimates>,
     /// Times and values of the force, positive in compression.
     pub force: Option<(Vec<f64>, Vec<f64>)>,
 }
@@ -52,7 +52,7 @@ impl Record {
 }
 
 impl<'a> SiRun<'a> {
-    pub(super) fn of(recorded: &'a Recorded, units: UnitSystem, given: &Given) -> Self {
+    pub(super) fn of(recorded: &'a Recorded, units: UnitSystem, given: &UserHints) -> Self {
         let record = &recorded.record;
         let bodies = if given.half_model { 2.0 } else { 1.0 };
         let time_s: Vec<f64> = record.time.iter().map(|t| t * units.time_s).collect();
@@ -70,7 +70,7 @@ impl<'a> SiRun<'a> {
         let crush = (record.travel[end] - record.travel[before.min(end)]).abs();
         let (momentum, energy) = (record.masses(), record.masses_by_energy());
         // A kinetic energy has the unit of mass times speed squared.
-        let weighed = |of: fn(&RawMasses) -> Option<f64>| Weighed {
+        let weighed = |of: fn(&RawMasses) -> Option<f64>| MassEstimates {
             by_momentum: momentum.as_ref().and_then(of).map(|mass| mass * units.mass_kg),
             in_free_flight: momentum.is_some_and(|masses| masses.in_free_flight),
             by_energy: energy.as_ref().and_then(of).map(|mass| mass * units.mass_kg),

@@ -33,8 +33,8 @@ use crate::error::{Error, error};
 use std::path::Path;
 
 pub(crate) use evidence::Proposed;
-pub use given::Given;
 pub(crate) use given::GivenForce;
+pub use given::UserHints;
 pub use left_out::LeftOut;
 pub use proposal::Proposal;
 pub(crate) use proposal::ProposedRun;

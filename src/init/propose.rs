@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::agree::Agreed;
 use super::folders::{Folders, names, seen_from};
-use super::given::{Given, GivenForce};
+use super::given::{GivenForce, UserHints};
 use super::left_out::{LeftOut, Reason};
 use super::measure::{Measured, SiRun};
 use super::proposal::Proposal;
@@ -35,7 +35,7 @@ pub struct Request {
     /// Where the study will stand: paths in it begin there.
     pub study: PathBuf,
     /// What is known already.
-    pub given: Given,
+    pub given: UserHints,
 }
 
 /// A run that was looked over.
@@ -73,7 +73,7 @@ pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Prop
     };
     refuse_given(&agreed, &surveys, given)?;
     let recorded = record(surveyed, &agreed, &mut left_out);
-    let recorded = without_twins(recorded, &mut left_out);
+    let recorded = without_duplicates(recorded, &mut left_out);
     let (units, recorded, mut warnings) = agree_on_units(recorded, given, &mut left_out);
     let study = match request.study.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
@@ -100,7 +100,7 @@ pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Prop
 /// Looks over every run; what cannot be used, or is there twice, is left out.
 fn survey(
     folders: &[PathBuf],
-    given: &Given,
+    given: &UserHints,
     left_out: &mut Vec<LeftOut>,
     progress: &(impl Fn(&str) + Sync),
 ) -> Vec<Surveyed> {
@@ -152,7 +152,7 @@ fn usable<T>(runs: Vec<Result<T, Box<LeftOut>>>, left_out: &mut Vec<LeftOut>) ->
 }
 
 /// Holds what the caller says of bodies and force against what there is.
-fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(), Error> {
+fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &UserHints) -> Result<(), Error> {
     if let Some(GivenForce { file, id, .. }) = &given.force
         && agreed.force.is_none()
     {
@@ -170,7 +170,7 @@ fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &Given) -> Result<(
         ));
     }
     if given.half_model {
-        let alone = Given { half_model: false, kind: None, ..given.clone() };
+        let alone = UserHints { half_model: false, kind: None, ..given.clone() };
         let found = Agreed::of(surveys, &alone);
         if found.is_some_and(|found| found.kind == StudyKind::Pair) {
             return Err(error!(
@@ -206,7 +206,7 @@ fn record(surveyed: Vec<Surveyed>, agreed: &Agreed, left_out: &mut Vec<LeftOut>)
 }
 
 /// Leaves out runs whose histories are those of another.
-fn without_twins(recorded: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
+fn without_duplicates(recorded: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
     let mut unique: Vec<Recorded> = Vec::new();
     for run in recorded {
         match unique.iter().find(|known| is_twin(&known.record, &run.record)) {
@@ -247,7 +247,7 @@ fn with_paths(
 /// crash the record does not hold.
 fn agree_on_units(
     recorded: Vec<Recorded>,
-    given: &Given,
+    given: &UserHints,
     left_out: &mut Vec<LeftOut>,
 ) -> (super::Proposed<UnitSystem>, Vec<Recorded>, Vec<String>) {
     let mut warnings = Vec::new();

@@ -111,7 +111,7 @@ impl Record {
         })?;
         let impulse = impulse(history, &self.time).ok_or_else(|| {
             unusable(format!(
-                "{} of {} holds values that are no numbers",
+                "{} of {} holds values that are not numbers",
                 history.label(),
                 source.shown()
             ))
@@ -135,7 +135,7 @@ impl Record {
     fn check(&self) -> Result<(), Reason> {
         let numbers = self.velocities.iter().flatten().chain(&self.travel);
         if numbers.into_iter().any(|v| !v.is_finite()) {
-            let why = "the motion of its nodes holds values that are no numbers".into();
+            let why = "the motion of its nodes holds values that are not numbers".into();
             return Err(Reason::Unusable { why });
         }
         if self.time.len() < 2 || self.closing(0) == 0.0 {

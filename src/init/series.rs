@@ -49,7 +49,7 @@ pub(super) fn velocity(
 
 /// Impulse of a force at other times, held before its first and behind its last.
 ///
-/// `None` if the force holds a value that is no number, or has fewer than two states.
+/// `None` if the force holds a value that is not a number, or has fewer than two states.
 pub(super) fn impulse(force: &History, times: &[f64]) -> Option<Vec<f64>> {
     let states = rising(&force.time);
     let (time, values) = (picked(&force.time, &states), picked(&force.values, &states));

@@ -2,13 +2,13 @@
 //! for them, and which forces could have moved them.
 //!
 //! A node stands for a body if its velocity follows the force's impulse, `∫F dt = m Δv`: what lies
-//! in the crush zone is stopped first and then shakes, and what is no part of the body does not
+//! in the crush zone is stopped first and then shakes, and what is not part of the body does not
 //! follow at all. A force is the one between two bodies if some node follows it; a contact within
 //! a body is followed as well, but has a smaller impulse than what acts on the body from outside.
 
 use std::collections::HashMap;
 
-use super::batches::Batches;
+use super::batches::HistoryBatches;
 use super::left_out::Reason;
 use super::series::{Fit, by_entity, component, impulse, largest, picked, rising, velocity};
 use super::sources::{FORCES, Source, Sources};
@@ -96,7 +96,7 @@ impl Survey {
         } else {
             DisplacementComponent::ALL.map(DisplacementComponent::name)
         };
-        let mut nodes = Batches::new(source, components.to_vec());
+        let mut nodes = HistoryBatches::new(source, components.to_vec());
         let (starts, time) = starts(&mut nodes, source)?;
         if time.len() < FEWEST_STATES {
             return Err(few_states(source, time.len()));
@@ -141,7 +141,10 @@ fn rank(force: &ForceCandidate) -> (usize, i64) {
 }
 
 /// How each node starts, and the times that rise.
-fn starts(nodes: &mut Batches<'_>, source: &Source) -> Result<(Vec<Start>, Vec<f64>), Reason> {
+fn starts(
+    nodes: &mut HistoryBatches<'_>,
+    source: &Source,
+) -> Result<(Vec<Start>, Vec<f64>), Reason> {
     let titles: HashMap<EntityId, &Option<String>> =
         source.entities.iter().map(|entity| (entity.id, &entity.title)).collect();
     let (mut starts, mut times) = (Vec::new(), Vec::new());
@@ -160,7 +163,7 @@ fn starts(nodes: &mut Batches<'_>, source: &Source) -> Result<(Vec<Start>, Vec<f
     Ok((starts, times))
 }
 
-/// `None` for a node without velocities, or with one that is no number: it did not live long.
+/// `None` for a node without velocities, or with one that is not a number: it did not live long.
 fn start(id: i64, title: Option<String>, node: &[History], states: &[usize]) -> Option<Start> {
     let (mut first, mut change) = ([0.0; 3], [0.0_f64; 3]);
     for (k, direction) in DisplacementComponent::ALL.into_iter().enumerate() {
@@ -234,7 +237,7 @@ fn force_candidates(
     let titles: HashMap<EntityId, &Option<String>> =
         source.entities.iter().map(|entity| (entity.id, &entity.title)).collect();
     let mut found: Vec<ForceCandidate> = Vec::new();
-    Batches::new(source, components).each(&mut |piece| {
+    HistoryBatches::new(source, components).each(&mut |piece| {
         for of in by_entity(&piece.histories) {
             let Some(entity) = of[0].entity else { continue };
             let Some((component, impulse)) = along(of, direction, time) else { continue };
@@ -310,7 +313,7 @@ fn add(found: &mut Vec<ForceCandidate>, candidate: ForceCandidate) {
 
 /// How well each node of the bodies follows each force, and how each body moves.
 fn judge(
-    nodes: &mut Batches<'_>,
+    nodes: &mut HistoryBatches<'_>,
     bodies: &mut [Body],
     forces: &[ForceCandidate],
     direction: DisplacementComponent,

@@ -1,7 +1,7 @@
 //! What the title of a node says of the body that it may stand for.
 
 /// Whether a title names a body's centre of gravity.
-pub(super) fn is_centre(title: Option<&str>) -> bool {
+pub(super) fn names_centre_of_gravity(title: Option<&str>) -> bool {
     let Some(title) = title.map(str::to_lowercase) else { return false };
     let word = |wanted: &str| title.split(|c: char| !c.is_alphanumeric()).any(|w| w == wanted);
     let centre = ["centre", "center"].iter().any(|c| title.contains(c));
@@ -20,7 +20,7 @@ mod tests {
     #[test]
     fn centres_of_gravity_are_known_by_their_titles() {
         fn t(title: &str, expected: bool) {
-            assert_eq!(is_centre(Some(title)), expected, "{title}");
+            assert_eq!(names_centre_of_gravity(Some(title)), expected, "{title}");
         }
         t("COG of the rigid body of car A", true);
         t("N900001_COG", true);
@@ -31,6 +31,6 @@ mod tests {
         t("centre of the nose plate of car A", false);
         t("cogwheel", false);
         t("mass of equipment", false);
-        assert!(!is_centre(None));
+        assert!(!names_centre_of_gravity(None));
     }
 }

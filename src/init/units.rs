@@ -32,7 +32,7 @@ const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 
 /// First closing speed over the time to the largest crush: from a train against soft buffers to
 /// some hundred g. Speed and time may each be possible and what they make together not: the mean
 /// force is mass times deceleration, and no crush zone stops its own vehicle with hundreds of its
-/// weights. A shunting impact at 0.5 km/h, recorded in mm and s, is no impact at 139 m/s that
+/// weights. A shunting impact at 0.5 km/h, recorded in mm and s, is not an impact at 139 m/s that
 /// ends within the same 20 ms, for that would be 700 g. The spread is wide, because what is hit may
 /// be a buffer or a rock.
 const DECELERATION_M_PER_S2: Range = Range { low: 0.2, high: 5e3, usual: 100.0, spread: 5.0 };
@@ -98,14 +98,14 @@ pub(super) fn choose(
     if let Some(units) = given {
         if let Some(why) = refused(&units) {
             warnings.push(format!(
-                "units: {units} as given would make {why}, which is no crash; {}",
+                "units: {units} as given would make {why}, which is not a crash; {}",
                 match guessed(runs) {
                     Some((guess, _)) => format!("{guess} would fit"),
                     None => "no usual system fits better".into(),
                 }
             ));
         }
-        return Proposed::found(units, Evidence::Given("by --units".into()));
+        return Proposed::found(units, Evidence::UserHints("by --units".into()));
     }
     if let Some((units, place)) = stated {
         match refused(&units) {
@@ -133,7 +133,7 @@ pub(super) fn choose(
                 digits(first.crush),
                 digits(first.loading_time)
             ),
-            None => "no run tells them".into(),
+            None => "they follow from no run".into(),
         }),
     }
 }

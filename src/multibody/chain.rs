@@ -135,7 +135,7 @@ pub struct Chain {
     interfaces: Vec<Interface>,
 }
 
-/// Why bodies and interfaces are no chain.
+/// Why bodies and interfaces are not a chain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ChainError {
     /// A chain needs a body.

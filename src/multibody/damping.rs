@@ -13,7 +13,7 @@ pub struct Damping {
     coefficient_n_s_per_m: Vec<f64>,
 }
 
-/// Why two columns are no damper.
+/// Why two columns are not a damper.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DampingError {
     /// Columns that differ in length or are empty.

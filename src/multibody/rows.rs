@@ -23,9 +23,9 @@ pub(super) fn larger(a: Row, b: Row) -> Row {
 
 /// Where a body, or the interface in front of it, stands: counted along the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Slot(usize);
+pub(super) struct LaneIndex(usize);
 
-impl Slot {
+impl LaneIndex {
     pub(crate) fn new(row: usize, lane: usize) -> Self {
         Self(row * LANES + lane)
     }
@@ -43,7 +43,7 @@ impl Slot {
 
 /// The layout of a chain.
 #[derive(Clone, Debug)]
-pub(super) struct Layout(Vec<Slot>);
+pub(super) struct Layout(Vec<LaneIndex>);
 
 impl Layout {
     /// Of as many bodies, and of a last one that never moves.
@@ -51,13 +51,17 @@ impl Layout {
         let rows = bodies.div_ceil(LANES);
         // Without a body that is only a pad, the last one stands behind the end.
         let slot = |i: usize| {
-            if i < rows * LANES { Slot::new(i % rows, i / rows) } else { Slot::new(rows, 0) }
+            if i < rows * LANES {
+                LaneIndex::new(i % rows, i / rows)
+            } else {
+                LaneIndex::new(rows, 0)
+            }
         };
         Self((0..=bodies).map(slot).collect())
     }
 
     #[inline(always)]
-    pub(crate) fn of(&self, i: usize) -> Slot {
+    pub(crate) fn of(&self, i: usize) -> LaneIndex {
         self.0[i]
     }
 
@@ -76,7 +80,7 @@ impl Layout {
 
     /// What stands at a slot.
     #[inline(always)]
-    pub(crate) fn index(&self, slot: Slot) -> usize {
+    pub(crate) fn index(&self, slot: LaneIndex) -> usize {
         slot.lane() * self.rows() + slot.row()
     }
 }
@@ -137,18 +141,18 @@ pub(super) fn behind(rows: &[Row], c: usize) -> Row {
     }
 }
 
-impl Index<Slot> for Rows {
+impl Index<LaneIndex> for Rows {
     type Output = f64;
 
     #[inline(always)]
-    fn index(&self, slot: Slot) -> &f64 {
+    fn index(&self, slot: LaneIndex) -> &f64 {
         &self.0.as_flattened()[slot.0]
     }
 }
 
-impl IndexMut<Slot> for Rows {
+impl IndexMut<LaneIndex> for Rows {
     #[inline(always)]
-    fn index_mut(&mut self, slot: Slot) -> &mut f64 {
+    fn index_mut(&mut self, slot: LaneIndex) -> &mut f64 {
         &mut self.0.as_flattened_mut()[slot.0]
     }
 }

@@ -89,7 +89,7 @@ impl Truncated {
         let between = normal_share(high) - below;
         if between.is_nan() || between <= LEAST_SHARE {
             return Err(
-                error!(Sweep at "distribution", "min and max leave nothing of the distribution"),
+                error!(Sweep at "distribution", "min and max cut off almost all of the distribution"),
             );
         }
         Ok(Self { mean, sd: signed_sd, min, max, below, between })

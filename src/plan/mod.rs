@@ -485,9 +485,9 @@ impl Vary {
             Some(dimension) => {
                 dimension.parse(text).map_err(|source| error!(Sweep at key, "{key}: {source}"))?
             }
-            None => text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
-                error!(Sweep at key, "{key}: \"{text}\" is no number: write a plain one, such as 0.9")
-            })?,
+            None => text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(
+                || error!(Sweep at key, "{key}: \"{text}\" is not a number: write for example 0.9"),
+            )?,
         };
         let (low, high) = match (self.what, self.factor) {
             // How far values scatter has no sign of its own to check here.
@@ -586,7 +586,7 @@ mod tests {
         );
         t(
             "what = \"mass\", factor = true, values = [\"24t\"]",
-            "values: \"24t\" is no number: write a plain one, such as 0.9",
+            "values: \"24t\" is not a number: write for example 0.9",
         );
         t("what = \"band\", values = [1.5]", "values: 1.5 is out of range: expected from -1 to 1");
         t("what = \"force\", values = [-1]", "values: -1 is out of range: expected 0 or more");

@@ -11,7 +11,7 @@ pub(crate) const INTERVAL_S: f64 = 1e-4;
 const LEAST_SAMPLES: usize = 5;
 /// Most common samples: 500 s, far beyond any collision.
 const MOST_COMMON: f64 = 5e6;
-/// Larger magnitudes are no measured values, and their squares would overflow.
+/// Larger magnitudes are not measured values, and their squares would overflow.
 const LARGEST: f64 = 1e100;
 
 /// A signal: values at times in s.
@@ -53,7 +53,7 @@ impl Signal {
         if values.len() < LEAST_SAMPLES {
             return Err(error!(
                 Rating,
-                "{samples} samples are no history: at least {LEAST_SAMPLES} are needed",
+                "a signal needs at least {LEAST_SAMPLES} samples, found {samples}",
                 samples = values.len()
             ));
         }
@@ -207,7 +207,7 @@ mod tests {
             error(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, f64::NAN, 0.0, 0.0, 0.0]),
             "sample 2: the value is NaN: expected a finite number up to 1e100"
         );
-        assert_eq!(error(&[0.0], &[0.0]), "1 samples are no history: at least 5 are needed");
+        assert_eq!(error(&[0.0], &[0.0]), "a signal needs at least 5 samples, found 1");
         let none =
             Pair::new(&line(0.0, 0.125, 5), &line(1.0, 0.125, 5), (None, None), 12).unwrap_err();
         assert_eq!(

@@ -146,7 +146,7 @@ fn limits(prepared: &Prepared, run: &Run) -> Option<String> {
         .collect();
     let over = if over.is_empty() { "no vehicle".into() } else { over.join(", ") };
     Some(format!(
-        "Mean deceleration over {} g ({}:{}): {over}. These are figures of a one-dimensional model and no statement of conformity.",
+        "Mean deceleration over {} g ({}:{}): {over}. They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
         limits.mean_deceleration_g, limits.standard, limits.edition
     ))
 }

@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::end::{Crush, crush_between, crush_end, plates};
-use super::layout::{End, Joint, Layout, Role, Slot, layout};
+use super::layout::{Connection, ConnectionKind, End, Layout, Role, layout};
 use super::place::{self, Origin};
 use super::spring::{Spring, scale_error, spring};
-use super::{CheckedScenario, CurveSource, LawName, LimitsTable, Prepared, Sources, Used};
+use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::multibody::{
     Chain, ChainError, Damping, ForceLaw, Interface, Method, RunSettings, Tension,
@@ -28,13 +28,13 @@ pub(super) fn assemble_at(
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
     for (k, (slot, &speed)) in slots.iter().zip(speeds_m_per_s).enumerate() {
         let (interface, of_curve) = match &slot.joint {
-            Joint::Curve(curve) if scenario.curves[*curve].law == LawName::Rate => {
+            ConnectionKind::Curve(curve) if scenario.curves[*curve].law == LawName::Rate => {
                 let ahead = (k + 1 < bodies.len()).then_some(k + 1);
                 builder.with_rate(slot, curve, (k, ahead), speed)?
             }
-            Joint::Curve(curve) => builder.interface(slot, curve, speed)?,
-            Joint::End(end) => builder.end(slot, end, speed)?,
-            Joint::Plates => builder.plates(slot)?,
+            ConnectionKind::Curve(curve) => builder.interface(slot, curve, speed)?,
+            ConnectionKind::End(end) => builder.end(slot, end, speed)?,
+            ConnectionKind::Plates => builder.plates(slot)?,
         };
         interfaces.push(interface);
         used.push(of_curve);
@@ -109,19 +109,19 @@ pub(crate) const PLATES: &str = "plates";
 
 /// A law that has been made, and for what.
 #[derive(Clone)]
-struct Made {
+struct CachedLaw {
     curve: String,
     /// What decides it: role, speed and mass if a model gives it, whether vehicles are split.
     key: (bool, bool, bool, u64, u64),
     law: Arc<ForceLaw>,
-    used: Used,
+    used: CurveInUse,
 }
 
 struct Builder<'a> {
     path: &'a Path,
     scenario: &'a CheckedScenario<'a>,
     sources: &'a Sources,
-    made: Vec<Made>,
+    made: Vec<CachedLaw>,
     warnings: Vec<String>,
 }
 
@@ -144,10 +144,10 @@ impl<'a> Builder<'a> {
     /// An interface that a curve of the scenario tells.
     fn interface(
         &mut self,
-        slot: &Slot<'_>,
+        slot: &Connection<'_>,
         curve: &str,
         speed: f64,
-    ) -> Result<(Interface, Used), Error> {
+    ) -> Result<(Interface, CurveInUse), Error> {
         let made = self.law(slot, curve, speed)?;
         let table = &self.scenario.curves[curve];
         let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
@@ -170,10 +170,10 @@ impl<'a> Builder<'a> {
     /// The crush zone of a vehicle whose end a model tells.
     fn end(
         &mut self,
-        slot: &Slot<'_>,
+        slot: &Connection<'_>,
         end: &End<'_>,
         speed: f64,
-    ) -> Result<(Interface, Used), Error> {
+    ) -> Result<(Interface, CurveInUse), Error> {
         let (model, scale) = self.model(end.curve)?;
         let crush = crush_end(model, end, speed, scale)
             .map_err(|source| self.no_spring(end.curve, source))?;
@@ -186,11 +186,11 @@ impl<'a> Builder<'a> {
     /// `sides` are the bodies behind and ahead.
     fn with_rate(
         &mut self,
-        slot: &Slot<'_>,
+        slot: &Connection<'_>,
         curve: &str,
         sides: (usize, Option<usize>),
         speed: f64,
-    ) -> Result<(Interface, Used), Error> {
+    ) -> Result<(Interface, CurveInUse), Error> {
         let (model, scale) = self.model(curve)?;
         self.check_kind(slot, curve, Some(model.speed_kind))?;
         let crush = crush_between(model, slot, sides, speed, scale)
@@ -216,10 +216,10 @@ impl<'a> Builder<'a> {
     /// The interface of a crush force.
     fn crushed(
         &mut self,
-        slot: &Slot<'_>,
+        slot: &Connection<'_>,
         curve: &str,
         crush: Crush,
-    ) -> Result<(Interface, Used), Error> {
+    ) -> Result<(Interface, CurveInUse), Error> {
         let table = &self.scenario.curves[curve];
         let spring = |source| self.no_spring(curve, source);
         let (law, of_law) = Spring { curve: crush.curve, warnings: crush.warnings }
@@ -227,7 +227,7 @@ impl<'a> Builder<'a> {
             .map_err(spring)?;
         self.warnings.extend(of_law.iter().map(|w| format!("curve \"{curve}\": {w}")));
         let interface = Interface::new(slot.name.clone(), law, 0.0).with_rate(crush.rate);
-        let used = Used {
+        let used = CurveInUse {
             curve: curve.into(),
             force: Some("crush"),
             speed_m_per_s: Some(crush.speed_m_per_s),
@@ -238,7 +238,7 @@ impl<'a> Builder<'a> {
     /// Fails if a curve of one kind of speed stands where the other is meant.
     fn check_kind(
         &self,
-        slot: &Slot<'_>,
+        slot: &Connection<'_>,
         curve: &str,
         kind: Option<SpeedKind>,
     ) -> Result<(), Error> {
@@ -260,15 +260,18 @@ impl<'a> Builder<'a> {
     }
 
     /// Where the plates of two ends meet.
-    fn plates(&mut self, slot: &Slot<'_>) -> Result<(Interface, Used), Error> {
+    fn plates(&mut self, slot: &Connection<'_>) -> Result<(Interface, CurveInUse), Error> {
         let interface = plates(&slot.name, slot.gap_m.unwrap_or(0.0)).map_err(|error| {
             self.failed(error.of("between two plates").at(KeyPath::of("contact")))
         })?;
-        Ok((interface, Used { curve: PLATES.into(), force: Some("contact"), speed_m_per_s: None }))
+        Ok((
+            interface,
+            CurveInUse { curve: PLATES.into(), force: Some("contact"), speed_m_per_s: None },
+        ))
     }
 
     /// The law of a curve at a slot: made once for all slots that need the same.
-    fn law(&mut self, slot: &Slot<'_>, curve: &str, speed: f64) -> Result<Made, Error> {
+    fn law(&mut self, slot: &Connection<'_>, curve: &str, speed: f64) -> Result<CachedLaw, Error> {
         let table = &self.scenario.curves[curve];
         let source = self.sources.curves.get(curve);
         let source = source.ok_or_else(|| self.not_read(curve))?;
@@ -291,9 +294,9 @@ impl<'a> Builder<'a> {
         let force = spring.curve.force.map(super::super::curve::ForceKind::name);
         let (law, said) =
             spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;
-        let used = Used { curve: curve.into(), force, speed_m_per_s };
+        let used = CurveInUse { curve: curve.into(), force, speed_m_per_s };
         self.warnings.extend(said.iter().map(|w| format!("curve \"{curve}\": {w}")));
-        let made = Made { curve: curve.into(), key, law: Arc::new(law), used };
+        let made = CachedLaw { curve: curve.into(), key, law: Arc::new(law), used };
         self.made.push(made.clone());
         Ok(made)
     }

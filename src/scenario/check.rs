@@ -374,7 +374,7 @@ fn check_ends(scenario: &Scenario) -> Result<(), Error> {
                 let vehicle = &vehicle.name;
                 return Err(error!(
                     Scenario,
-                    "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which tells the mass that is stopped"
+                    "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which knows the mass that is stopped"
                 )
                 .at(scenario.vehicle(vehicle).key(end)));
             }

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::layout::{End, Role, Slot};
+use super::layout::{Connection, End, Role};
 use crate::curve::{CurveUnloading, DrivingCurve, Envelope};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
@@ -34,14 +34,14 @@ pub(super) struct Crush {
 }
 
 /// How an end counts what its model counts: two ends together, or one.
-struct Coordinates {
+struct EndScaling {
     /// Model's deflection per deflection of the end.
     deflection: f64,
     /// Model's speed per closing speed of the two vehicles.
     speed: f64,
 }
 
-impl Coordinates {
+impl EndScaling {
     fn of(kind: SpeedKind, at: Role) -> Self {
         let against_wall = at == Role::Wall;
         match kind {
@@ -67,7 +67,7 @@ fn below(error: impl std::error::Error + Send + Sync + 'static) -> Error {
 }
 
 /// Least share of the give of end and plates together that is the end's.
-const LEAST_OF_END: f64 = 0.1;
+const MIN_END_COMPLIANCE_SHARE: f64 = 0.1;
 
 /// The end of a vehicle whose neighbours close at `closing_m_per_s`.
 pub(super) fn crush_end(
@@ -76,7 +76,7 @@ pub(super) fn crush_end(
     closing_m_per_s: f64,
     scale: f64,
 ) -> Result<Crush, Error> {
-    let coordinates = Coordinates::of(model.speed_kind, end.at);
+    let coordinates = EndScaling::of(model.speed_kind, end.at);
     let speed_m_per_s = coordinates.speed * closing_m_per_s;
     let (law, at) = crush_curve(model, speed_m_per_s)?;
     let loading = coordinates.per_end(&at.standing_n, scale)?;
@@ -86,7 +86,7 @@ pub(super) fn crush_end(
     let plates_m_per_n = if end.at == Role::Wall { 1.0 } else { 0.5 } / PLATES_N_PER_M;
     let of_end = |k: f64| {
         let m_per_n = 1.0 / (k * coordinates.deflection * scale);
-        1.0 / (m_per_n - plates_m_per_n).max(LEAST_OF_END * m_per_n)
+        1.0 / (m_per_n - plates_m_per_n).max(MIN_END_COMPLIANCE_SHARE * m_per_n)
     };
     let unloading = CurveUnloading::of(stiffness.map(of_end));
     let mut warnings = warnings(model, speed_m_per_s);
@@ -117,7 +117,7 @@ pub(super) fn crush_end(
 /// `speed_m_per_s`: each is moved by `F_f M/(M − m_s)`.
 pub(super) fn crush_between(
     model: &Model,
-    slot: &Slot<'_>,
+    slot: &Connection<'_>,
     (behind, ahead): (usize, Option<usize>),
     speed_m_per_s: f64,
     scale: f64,
@@ -146,7 +146,7 @@ fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCur
     model.crush_curve(speed_m_per_s).ok_or_else(|| {
         error!(
             Scenario at "model",
-            "its group \"{}\" tells no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve",
+            "its group \"{}\" has no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve",
             model.group
         )
     })

@@ -7,7 +7,7 @@ use crate::multibody::{Body, Resistance};
 #[derive(Default)]
 pub(super) struct Layout<'a> {
     pub bodies: Vec<Body>,
-    pub slots: Vec<Slot<'a>>,
+    pub slots: Vec<Connection<'a>>,
     /// Bodies as the scenario lists them: vehicle, its front, its rear.
     pub order: Vec<usize>,
     /// The body of each vehicle, as the scenario lists them.
@@ -15,10 +15,10 @@ pub(super) struct Layout<'a> {
 }
 
 /// A place for an interface.
-pub(super) struct Slot<'a> {
+pub(super) struct Connection<'a> {
     /// `A1|A2`, the one nearer to the nose first.
     pub name: String,
-    pub joint: Joint<'a>,
+    pub joint: ConnectionKind<'a>,
     /// Free distance, if the curve's own does not hold.
     pub gap_m: Option<f64>,
     pub role: Role,
@@ -30,7 +30,7 @@ pub(super) struct Slot<'a> {
 
 /// What acts at a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Joint<'a> {
+pub(super) enum ConnectionKind<'a> {
     Curve(&'a str),
     /// The crush law of a model, between body and crush zone.
     End(End<'a>),
@@ -52,7 +52,7 @@ pub(super) struct End<'a> {
     pub at: Role,
 }
 
-impl<'a> Joint<'a> {
+impl<'a> ConnectionKind<'a> {
     /// The curve of the scenario that it needs.
     pub(super) fn curve(&self) -> Option<&'a str> {
         match self {
@@ -105,7 +105,7 @@ pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
     };
     let gap_m = contact.gap.map(|g| g.0);
     let joint = joint(nose.front_zone(), contact.curve.as_deref());
-    layout.slots.push(Slot { name, joint, gap_m, role, mass_kg, split });
+    layout.slots.push(Connection { name, joint, gap_m, role, mass_kg, split });
     if let Some(second) = scenario.train.get(1) {
         for (i, vehicle) in second.vehicles.iter().enumerate() {
             let is_last = i + 1 == second.vehicles.len();
@@ -123,11 +123,11 @@ pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
 
 /// What acts between two ends, or an end and the wall: plates if `end` comes from a model, as the
 /// other one then does.
-fn joint<'a>(end: Option<CrushZone<'a>>, curve: Option<&'a str>) -> Joint<'a> {
+fn joint<'a>(end: Option<CrushZone<'a>>, curve: Option<&'a str>) -> ConnectionKind<'a> {
     if end.is_some_and(|end| end.is_of_model()) {
-        Joint::Plates
+        ConnectionKind::Plates
     } else {
-        Joint::Curve(curve.unwrap_or_default())
+        ConnectionKind::Curve(curve.unwrap_or_default())
     }
 }
 
@@ -162,25 +162,26 @@ impl<'a> Layout<'a> {
         let plate_kg = PLATE * vehicle.mass.0;
         let plates = [&before, &after].into_iter().flatten().filter(|z| z.2.is_of_model());
         let plates_kg = plate_kg * plates.count() as f64;
-        let within = |zone_name: &str, zone: &CrushZone<'a>, body: usize, zone_body: usize| Slot {
-            name: format!("{zone_name}|{name}"),
-            joint: if !zone.is_of_model() {
-                Joint::Curve(zone.curve)
-            } else {
-                Joint::End(End {
-                    curve: zone.curve,
-                    body,
-                    zone: zone_body,
-                    behind: body,
-                    ahead: None,
-                    at: Role::Wall,
-                })
-            },
-            gap_m: Some(0.0),
-            role: Role::Within,
-            mass_kg: vehicle.mass.0,
-            split: true,
-        };
+        let within =
+            |zone_name: &str, zone: &CrushZone<'a>, body: usize, zone_body: usize| Connection {
+                name: format!("{zone_name}|{name}"),
+                joint: if !zone.is_of_model() {
+                    ConnectionKind::Curve(zone.curve)
+                } else {
+                    ConnectionKind::End(End {
+                        curve: zone.curve,
+                        body,
+                        zone: zone_body,
+                        behind: body,
+                        ahead: None,
+                        at: Role::Wall,
+                    })
+                },
+                gap_m: Some(0.0),
+                role: Role::Within,
+                mass_kg: vehicle.mass.0,
+                split: true,
+            };
         let mut body = |place: usize, name: &str, mass_kg: f64| {
             places[place] = Some(self.bodies.len());
             let body = Body::new(name, mass_kg, train.speed.0);
@@ -204,7 +205,7 @@ impl<'a> Layout<'a> {
         let (ahead, behind) = (&train.vehicles[i], &train.vehicles[i + 1]);
         let curve = ahead.behind.as_deref().or(train.inner.as_deref());
         let joint = joint(ahead.rear_zone(), curve);
-        self.slots.push(Slot {
+        self.slots.push(Connection {
             name: format!("{}|{}", ahead.name, behind.name),
             gap_m: ahead.gap.or(train.gap).map(|gap| gap.0),
             joint,
@@ -218,7 +219,7 @@ impl<'a> Layout<'a> {
     /// bodies `k` and `k + 1`.
     fn join_ends(&mut self) {
         for k in 0..self.slots.len() {
-            if self.slots[k].joint != Joint::Plates {
+            if self.slots[k].joint != ConnectionKind::Plates {
                 continue;
             }
             // The plates are bodies k and k + 1, their vehicles one further.
@@ -226,7 +227,9 @@ impl<'a> Layout<'a> {
             let behind = k.saturating_sub(1);
             let ahead = (at != Role::Wall).then_some(k + 2);
             for end in [k.checked_sub(1), Some(k + 1)].into_iter().flatten() {
-                if let Some(Joint::End(end)) = self.slots.get_mut(end).map(|slot| &mut slot.joint) {
+                if let Some(ConnectionKind::End(end)) =
+                    self.slots.get_mut(end).map(|slot| &mut slot.joint)
+                {
                     (end.behind, end.ahead, end.at) = (behind, ahead, at);
                 }
             }

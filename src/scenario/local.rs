@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::assemble::assemble_at;
-use super::layout::{Joint, Role, layout};
+use super::layout::{ConnectionKind, Role, layout};
 use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, Sources};
 use crate::error::Error;
 use crate::multibody::{Chain, Method, Run, simulate};
@@ -135,14 +135,14 @@ fn slow_interfaces(prepared: &Prepared, sources: &Sources) -> Vec<String> {
 }
 
 /// Whether a slot's curve depends on its own closing speed: between vehicles, from a model.
-fn is_local(joint: &Joint<'_>, role: Role, sources: &Sources) -> bool {
+fn is_local(joint: &ConnectionKind<'_>, role: Role, sources: &Sources) -> bool {
     match joint {
-        Joint::Curve(curve) => {
+        ConnectionKind::Curve(curve) => {
             role == Role::Vehicles
                 && matches!(sources.curves.get(*curve), Some(CurveSource::Model(_)))
         }
-        Joint::End(end) => end.at == Role::Vehicles,
-        Joint::Plates => false,
+        ConnectionKind::End(end) => end.at == Role::Vehicles,
+        ConnectionKind::Plates => false,
     }
 }
 

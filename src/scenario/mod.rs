@@ -73,7 +73,7 @@ pub struct Prepared {
     /// Bodies as the scenario lists them: indices into the chain, first train first.
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
-    pub(crate) used: Vec<Used>,
+    pub(crate) used: Vec<CurveInUse>,
     /// Limits that results are held against.
     pub(crate) limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
@@ -101,7 +101,7 @@ impl Prepared {
 
 /// What an interface uses.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Used {
+pub(crate) struct CurveInUse {
     /// Name of its curve in the scenario.
     pub(crate) curve: String,
     /// Which force it is, where that is known: `contact` or `body`.

@@ -28,7 +28,7 @@ pub(crate) enum CurveSource {
     Case(Box<Case>),
 }
 
-/// Over this length the force steps from one stage to the next: a step is no function.
+/// Over this length the force steps from one stage to the next: a step is not a function.
 const STEP_M: f64 = 1e-4;
 
 impl Scenario {
@@ -84,9 +84,9 @@ impl Sources {
 
     /// Makes a model's crush law one without stopped mass, in which the contact force itself has the
     /// rate.
-    pub(crate) fn forget_stopped_mass(&mut self, curve: &str) {
+    pub(crate) fn without_stopped_mass(&mut self, curve: &str) {
         if let Some(CurveSource::Model(model)) = self.curves.get_mut(curve) {
-            model.forget_stopped_mass();
+            model.without_stopped_mass();
         }
     }
 

@@ -1,8 +1,8 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
-use super::layout::{Role, Slot};
+use super::layout::{Connection, Role};
 use super::{CurveSource, CurveTable as Table, EndName, LawName};
-use crate::curve::driving::NoDrivingCurve;
+use crate::curve::driving::DrivingCurveError;
 use crate::curve::{DrivingCurve, ForceKind};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
@@ -21,7 +21,7 @@ pub(super) fn scale_error(factor: f64) -> Error {
     error!(Scenario at "scale", "scale = {factor}: expected more than 0")
 }
 
-/// The error of a curve that is no envelope, or none any more.
+/// The error of a curve that is not an envelope, or none any more.
 fn envelope_error(error: Error) -> Error {
     error.coded(ErrorCode::Scenario)
 }
@@ -35,7 +35,7 @@ fn predict_error(error: Error) -> Error {
 pub(super) fn spring(
     source: &CurveSource,
     table: &Table,
-    slot: &Slot<'_>,
+    slot: &Connection<'_>,
     speed_m_per_s: f64,
 ) -> Result<Spring, Error> {
     let (declared, has_body) = match source {
@@ -72,9 +72,9 @@ pub(super) fn spring(
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
             let curve = DrivingCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
             let curve = curve.map_err(|error| match error {
-                NoDrivingCurve::Envelope(error) => envelope_error(error),
-                NoDrivingCurve::NoMotion => {
-                    error!(Scenario, "its sampled states make no loading branch")
+                DrivingCurveError::Envelope(error) => envelope_error(error),
+                DrivingCurveError::NoMotion => {
+                    error!(Scenario, "its samples contain no loading branch")
                 }
             })?;
             Spring { curve, warnings: truncated.into_iter().collect() }
@@ -98,7 +98,7 @@ pub(super) fn spring(
 fn of_model(
     model: &Model,
     table: &Table,
-    slot: &Slot<'_>,
+    slot: &Connection<'_>,
     speed_m_per_s: f64,
     force: Option<ForceKind>,
 ) -> Result<Spring, Error> {
@@ -144,7 +144,7 @@ const ONLY_CONTACT: &str = "it has a contact force only, which a vehicle of one 
 /// of its own, the contact force drives it, and a body force would count that mass twice.
 fn which_force(
     asked: Option<ForceKind>,
-    slot: &Slot<'_>,
+    slot: &Connection<'_>,
     declared: Option<ForceKind>,
     has_body: bool,
 ) -> Result<Option<ForceKind>, Error> {

@@ -335,7 +335,7 @@ impl CrushZone<'_> {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {
-    /// Part of the vehicle's mass. If absent, the curve is a model, which tells how much mass the
+    /// Part of the vehicle's mass. If absent, the curve is a model, which knows how much mass the
     /// crush zone stops.
     pub(crate) mass: Option<MassText>,
     /// Curve between it and the body.

@@ -30,7 +30,7 @@ pub enum ReadError {
         known: String,
     },
     /// The file is not of the format that was named.
-    #[error("{path}: this is no {format}: it looks like a {looks_like}, read it as that")]
+    #[error("{path}: this is not a {format}: it looks like a {looks_like}, read it as that")]
     OtherFormat {
         /// The file.
         path: PathBuf,

@@ -52,14 +52,14 @@ pub(super) fn is_continuation(path: &Path) -> bool {
 }
 
 /// Continuations looked for behind one that is missing.
-const LOOKED_AHEAD: usize = 20;
+const MAX_MISSING_FILES: usize = 20;
 
 /// The first continuation that is missing although later ones are there, of any of the files.
 pub(crate) fn missing_continuation(path: &Path) -> Option<String> {
     let first = |path: &Path| (1..).find(|&n| !continuation(path, n).is_file()).unwrap_or(1);
     family(path).iter().filter(|part| !is_continuation(part)).find_map(|part| {
         let missing = first(part);
-        let later = missing + 1..=missing + LOOKED_AHEAD;
+        let later = missing + 1..=missing + MAX_MISSING_FILES;
         let missing = continuation(part, missing);
         let name = missing.file_name()?.to_string_lossy().into_owned();
         later.into_iter().any(|n| continuation(part, n).is_file()).then_some(name)

@@ -81,7 +81,7 @@ pub use source::{Source, Window};
 /// # Errors
 /// [`ReadError`] if the file cannot be opened, its kind is not known, it has several
 /// sections and none is selected, or a selected section, id or component is not in it.
-/// Damage within the file is no error: see [`SolverFile::problems`].
+/// Damage within the file is not error: see [`SolverFile::problems`].
 pub fn read(
     path: &Path,
     format: Option<&str>,
@@ -149,7 +149,7 @@ pub fn read_sections(
             "binout" if is_container => {
                 "this is an LSDA container, but it has no section of a binout"
             }
-            "binout" => "this is no LSDA container",
+            "binout" => "this is not an LSDA container",
             _ => "it has no history that is read",
         }
         .into(),

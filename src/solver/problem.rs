@@ -133,12 +133,12 @@ impl Place {
 
 /// Collects problems up to a bound.
 #[derive(Debug, Default)]
-pub(crate) struct Problems {
+pub(crate) struct Diagnostics {
     kept: Vec<Problem>,
     dropped: usize,
 }
 
-impl Problems {
+impl Diagnostics {
     pub(crate) fn add(
         &mut self,
         code: ProblemCode,
@@ -178,7 +178,7 @@ impl Problems {
     }
 }
 
-impl Extend<Problem> for Problems {
+impl Extend<Problem> for Diagnostics {
     fn extend<T: IntoIterator<Item = Problem>>(&mut self, problems: T) {
         problems.into_iter().for_each(|problem| self.push(problem));
     }

@@ -1,6 +1,6 @@
 //! States that a restart wrote again, and states whose time is out of order.
 
-use super::problem::{Place, Problem, ProblemCode, Problems};
+use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 
 /// Indices of the states that count, by one rule for all files: of what was written again the
 /// last writing. A single state whose time is before its neighbours' stays where the file has
@@ -16,8 +16,8 @@ pub(crate) fn resolve(
     is_same: impl Fn(usize, usize) -> Option<bool>,
     place: impl Fn(usize) -> Option<Place>,
     of: &str,
-) -> (Vec<usize>, Problems) {
-    let mut problems = Problems::default();
+) -> (Vec<usize>, Diagnostics) {
+    let mut problems = Diagnostics::default();
     let mut kept: Vec<usize> = Vec::with_capacity(time.len());
     for i in 0..time.len() {
         let goes_back = i > 0 && time[i] < time[i - 1];

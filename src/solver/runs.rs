@@ -32,12 +32,12 @@ pub(crate) struct RunFolders {
 /// Hidden folders are passed over; a folder that is reached by several links counts once.
 pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
     if !fs::metadata(root)?.is_dir() {
-        let message = "this is no folder: give a run's folder, or one above runs";
+        let message = "this is not a folder: give a run's folder, or one above runs";
         return Err(io::Error::new(io::ErrorKind::NotADirectory, message));
     }
     root.read_dir()?;
     let mut walk = Walk { found: RunFolders::default(), seen: HashSet::new() };
-    walk.look_into(root, 0);
+    walk.scan_folder(root, 0);
     Ok(walk.found)
 }
 
@@ -89,7 +89,7 @@ struct Walk {
 }
 
 impl Walk {
-    fn look_into(&mut self, folder: &Path, depth: usize) {
+    fn scan_folder(&mut self, folder: &Path, depth: usize) {
         let place = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
         if self.seen.len() >= MOST_FOLDERS || !self.seen.insert(place) {
             return;
@@ -101,7 +101,7 @@ impl Walk {
             Ok((_, below)) if below.is_empty() || depth == DEEPEST => {
                 self.found.without_files.push(folder.into());
             }
-            Ok((_, below)) => below.iter().for_each(|path| self.look_into(path, depth + 1)),
+            Ok((_, below)) => below.iter().for_each(|path| self.scan_folder(path, depth + 1)),
         }
     }
 }

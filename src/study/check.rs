@@ -2,14 +2,14 @@
 
 use std::collections::HashSet;
 
-use super::manifest::{Head, Manifest, RunEntry, StudyKind};
+use super::manifest::{Manifest, RunEntry, StudyHeader, StudyKind};
 use crate::curve::Parameter;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::recipe::{ForceSource, Recipe};
 use crate::error::{Error, KeyPath, error};
 
 pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
-    let Head { name, group, kind, half_model, .. } = &manifest.study;
+    let StudyHeader { name, group, kind, half_model, .. } = &manifest.study;
     check_name("study.name", name, true)?;
     // A build removes the cases of its study that it does not know.
     if name == IMPORTED {
@@ -36,7 +36,7 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
         (StudyKind::Wall, true, _) => {
             return Err(error!(
                 Study at "study.half_model",
-                "half_model = true needs kind = \"pair\": a wall is no symmetry plane of a pair"
+                "half_model = true needs kind = \"pair\": a wall run has no symmetry plane"
             ));
         }
         _ => {}
@@ -118,7 +118,7 @@ fn check_parameters(entry: &RunEntry) -> Result<(), Error> {
         let at = KeyPath::of("parameters").key(name);
         let of = format!("run \"{}\": parameter \"{}\"", entry.path, name.escape_debug());
         if name.trim().is_empty() || name.contains(|c: char| c.is_control() || c == '=') {
-            return Err(error!(Study, "{of} is no name").at(at.itself()));
+            return Err(error!(Study, "{of} is not a name").at(at.itself()));
         }
         if TAKEN.contains(&name.as_str()) {
             return Err(
@@ -136,7 +136,7 @@ fn check_parameters(entry: &RunEntry) -> Result<(), Error> {
 fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
     let shown = name.escape_debug();
     if name.trim().is_empty() || name == "." || name == ".." {
-        return Err(error!(Study at key, "{key} = \"{shown}\" is no name"));
+        return Err(error!(Study at key, "{key} = \"{shown}\" is not a name"));
     }
     if name.contains(|c: char| c.is_control() || (c == '/' && !slash)) {
         return Err(error!(

@@ -5,7 +5,7 @@ use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
 use super::twin::compare_twin;
 use super::{RunError, absolute};
-use crate::curve::extract::{DeckSpeed, Extracted, Remarks, Setup, extract};
+use crate::curve::extract::{DeckSpeed, Extracted, Notes, Setup, extract};
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::unit::UnitSystem;
@@ -13,7 +13,7 @@ use crate::unit::UnitSystem;
 impl LocatedRun<'_> {
     /// Reads the selected histories and extracts the case.
     pub(crate) fn extract(&self) -> Result<Case, RunError> {
-        let mut remarks = Remarks { notes: self.deck_notes.clone(), ..Remarks::default() };
+        let mut remarks = Notes { notes: self.deck_notes.clone(), ..Notes::default() };
         let units = remarks.take(self.units()?);
         let files = RunFiles::read(self, &self.study.manifest.recipe)?;
         let extracted = self.curve(&files, units)?;
@@ -28,8 +28,8 @@ impl LocatedRun<'_> {
     }
 
     /// The manifest's units, or those that the deck states.
-    fn units(&self) -> Result<(UnitSystem, Remarks), RunError> {
-        let mut remarks = Remarks::default();
+    fn units(&self) -> Result<(UnitSystem, Notes), RunError> {
+        let mut remarks = Notes::default();
         let stated = self.deck.as_ref().and_then(|deck| {
             let units = deck.deck.units.as_ref()?;
             Some((shown_name(&deck.file.path), units, units.system?))
@@ -91,8 +91,8 @@ impl LocatedRun<'_> {
     }
 
     /// What is to be said of the files: the side that was chosen, twins, notes and damage.
-    fn of_files(&self, files: &RunFiles<'_>) -> Result<Remarks, RunError> {
-        let mut remarks = Remarks::default();
+    fn of_files(&self, files: &RunFiles<'_>) -> Result<Notes, RunError> {
+        let mut remarks = Notes::default();
         if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force
             && let Some(side) = files.force_history()?.entity.and_then(|e| e.side)
         {
@@ -119,7 +119,7 @@ impl LocatedRun<'_> {
         files: &RunFiles<'_>,
         units: UnitSystem,
         extracted: Extracted,
-        remarks: Remarks,
+        remarks: Notes,
     ) -> Case {
         let head = &self.study.manifest.study;
         let read = files.each().into_iter().map(|read| self.source(read));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::files::{Located, force_file, hashed_family, locate_file, shown_name};
 use super::{RunEntry, RunError, Study};
-use crate::curve::made_of::made_of;
+use crate::curve::source_hash::source_hash;
 use crate::file;
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
@@ -126,9 +126,9 @@ impl Study {
 
 impl LocatedRun<'_> {
     /// What its case is made of, whatever it is called.
-    pub(crate) fn made_of(&self) -> Option<String> {
+    pub(crate) fn source_hash(&self) -> Option<String> {
         let files = self.files.iter().chain(self.deck.iter().map(|deck| &deck.file));
-        made_of(&self.recipe, files.map(|file| file.blake3.as_str()))
+        source_hash(&self.recipe, files.map(|file| file.blake3.as_str()))
     }
 
     /// The problems of the run's files, found by reading all of them, each with its file's name.

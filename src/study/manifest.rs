@@ -16,7 +16,7 @@ use crate::unit::{
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// What all runs share.
-    pub study: Head,
+    pub study: StudyHeader,
     /// How a curve is made of a run.
     pub recipe: Recipe,
     /// One entry per FE run.
@@ -26,7 +26,7 @@ pub struct Manifest {
 /// What all runs of a study share.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Head {
+pub struct StudyHeader {
     /// Name of the study.
     pub name: String,
     /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
@@ -91,7 +91,7 @@ pub struct RunEntry {
     /// half of each thickness).
     pub gap: Option<LengthText>,
     /// Deflection at contact: above 0 for a record that begins crushed, below 0 for slack that
-    /// is no crush.
+    /// is not crush.
     pub offset: Option<SignedLengthText>,
     /// Solver's time behind which the record is not used.
     pub truncate: Option<InstantText>,
@@ -115,18 +115,18 @@ pub struct Sign(pub(super) i64);
 /// A sign that is neither 1 nor −1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("sign = {found}: expected 1 or -1")]
-pub struct NoSign {
+pub struct SignError {
     /// As written.
     pub found: i64,
 }
 
 impl TryFrom<i64> for Sign {
-    type Error = NoSign;
+    type Error = SignError;
 
-    fn try_from(sign: i64) -> Result<Self, NoSign> {
+    fn try_from(sign: i64) -> Result<Self, SignError> {
         match sign {
             1 | -1 => Ok(Self(sign)),
-            found => Err(NoSign { found }),
+            found => Err(SignError { found }),
         }
     }
 }

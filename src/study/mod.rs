@@ -22,11 +22,11 @@ use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub use error::RunError;
 pub(crate) use locate::LocatedRun;
-pub use manifest::Head;
 pub use manifest::Manifest;
-pub use manifest::NoSign;
 pub use manifest::RunEntry;
 pub use manifest::Sign;
+pub use manifest::SignError;
+pub use manifest::StudyHeader;
 pub use manifest::StudyKind;
 
 /// A manifest that makes sense, and where it stands.
@@ -47,7 +47,7 @@ pub(crate) fn load(path: &Path) -> Result<Study, Error> {
 /// Parses and checks the text of a study manifest; `path` is for messages.
 ///
 /// # Errors
-/// If the text is no manifest, or what it says makes no sense.
+/// If the text is not a manifest, or what it says makes no sense.
 pub fn parse(path: &Path, text: &str) -> Result<Study, Error> {
     let manifest = toml_file::parse(path, text)?;
     let document = Document::new(path, text);

@@ -1,7 +1,7 @@
 //! A text file and the binary file beside it that should hold the same.
 
 use super::files::{Located, shown_name};
-use crate::curve::extract::Remarks;
+use crate::curve::extract::Notes;
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
 
@@ -9,8 +9,8 @@ use crate::solver::{self, Selection, SolverFile, WantedId};
 const SAME_VALUE: f64 = 1e-5;
 
 /// Which of text file and binout was read, and whether they differ.
-pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Remarks {
-    let mut remarks = Remarks::default();
+pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Notes {
+    let mut remarks = Notes::default();
     let name = &file.file;
     if let Some(section) = &file.section {
         remarks.note(format!("{name}: read from section {section} of {}", shown_name(&file.path)));

@@ -308,7 +308,7 @@ impl Band {
         self.of_interpolation().and(self.scatter.map(mean)).pointwise_share
     }
 
-    /// The same band over another span; `None` if the scaled widths are no finite numbers.
+    /// The same band over another span; `None` if the scaled widths are not finite numbers.
     pub(crate) fn over(self, span_m_per_s: f64) -> Option<Self> {
         let factor = (span_m_per_s / self.span_m_per_s).powf(self.left_out.power());
         let interpolation = self.of_interpolation();
@@ -470,7 +470,7 @@ mod tests {
         assert_eq!(gap_m_per_s(&[5.0, 5.0], 5.0), None);
         let outside = |v: f64| distance_outside_m_per_s(&speeds, v);
         assert_eq!([outside(3.0), outside(5.0), outside(9.0), outside(15.0)], [2.0, 0.0, 0.0, 2.0]);
-        assert_eq!(outside(13.000001), 0.0, "rounding is no extrapolation");
+        assert_eq!(outside(13.000001), 0.0, "rounding is not extrapolation");
     }
 
     #[test]

@@ -104,12 +104,12 @@ pub(super) struct Curves {
     pub declared: Vec<CaseCurve>,
     pub body: Vec<CaseCurve>,
     /// Of the curves of the declared force and of the body's, once it was asked for.
-    pub kinks: [Cached<Kink>; 2],
+    pub kinks: [Cached<SlopeJump>; 2],
 }
 
 /// How far single points of the curves lie above or below both of their neighbours, in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Kink {
+pub(super) struct SlopeJump {
     /// Distance of the neighbours.
     pub step_m: f64,
     pub most_n: f64,

@@ -67,7 +67,7 @@ fn over_interval(
         d.insert(0, 0.0);
         f.insert(0, force_n[0]);
     }
-    // One point, or a force that is no number, has no mean.
+    // One point, or a force that is not a number, has no mean.
     let (Some(&end_m), Ok(force)) = (along_m.last(), Envelope::new(d, f)) else {
         return force_n.to_vec();
     };

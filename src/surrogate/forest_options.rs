@@ -22,14 +22,14 @@ pub struct ForestOptions {
     /// Which points of the loading branches it learns from.
     pub table: TableKind,
     /// Whether each tree sees a sample drawn with replacement, or all points.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub bootstrap: bool,
     /// Whether the leaves keep their members, for quantiles.
     #[serde(default)]
     pub quantiles: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 

@@ -14,7 +14,7 @@ const STEPS: usize = 500;
 const JUMP: f64 = 3.0;
 /// if it is also more than this share of the crush: smaller ones are scatter of the search.
 const LEAST_JUMP: f64 = 0.03;
-/// A curve's start and this last share of it are no landmarks: a force that still rises when
+/// A curve's start and this last share of it are not landmarks: a force that still rises when
 /// the body stops has not reached its peak.
 const END: f64 = 0.02;
 /// Slopes that a warp may have between landmarks.

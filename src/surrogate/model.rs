@@ -4,7 +4,7 @@ use crate::error::{Error, error};
 use std::sync::Arc;
 
 use super::band::{self, Band};
-use super::cases::{Curves, Kink, ModelCase};
+use super::cases::{Curves, ModelCase, SlopeJump};
 use super::crush_law::{CrushCurve, CrushLaw};
 use super::curves::interpolate_held;
 use super::entry::FitInput;
@@ -20,7 +20,7 @@ use crate::dataset::{Feature, TrainingSet, nearest};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A nearest training speed further away than this share of the speed causes a warning.
-const FAR: f64 = 0.25;
+const FAR_OUTSIDE_SHARE: f64 = 0.25;
 
 /// A surrogate fitted to a group, for the declared force and for the body's.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ impl Model {
         };
         let speed = |i: usize| cases[i].speed_m_per_s;
         let needed_law = if kind.entry().needs_crush_law {
-            crush_law(set, &curves.declared).filter(|law| law.stopped.is_told())
+            crush_law(set, &curves.declared).filter(|law| law.stopped.is_known())
         } else {
             None
         };
@@ -206,7 +206,7 @@ impl Model {
         match band::at(inner, ends, &speeds, at.speed_m_per_s) {
             Some(band) => Ok(Some(band)),
             None => Err(Warning::no_band(
-                "no speed that was left out tells how far FE may lie from a curve here",
+                "no left-out speed shows how far FE may lie from a curve here",
             )),
         }
     }
@@ -251,7 +251,7 @@ impl Model {
     }
 
     /// Makes its crush law one without stopped mass, in which the contact force itself has the rate.
-    pub(crate) fn forget_stopped_mass(&mut self) {
+    pub(crate) fn without_stopped_mass(&mut self) {
         if let Some(law) = &self.crush_law {
             self.crush_law = Some(law.without_stopped_mass(&self.curves.declared));
         }
@@ -299,7 +299,7 @@ impl Model {
         let of_body = of_body && !body.is_empty();
         let curves = if of_body { body } else { declared };
         let kept = self.curves.kinks[usize::from(of_body)]
-            .get_or_compute(|| Kink { step_m, most_n: most(curves) });
+            .get_or_compute(|| SlopeJump { step_m, most_n: most(curves) });
         if kept.step_m == step_m { kept.most_n } else { most(curves) }
     }
 
@@ -315,7 +315,7 @@ impl Model {
         let nearest = self.cases[nearest(speeds(), v)].speed_m_per_s;
         if !(low..=high).contains(&v) {
             warnings.push(Warning::out_of_range(v, low, high));
-        } else if (nearest / v - 1.0).abs() > FAR {
+        } else if (nearest / v - 1.0).abs() > FAR_OUTSIDE_SHARE {
             warnings.push(Warning::far_from_training(v, nearest));
         }
         warnings.extend(self.features_outside(at).map(|(feature, asked, low, high)| {

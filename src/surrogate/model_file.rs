@@ -71,7 +71,7 @@ impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// With the place in the file where it is no model of ours.
+    /// With the place in the file where it is not a model of ours.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = file::read(path, MAX_BYTES).map_err(|source| {
             error!(Model, "{path}: {source}", path = path.display()).caused_by(source)
@@ -87,7 +87,7 @@ impl Model {
         let no_model = |line, column, detail| {
             error!(
                 Model,
-                "{path}: line {line}, column {column}: this is no model file ({detail}): give one made by crumple train",
+                "{path}: line {line}, column {column}: this is not a model file ({detail}): give one made by crumple train",
                 path = path.display()
             )
         };
@@ -171,7 +171,7 @@ impl Model {
             .iter()
             .flat_map(|of| [of.band, of.band_outside, of.body_band, of.body_band_outside]);
         if !bands.flatten().all(|band| band.is_sound()) {
-            return Err("the widths or the span of its band are no measurement".into());
+            return Err("the widths or the span of its band are not a measurement".into());
         }
         let masses = [Some(self.mass_kg), self.other_mass_kg];
         if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {

@@ -23,7 +23,7 @@ pub(crate) use super::predicted::ForestQuantiles;
 pub use super::predicted::PredictedCurve;
 pub(crate) use super::predicted::Provenance;
 pub use super::query::Query;
-use super::query::{Asked, over_speed};
+use super::query::{ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
 use crate::curve::{DrivingCurve, Envelope, ForceKind};
@@ -99,7 +99,7 @@ pub fn predict_beyond(model: &Model, query: &Query) -> Result<(PredictedCurve, B
 
 /// The motion that the body's force gives, beyond any maximal crush.
 struct Motion<'a> {
-    asked: Asked<'a>,
+    asked: ResolvedQuery<'a>,
     query: &'a Query,
     /// Body force over even deflections.
     body: Envelope,
@@ -107,7 +107,7 @@ struct Motion<'a> {
 
 impl<'a> Motion<'a> {
     fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
-        let asked = Asked::new(model, query)?;
+        let asked = ResolvedQuery::new(model, query)?;
         let longest = model.cases.iter().map(|c| c.max_deflection_m).fold(0.0, f64::max);
         let along = grid(REACH * longest, POINTS);
         let force_n = model.body_force_n(&asked.at(), &along);
@@ -122,7 +122,7 @@ impl<'a> Motion<'a> {
 
     /// The declared force in N, at the speeds that the motion gives at these deflections.
     fn declared_n(&self, deflection_m: &[f64]) -> Result<Vec<f64>, Error> {
-        let Asked { model, v, mass_kg, .. } = self.asked;
+        let ResolvedQuery { model, v, mass_kg, .. } = self.asked;
         if !model.has_body_force() {
             return Ok(deflection_m.iter().map(|&d| self.body.force_at(d)).collect());
         }
@@ -316,7 +316,7 @@ struct Banded {
 /// Where the curve comes from and how it was checked, without its bands; energies over the kinetic one are those of
 /// the declared force and of the body's.
 fn provenance(
-    asked: &Asked<'_>,
+    asked: &ResolvedQuery<'_>,
     rule: MaxCrushRule,
     crush: MaxCrush,
     (energy, body_energy): (f64, Option<f64>),

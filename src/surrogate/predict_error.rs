@@ -13,5 +13,5 @@ pub(super) fn envelope(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Enve
 
 /// The error of a predicted curve that is not an envelope.
 pub(crate) fn invalid(error: Error) -> Error {
-    error.coded_as(ErrorCode::Prediction).of("the predicted curve is no curve")
+    error.coded_as(ErrorCode::Prediction).of("the predicted curve is invalid")
 }

@@ -222,7 +222,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// the error or If it does not have that
-    /// force, else the error that its points are no envelope.
+    /// force, else the error that its points are not an envelope.
     pub fn of_force(&self, kind: ForceKind) -> Result<Self, Error> {
         match (kind, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => Err(
@@ -292,7 +292,7 @@ impl PredictedCurve {
     /// The curve of one force that drives an interface.
     ///
     /// # Errors
-    /// If the curve does not have that force, or its points are no envelope.
+    /// If the curve does not have that force, or its points are not an envelope.
     pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, Error> {
         self.driving_member(force, None)
     }

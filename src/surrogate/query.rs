@@ -17,9 +17,9 @@ use crate::unit::Speed;
 /// Deviation of the mass from the training runs' that needs no warning.
 const SAME_MASS: f64 = 1e-3;
 /// Share of a curve over which the force before its largest crush is averaged.
-const LAST: f64 = 0.05;
+const LAST_SHARE_OF_CRUSH: f64 = 0.05;
 /// Power of that force with which the speed of separation goes: the energy given back with its root.
-const OF_LAST_FORCE: f64 = 0.25;
+const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 
 /// What is asked of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +58,7 @@ impl Query {
 }
 
 /// A query with everything that follows from it and the model alone.
-pub(super) struct Asked<'a> {
+pub(super) struct ResolvedQuery<'a> {
     pub model: &'a Model,
     pub v: f64,
     pub masses: Masses,
@@ -70,7 +70,7 @@ pub(super) struct Asked<'a> {
     pub kinetic_energy_j: f64,
 }
 
-impl<'a> Asked<'a> {
+impl<'a> ResolvedQuery<'a> {
     pub(crate) fn new(model: &'a Model, query: &Query) -> Result<Self, Error> {
         let v = query.speed_m_per_s;
         if !(v > 0.0 && v.is_finite()) {
@@ -84,7 +84,7 @@ impl<'a> Asked<'a> {
         if !query.extrapolate && is_far_outside(v, low, high) {
             return Err(error!(
                 Prediction,
-                "{outside}: further outside than a third of the range, where nothing tells how wrong a curve is: run FE at such a speed, or ask for it all the same with --extrapolate",
+                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE at such a speed, or use --extrapolate to get it all the same",
                 outside = outside_of(v, low, high)
             ));
         }
@@ -202,7 +202,8 @@ impl<'a> Asked<'a> {
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };
-    let of_force = |force_n: f64| if force_n > 0.0 { force_n.powf(OF_LAST_FORCE) } else { 0.0 };
+    let of_force =
+        |force_n: f64| if force_n > 0.0 { force_n.powf(SEPARATION_SPEED_EXPONENT) } else { 0.0 };
     let known = |(case, curve): (&ModelCase, &CaseCurve)| {
         let per_force = case.rebound_speed_m_per_s? / of_force(last_force_n(curve.envelope()));
         per_force.is_finite().then_some((case.speed_m_per_s, per_force))
@@ -240,7 +241,7 @@ fn relative_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64> {
 
 /// Mean force in N over the last part of a curve: its very end is a matter of the fold's phase.
 fn last_force_n(curve: &Envelope) -> f64 {
-    let from_m = (1.0 - LAST) * curve.end_m();
+    let from_m = (1.0 - LAST_SHARE_OF_CRUSH) * curve.end_m();
     (curve.work() - curve.work_to(from_m)) / (curve.end_m() - from_m)
 }
 

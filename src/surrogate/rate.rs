@@ -82,7 +82,7 @@ const LEVELS: (f64, f64) = (0.5, 2.0);
 
 /// How the level of a curve against the next faster one is carried on beyond its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Carried {
+struct LevelExtrapolation {
     /// The level is the mean over this last share of the curve.
     last: f64,
     /// Length over which it fades, as a share of the curve's end.
@@ -90,9 +90,9 @@ struct Carried {
 }
 
 /// The level fades to that of the faster curve.
-const ALONE: Carried = Carried { last: 0.15, fades: 0.1 };
+const ALONE: LevelExtrapolation = LevelExtrapolation { last: 0.15, fades: 0.1 };
 /// The impact speed has the level; only the step at the end fades.
-const WITH_IMPACT: Carried = Carried { last: 0.005, fades: 0.05 };
+const WITH_IMPACT: LevelExtrapolation = LevelExtrapolation { last: 0.005, fades: 0.05 };
 
 /// After so many lengths what is left is below rounding.
 const LENGTHS: f64 = 37.0;
@@ -142,7 +142,7 @@ impl Rate {
         of(i) / of(i + 1)
     }
 
-    fn carried(&self) -> Carried {
+    fn carried(&self) -> LevelExtrapolation {
         if self.of_impact.is_some() { WITH_IMPACT } else { ALONE }
     }
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use super::Warning;
 use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound};
-use crate::curve::driving::NoDrivingCurve;
+use crate::curve::driving::DrivingCurveError;
 use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 
@@ -20,10 +20,10 @@ impl PredictedCurve {
     /// piecewise linear.
     ///
     /// # Errors
-    /// If the case's states make no loading branch.
+    /// If the case's states contain no loading branch.
     pub fn of_case(case: &Case) -> Result<Self, Error> {
         let no_curve =
-            |e: NoDrivingCurve| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
+            |e: DrivingCurveError| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
         let of_case = |force: ForceKind| {
             let mut curve = DrivingCurve::of_case(case, force)?;
             if case.moves_by_its_force() {

@@ -52,7 +52,7 @@ const FAR_OUTSIDE: f64 = 1.0 / 3.0;
 /// Whether a speed lies further outside `low` to `high` than a third of that range.
 pub(super) fn is_far_outside(speed_m_per_s: f64, low: f64, high: f64) -> bool {
     let outside = (low - speed_m_per_s).max(speed_m_per_s - high);
-    // A third of a range of km/h is no number of m/s.
+    // A third of a range of km/h is not a number of m/s.
     outside > 0.0 && outside > FAR_OUTSIDE * (high - low) * (1.0 + 1e-9)
 }
 
@@ -142,7 +142,7 @@ impl Warning {
         Self {
             code: WarningCode::FarFromTraining,
             message: format!(
-                "the nearest training speed is {}, {:.0} % from {}: an FE run between would tell more",
+                "the nearest training speed is {}, {:.0} % from {}: an FE run between them would help",
                 km_per_h(nearest),
                 (nearest / speed_m_per_s - 1.0).abs() * 100.0,
                 km_per_h(speed_m_per_s)

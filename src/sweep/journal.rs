@@ -8,7 +8,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::row::Head;
+use super::row::ShardHeader;
 use super::run::{self, Chunk};
 use super::shard_file::{ShardFile, read_line};
 use super::tally::Tally;
@@ -59,7 +59,7 @@ pub fn write(
     // A link is followed, so that its target is replaced and not the link.
     let output = &fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf());
     let _lock = WriterLock::take(output)?;
-    let head = Head::of(sweep, options.shard);
+    let head = ShardHeader::of(sweep, options.shard);
     let part = beside(output, ".part");
     let mut tally = Tally::new(&head);
     if options.restart {
@@ -74,7 +74,7 @@ pub fn write(
         tally.resumed = tally.done;
         return Ok(tally.close());
     }
-    let mut file = take_up(&part, &head, &mut tally)?;
+    let mut file = resume(&part, &head, &mut tally)?;
     tally.resumed = tally.done;
     let write_failed = failed(output);
     let mut flow = progress(tally.done);
@@ -115,7 +115,7 @@ pub fn write_rows(
     options: &WriteOptions,
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, Error> {
-    let head = Head::of(sweep, options.shard);
+    let head = ShardHeader::of(sweep, options.shard);
     let mut tally = Tally::new(&head);
     out.write_all(head.text().as_bytes()).map_err(failed(name))?;
     run::rows(sweep, head.rows(), options.chunk, |chunk| {
@@ -134,13 +134,13 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> Error + '_ {
 }
 
 /// Opens the file under work behind its last whole row; makes it if it is not there.
-fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, Error> {
+fn resume(part: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<File, Error> {
     let io = |source| Error::io(part, source);
     let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(part);
     let mut file = open.map_err(failed(part))?;
     let wanted = head.text();
     let mut reader = BufReader::new(&file);
-    let end = match Head::read(&mut reader).map_err(io)? {
+    let end = match ShardHeader::read(&mut reader).map_err(io)? {
         Some((found, length)) => {
             found.check_same(part, head)?;
             let mut end = length;
@@ -172,7 +172,7 @@ fn take_up(part: &Path, head: &Head, tally: &mut Tally) -> Result<File, Error> {
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.
-fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), Error> {
+fn complete(output: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<(), Error> {
     if is_hdf5(output) {
         return to_hdf5::complete(output, head, tally);
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::row::Head;
+use super::row::ShardHeader;
 use super::shard_file::ShardFile;
 use super::tally::Tally;
 use super::to_hdf5::{self, is_hdf5};
@@ -74,20 +74,20 @@ fn open(path: &Path) -> Result<ShardFile, Error> {
     Err(if first == HDF5_SIGNATURE {
         error!(Sweep, "{path} is HDF5: merge the shards as .csv and name the output .h5 or .hdf5")
     } else {
-        error!(Sweep, "{path} is no result of crumple sweep: give the files of its shards")
+        error!(Sweep, "{path} is not a result of crumple sweep: give the files of its shards")
     })
 }
 
 /// Puts files in the order of their shards and checks that they are all of one sweep; the head
 /// of the whole.
-fn ordered(files: &mut [ShardFile]) -> Result<Head, Error> {
+fn ordered(files: &mut [ShardFile]) -> Result<ShardHeader, Error> {
     let Some(ShardFile { path: first_path, head: first }) = files.first() else {
         return Err(error!(Sweep, "there is nothing to merge: give the files of the shards"));
     };
     let (first_path, first) = (first_path.display().to_string(), first.clone());
     for ShardFile { path, head } in files.iter() {
         let (path, count, first_count) = (path.display(), head.shard.count(), first.shard.count());
-        if head.differs_from(&Head { shard: head.shard, ..first.clone() }).is_some() {
+        if head.differs_from(&ShardHeader { shard: head.shard, ..first.clone() }).is_some() {
             return Err(error!(
                 Sweep,
                 "{path} and {first_path} are of different sweeps: plan, scenario, a file it names or crumple's version differ"
@@ -112,7 +112,7 @@ fn ordered(files: &mut [ShardFile]) -> Result<Head, Error> {
     let count = first.shard.count();
     let there: BTreeSet<u64> = files.iter().map(|file| file.head.shard.index()).collect();
     if there.len() as u64 == count {
-        return Ok(Head { shard: Shard::WHOLE, ..first });
+        return Ok(ShardHeader { shard: Shard::WHOLE, ..first });
     }
     let missing = (1..=count).filter(|index| !there.contains(index));
     let mut listed: Vec<String> = missing.take(LISTED).map(|index| index.to_string()).collect();

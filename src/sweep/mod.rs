@@ -93,7 +93,7 @@ fn damaged(path: &Path, what: &str) -> Error {
 fn foreign(path: &Path) -> Error {
     error!(
         Sweep,
-        "{} is there and is no sweep's: --restart replaces it, another -o keeps it",
+        "{} exists and is not a sweep result: use --restart to replace it, or another -o",
         path.display()
     )
 }

@@ -115,7 +115,7 @@ impl<'a> Line<'a> {
         Some(Self { item, values, status, message })
     }
 
-    /// Number of a field: NaN if it is empty, `None` if it is no number.
+    /// Number of a field: NaN if it is empty, `None` if it is not a number.
     pub(crate) fn number(field: &str) -> Option<f64> {
         if field.is_empty() {
             return Some(f64::NAN);
@@ -126,7 +126,7 @@ impl<'a> Line<'a> {
 
 /// What stands above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Head {
+pub(crate) struct ShardHeader {
     /// Version of the program that wrote it.
     pub version: String,
     /// What tells the sweep from any other, see [`Sweep::hash`].
@@ -142,7 +142,7 @@ pub(crate) struct Head {
 /// Bounds of a header, so that no other file is read for long.
 pub(crate) const MAX_HEAD_BYTES: usize = 1 << 24;
 
-impl Head {
+impl ShardHeader {
     /// The head of a shard of `sweep`.
     pub(crate) fn of(sweep: &Sweep, shard: Shard) -> Self {
         Self {
@@ -221,7 +221,10 @@ impl Head {
     /// Why rows under this head do not belong under `wanted`; `None` if they do.
     pub(crate) fn differs_from(&self, wanted: &Self) -> Option<String> {
         if self.version != wanted.version {
-            return Some(format!("it is of crumple {}, this is {}", self.version, wanted.version));
+            return Some(format!(
+                "it was written by crumple {}; this is {}",
+                self.version, wanted.version
+            ));
         }
         if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
         {

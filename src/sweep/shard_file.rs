@@ -4,14 +4,14 @@ use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::damaged;
-use super::row::{Head, MAX_HEAD_BYTES, bad_row};
+use super::row::{MAX_HEAD_BYTES, ShardHeader, bad_row};
 use crate::error::Error;
 use crate::file;
 
 /// The finished CSV file of a shard.
 pub(super) struct ShardFile {
     pub path: PathBuf,
-    pub head: Head,
+    pub head: ShardHeader,
 }
 
 impl ShardFile {
@@ -19,7 +19,7 @@ impl ShardFile {
     pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, Error> {
         let io = |source| Error::io(path, source);
         let mut reader = BufReader::new(file::open(path).map_err(io)?);
-        let head = Head::read(&mut reader).map_err(io)?;
+        let head = ShardHeader::read(&mut reader).map_err(io)?;
         Ok(head.map(|(head, _)| Self { path: path.into(), head }))
     }
 
@@ -29,12 +29,12 @@ impl ShardFile {
         let io = |source| Error::io(&self.path, source);
         let file = file::open(&self.path).map_err(io)?;
         let mut reader = BufReader::with_capacity(1 << 16, file);
-        Head::read(&mut reader).map_err(io)?;
+        ShardHeader::read(&mut reader).map_err(io)?;
         each_line(&self.path, &mut reader, see, &self.head)
     }
 }
 
-/// Longer lines are no rows: the columns' names fit into as much.
+/// Longer lines are not rows: the columns' names fit into as much.
 const MAX_LINE_BYTES: u64 = MAX_HEAD_BYTES as u64;
 
 /// Reads the next line, or as much of it as a row can have; how many bytes.
@@ -48,7 +48,7 @@ fn each_line(
     path: &Path,
     reader: &mut impl BufRead,
     mut see: impl FnMut(&[u8]) -> Option<()>,
-    head: &Head,
+    head: &ShardHeader,
 ) -> Result<(), Error> {
     let io = |source| Error::io(path, source);
     let mut line = Vec::new();

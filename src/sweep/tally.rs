@@ -1,13 +1,13 @@
 //! What a report says of the rows, counted row by row.
 
 use super::Report;
-use super::row::{Head, Line, Status};
+use super::row::{Line, ShardHeader, Status};
 use super::run::Written;
 use super::statistics::Statistics;
 
 /// What a report needs, row by row.
 pub(super) struct Tally {
-    head: Head,
+    head: ShardHeader,
     statistics: Statistics,
     pub rows: u64,
     pub done: u64,
@@ -21,7 +21,7 @@ pub(super) struct Tally {
 const MESSAGES: usize = 3;
 
 impl Tally {
-    pub(crate) fn new(head: &Head) -> Self {
+    pub(crate) fn new(head: &ShardHeader) -> Self {
         let rows = head.rows().end - head.rows().start;
         let numbers: Vec<String> = (1..head.columns.len())
             .filter(|&c| !head.is_text(c))

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::row::{FORMAT, Head, LAYOUT, Line, Status, bad_row};
+use super::row::{FORMAT, LAYOUT, Line, ShardHeader, Status, bad_row};
 use super::shard_file::ShardFile;
 use super::tally::Tally;
 use super::{Shard, damaged, foreign};
@@ -34,7 +34,7 @@ impl Widths {
     }
 
     /// The datasets of a file of `head`.
-    fn datasets(&self, head: &Head) -> Vec<Column> {
+    fn datasets(&self, head: &ShardHeader) -> Vec<Column> {
         let rows = head.rows().end - head.rows().start;
         let own = head.columns.len() - 1;
         let mut datasets: Vec<Column> = (0..own)
@@ -54,7 +54,7 @@ impl Widths {
     }
 }
 
-fn attributes(head: &Head) -> [(&'static str, Attribute); 6] {
+fn attributes(head: &ShardHeader) -> [(&'static str, Attribute); 6] {
     let number = |n: u64| Attribute::Integer(n as i64);
     [
         ("format", Attribute::Text(FORMAT.into())),
@@ -68,7 +68,7 @@ fn attributes(head: &Head) -> [(&'static str, Attribute); 6] {
 
 /// Writes the rows of CSV files, in this order, as one HDF5 file under `head`. The files have
 /// been written by this program and are read twice.
-pub(super) fn convert(files: &[ShardFile], head: &Head, output: &Path) -> Result<(), Error> {
+pub(super) fn convert(files: &[ShardFile], head: &ShardHeader, output: &Path) -> Result<(), Error> {
     let columns = head.columns.len();
     let mut widths = Widths::new(columns);
     let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), Error> {
@@ -143,8 +143,8 @@ impl<'a, 'p> Block<'a, 'p> {
         }
     }
 
-    /// Takes a row; `None` if a field is no number.
-    fn take(&mut self, line: &Line<'_>, head: &Head) -> io::Result<Option<()>> {
+    /// Takes a row; `None` if a field is not a number.
+    fn take(&mut self, line: &Line<'_>, head: &ShardHeader) -> io::Result<Option<()>> {
         self.held[0].extend((line.item as i64).to_le_bytes());
         for (k, field) in line.values.iter().enumerate() {
             match self.datasets[k + 1].values {
@@ -197,7 +197,7 @@ fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
 struct FinishedTable {
     path: PathBuf,
     table: Table,
-    head: Head,
+    head: ShardHeader,
 }
 
 impl FinishedTable {
@@ -296,7 +296,7 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
 }
 
 /// The head that a file's attributes and columns tell.
-fn head(table: &Table) -> Result<Option<Head>, Error> {
+fn head(table: &Table) -> Result<Option<ShardHeader>, Error> {
     let mut texts = Vec::new();
     for name in ["written_by", "hash", "shard"] {
         match table.attribute(name)? {
@@ -319,11 +319,17 @@ fn head(table: &Table) -> Result<Option<Head>, Error> {
         .and_then(|(index, count)| Shard::new(index.parse().ok()?, count.parse().ok()?));
     let version = texts[0].strip_prefix("crumple ").unwrap_or_default().to_string();
     let parts = shard.zip(u64::try_from(items).ok());
-    Ok(parts.map(|(shard, items)| Head { version, hash: texts[1].clone(), items, shard, columns }))
+    Ok(parts.map(|(shard, items)| ShardHeader {
+        version,
+        hash: texts[1].clone(),
+        items,
+        shard,
+        columns,
+    }))
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.
-pub(super) fn complete(output: &Path, head: &Head, tally: &mut Tally) -> Result<(), Error> {
+pub(super) fn complete(output: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<(), Error> {
     let file = FinishedTable::open(output).map_err(|_| foreign(output))?;
     file.head.check_same(output, head)?;
     file.tally(tally)

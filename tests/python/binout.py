@@ -10,7 +10,7 @@ import sys
 import numpy as np
 from lasso.dyna import Binout
 
-# What a section says of itself, and what is no result of an entity.
+# What a section says of itself, and what is not a result of an entity.
 NOT_COMPARED = {"time", "cycle", "ids", "misc", "setid", "legend_ids", "side", "force_ids",
                 "moment_ids", "spc_ids", "spc_mids", "factor_ids"}
 

@@ -33,7 +33,7 @@ fn groups(path: &Path, scenario: &Scenario) -> Result<BTreeMap<String, (Case, Ve
     let mut groups = BTreeMap::new();
     for (name, table) in &scenario.curves {
         let not_a_case = || {
-            error!(Comparison, "curve \"{curve}\" is no case of a database: to compare methods, write database = \"…\" and case = \"group/case\"", curve = name).at(KeyPath::of("curves").key(name))
+            error!(Comparison, "curve \"{curve}\" is not a case of a database: to compare methods, write database = \"…\" and case = \"group/case\"", curve = name).at(KeyPath::of("curves").key(name))
         };
         let file = folder.join(table.database.as_ref().ok_or_else(not_a_case)?);
         let case = table.case.as_deref().and_then(|c| c.split_once('/'));
@@ -119,7 +119,7 @@ fn crush_methods(
         return Vec::new();
     }
     let mut without = models.clone();
-    groups.keys().for_each(|name| without.forget_stopped_mass(name));
+    groups.keys().for_each(|name| without.without_stopped_mass(name));
     let rates = with_rates(scenario, groups);
     let of = [
         ("rate_only", rates.clone(), without),

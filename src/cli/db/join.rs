@@ -35,7 +35,7 @@ impl How {
     }
 
     fn effect(&self) -> Effect {
-        if self.dry_run { Effect::OnlySaid } else { Effect::Written }
+        if self.dry_run { Effect::DryRun } else { Effect::Written }
     }
 }
 

@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use super::chosen::Chosen;
 use super::row::CaseRow;
-use super::stopped_mass::said;
 use super::{CommandResult, GlobalOptions, Outcome, output};
+use crate::cli::train::stopped_mass_line;
 
 /// A database, and which of its cases.
 #[derive(clap::Args)]
@@ -37,7 +37,7 @@ pub(super) struct Groups<T> {
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
-    // A database without cases has nothing to list, which is no error.
+    // A database without cases has nothing to list, which is not error.
     let cases: Vec<&Case> = if selection.is_all() {
         database.all().collect()
     } else {
@@ -53,8 +53,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     for warning in &warnings {
         options.warn(warning);
     }
-    let told = |group: &String| Some((group.clone(), database.stopped_mass(group)?));
-    let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(told).collect();
+    let of_group = |group: &String| Some((group.clone(), database.stopped_mass(group)?));
+    let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(of_group).collect();
     let outcome = if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned };
     if options.json {
         output::print_json(&Groups { groups, stopped_mass, warnings })?;
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 print_group(out, group, rows)?;
                 if let Some(stopped) = stopped_mass.get(group) {
                     let kind = database.cases(group)[0].conditions.speed.kind;
-                    writeln!(out, "{}", said(stopped, kind))?;
+                    writeln!(out, "{}", stopped_mass_line(stopped, kind))?;
                 }
                 writeln!(out)
             })

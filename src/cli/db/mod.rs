@@ -14,7 +14,7 @@ mod show;
 
 use std::path::PathBuf;
 
-use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, stopped_mass};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output};
 pub(super) use row::CaseRow;
 
 /// List, show, check, add, rename, join, tag and export cases of a curve database

@@ -38,7 +38,7 @@ struct Named {
 
 pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.some("removed")?;
-    let effect = if args.dry_run { Effect::OnlySaid } else { Effect::Written };
+    let effect = if args.dry_run { Effect::DryRun } else { Effect::Written };
     let cases = curate::remove(&args.database, &selection, effect)?;
     let database = args.database.display().to_string();
     if options.json {

@@ -84,7 +84,7 @@ pub enum ExtractError {
     },
     /// No crash can have such a curve.
     #[error("{0}")]
-    Impossible(#[from] energy::Impossible),
+    ImpossibleRun(#[from] energy::ImpossibleRun),
     /// The deflection does not grow after contact.
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
@@ -97,12 +97,12 @@ pub enum ExtractError {
         component: &'static str,
     },
     /// The body does not move in the first state.
-    #[error("the first state does not move: add speed = \"…km/h\" to the run")]
+    #[error("the body is at rest in the first state: add speed = \"…km/h\" to the run")]
     Standing,
     /// The force cannot be filtered.
     #[error("{0}")]
     Filter(#[from] cfc::CfcError),
-    /// The columns are no curve.
+    /// The columns are not a curve.
     #[error("{0}")]
     Curve(#[from] Error),
 }
@@ -114,7 +114,7 @@ impl ExtractError {
             Self::TooShort { origin, .. } | Self::NotFinite { origin, .. } => {
                 *origin == Origin::Force
             }
-            Self::NoContact { .. } | Self::Filter(_) | Self::Impossible(_) => true,
+            Self::NoContact { .. } | Self::Filter(_) | Self::ImpossibleRun(_) => true,
             _ => false,
         }
     }

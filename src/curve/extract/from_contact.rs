@@ -2,7 +2,7 @@
 
 use super::error::ExtractError;
 use super::record::Record;
-use super::remarks::Remarks;
+use super::remarks::Notes;
 use crate::curve::Curve;
 
 /// The record from contact on.
@@ -20,8 +20,8 @@ impl FromContact {
         record: &Record,
         contact_s: f64,
         offset_m: f64,
-    ) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let contact_m = record.at(&record.deflection_m, contact_s)?;
         // A rebound can travel further than the crush: what the impact does first counts.
         let direction = if record.at(&record.rate_m_per_s, contact_s)? < 0.0 { -1.0 } else { 1.0 };

@@ -30,7 +30,7 @@ pub use input::Setup;
 pub use input::Stated;
 pub(crate) use input::StatedContact;
 use record::Record;
-pub(crate) use remarks::Remarks;
+pub(crate) use remarks::Notes;
 use sample::sample;
 use speed::{ImpactSpeed, SpeedBy};
 use start::Start;
@@ -56,7 +56,7 @@ pub struct Extracted {
 /// # Errors
 /// [`ExtractError`] says which history cannot be used and what to change.
 pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, ExtractError> {
-    let mut remarks = Remarks::default();
+    let mut remarks = Notes::default();
     let mut record = remarks.take(Record::of(measured, setup)?);
     // Before the filter, which without phase shift begins ahead of the contact.
     let start = remarks.take(Start::find(measured, setup, &record)?);
@@ -69,7 +69,7 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
     let before = contact.before;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
         remarks.take(ImpactSpeed::of(measured, setup, &record, before)?);
-    let claim = energy::Claim {
+    let claim = energy::StatedConditions {
         curve: &original,
         masses: setup.masses,
         speed,
@@ -112,8 +112,8 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
 }
 
 /// Filters the record's force.
-fn filter(class: u32, record: &mut Record) -> Result<Remarks, ExtractError> {
-    let mut remarks = Remarks::default();
+fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
+    let mut remarks = Notes::default();
     let filtered = cfc::filter(class, &record.time_s, &record.force_n)?;
     if filtered.resampled {
         remarks.note(format!(
@@ -126,8 +126,8 @@ fn filter(class: u32, record: &mut Record) -> Result<Remarks, ExtractError> {
 }
 
 /// What energy, impulse and the loading branch say of a curve.
-fn audited(curve: &Curve, balance: energy::Balance) -> Remarks {
-    let mut remarks = Remarks::default();
+fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
+    let mut remarks = Notes::default();
     // Of a run that ended while loading: of what it had stopped by then.
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         remarks.warn(format!(

@@ -2,7 +2,7 @@
 
 use super::error::{ExtractError, Origin};
 use super::input::{Measured, MeasuredForce, Setup};
-use super::remarks::Remarks;
+use super::remarks::Notes;
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
 use crate::history::History;
@@ -29,8 +29,8 @@ impl Record {
     pub(crate) fn of(
         measured: &Measured<'_>,
         setup: &Setup<'_>,
-    ) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let motion = remarks.take(Motion::of(measured, setup)?);
         let force = remarks.take(force(measured, setup)?);
         let mut record = remarks.take(Self::at_common_times(motion, force)?);
@@ -48,8 +48,8 @@ impl Record {
         Ok((record, remarks))
     }
 
-    fn at_common_times(motion: Motion, force: Signal) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    fn at_common_times(motion: Motion, force: Signal) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let first_rate_m_per_s = motion.rate_m_per_s[0];
         let (from, to) = (motion.time_s[0], motion.time_s[motion.time_s.len() - 1]);
         let pairs = || motion.time_s.iter().zip(&force.time_s);
@@ -149,8 +149,8 @@ impl Signal {
         factor: f64,
         what: &'static str,
         origin: Origin,
-    ) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
             let what = history.label();
             return Err(ExtractError::NotFinite {
@@ -188,8 +188,8 @@ struct Motion {
 }
 
 impl Motion {
-    fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let units = measured.units;
         let bodies = if setup.half_model { 2.0 } else { 1.0 };
         let Signal { time_s, values: deflection_m } = remarks.take(relative(
@@ -224,7 +224,7 @@ fn relative(
     units: UnitSystem,
     factor: f64,
     what: &'static str,
-) -> Result<(Signal, Remarks), ExtractError> {
+) -> Result<(Signal, Notes), ExtractError> {
     let (mut signal, mut remarks) = Signal::of(node, units, factor, what, Origin::Motion)?;
     if let Some(minus) = minus {
         let minus = remarks.take(Signal::of(minus, units, factor, what, Origin::Motion)?);
@@ -236,7 +236,7 @@ fn relative(
 }
 
 /// The force in N, in the direction of the file, at its own rate.
-fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Remarks), ExtractError> {
+fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Notes), ExtractError> {
     let units = measured.units;
     let mass = setup.masses.body_kg;
     let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);

@@ -2,14 +2,14 @@
 
 /// Choices that were made, and what the user should look at.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Remarks {
+pub(crate) struct Notes {
     /// Choices made, for the record.
     pub notes: Vec<String>,
     /// What the user should look at.
     pub warnings: Vec<String>,
 }
 
-impl Remarks {
+impl Notes {
     /// Adds a note.
     pub(crate) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());

@@ -2,7 +2,7 @@
 
 use super::error::ExtractError;
 use super::input::Setup;
-use super::remarks::Remarks;
+use super::remarks::Notes;
 use crate::curve::Curve;
 use crate::signal::resample::interpolate;
 
@@ -12,8 +12,8 @@ pub(super) fn sample(
     original: &Curve,
     closing: &[f64],
     setup: &Setup<'_>,
-) -> Result<((Curve, Vec<f64>), Remarks), ExtractError> {
-    let mut remarks = Remarks::default();
+) -> Result<((Curve, Vec<f64>), Notes), ExtractError> {
+    let mut remarks = Notes::default();
     let sampling = setup.recipe.sampling;
     let at = original.time_s();
     let last_s = at[at.len() - 1];

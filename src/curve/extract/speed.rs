@@ -3,7 +3,7 @@
 use super::error::ExtractError;
 use super::input::{Measured, Setup};
 use super::record::Record;
-use super::remarks::Remarks;
+use super::remarks::Notes;
 use crate::unit::{Speed, km_per_h};
 
 /// Two speeds of one impact may differ by this share before it is said.
@@ -33,8 +33,8 @@ impl ImpactSpeed {
         setup: &Setup<'_>,
         record: &Record,
         before: usize,
-    ) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
         let first = record.first_rate_m_per_s.abs();
         let recorded = measured.velocity.map(|_| record.rate_m_per_s[before].abs());

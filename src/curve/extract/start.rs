@@ -4,7 +4,7 @@ use super::error::{ExtractError, Origin};
 use super::from_contact::FromContact;
 use super::input::{Measured, MeasuredForce, Setup, StatedContact};
 use super::record::{Record, Signal, sign_of_impulse};
-use super::remarks::Remarks;
+use super::remarks::Notes;
 use crate::curve::contact::{self, milliseconds};
 use crate::curve::{Curve, loading};
 use crate::history::History;
@@ -39,18 +39,18 @@ impl Start {
         measured: &Measured<'_>,
         setup: &Setup<'_>,
         record: &Record,
-    ) -> Result<(Self, Remarks), ExtractError> {
+    ) -> Result<(Self, Notes), ExtractError> {
         match setup.stated.contact {
             Some(StatedContact::Time { s: time_s }) => {
                 if !record.holds(time_s) {
                     return Err(record.outside("contact_time", time_s));
                 }
-                let mut remarks = Remarks::default();
+                let mut remarks = Notes::default();
                 remarks.notes.extend(found_elsewhere(record, time_s));
                 Ok((Self { time_s, by: StartBy::Manifest }, remarks))
             }
             Some(StatedContact::Gap { m }) => {
-                let mut remarks = Remarks::default();
+                let mut remarks = Notes::default();
                 let time_s = closing_time(record, m)?;
                 remarks.note(format!("contact: the gap is closed at {}", milliseconds(time_s)));
                 remarks.notes.extend(found_elsewhere(record, time_s));
@@ -61,8 +61,8 @@ impl Start {
     }
 
     /// Where the contact force begins, if the recipe names one; else the record's.
-    fn in_force(measured: &Measured<'_>, record: &Record) -> Result<(Self, Remarks), ExtractError> {
-        let mut remarks = Remarks::default();
+    fn in_force(measured: &Measured<'_>, record: &Record) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
         let onset = match measured.contact {
             Some(contact) => remarks.take(onset_of(contact, measured.units)?),
             None => onset(&record.time_s, &record.force_n)?,
@@ -88,8 +88,8 @@ impl Start {
     }
 
     /// By how much the crush may be off because contact lies somewhere in a step.
-    pub(crate) fn uncertainty(&self, contact: &FromContact) -> Remarks {
-        let mut remarks = Remarks::default();
+    pub(crate) fn uncertainty(&self, contact: &FromContact) -> Notes {
+        let mut remarks = Notes::default();
         let curve = &contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
@@ -98,7 +98,7 @@ impl Start {
                 if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
             {
                 remarks.warn(format!(
-                    "contact: the first {:.0} % of the crush ({:.0} mm) bring less than {} % of the impulse: if that is no contact yet, say contact_time or gap in the run",
+                    "contact: the first {:.0} % of the crush ({:.0} mm) bring less than {} % of the impulse: if that is not the contact yet, say contact_time or gap in the run",
                     BEGINNING.0 * 100.0,
                     BEGINNING.0 * crush_m * 1e3,
                     BEGINNING.1 * 100.0
@@ -134,10 +134,7 @@ fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
 }
 
 /// The onset of a contact force where the force is a body force.
-fn onset_of(
-    contact: &History,
-    units: UnitSystem,
-) -> Result<(contact::Onset, Remarks), ExtractError> {
+fn onset_of(contact: &History, units: UnitSystem) -> Result<(contact::Onset, Notes), ExtractError> {
     let (signal, mut remarks) =
         Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
     let sign = sign_of_impulse(&signal.time_s, &signal.values);

@@ -75,7 +75,7 @@ impl Table {
         ];
         for (what, values) in checks {
             if values.iter().any(|v| !v.is_finite()) {
-                return Err(error!(Export, "the curve's {what} is no finite number"));
+                return Err(error!(Export, "the curve's {what} is not a finite number"));
             }
         }
         let mut bytes = [0; TOKEN];

@@ -5,7 +5,7 @@ use crate::error::{Error, error};
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
-use super::curve::{Facts, ReadCurve, ReadFile};
+use super::curve::{Metadata, ReadCurve, ReadFile};
 use super::error::Place;
 use crate::unit::UnitSystem;
 
@@ -29,13 +29,13 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
 }
 
 /// Deflections and forces below this share of the largest are zero.
-const NOTHING: f64 = 1e-9;
+const ZERO_SHARE: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.
 const SAME_DISTANCE: f64 = 1e-6;
 
 /// Points of one deflection are set apart by this share of the largest: next to nothing in energy, and less steep than
 /// would ask runs for tiny steps.
-const HAIR: f64 = 1e-4;
+const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// Jumps of the force that a note names.
 const STEPS: usize = 3;
 
@@ -47,7 +47,7 @@ pub(super) struct Columns {
     pub time_s: Option<Vec<f64>>,
     /// Where each point stands, for messages.
     pub places: Places,
-    pub facts: Facts,
+    pub facts: Metadata,
     pub title: Option<String>,
     pub units: Option<UnitSystem>,
     pub notes: Vec<String>,
@@ -81,7 +81,7 @@ impl Columns {
             force_n: Vec::new(),
             time_s: None,
             places,
-            facts: Facts::default(),
+            facts: Metadata::default(),
             title: None,
             units: None,
             notes: Vec::new(),
@@ -239,10 +239,10 @@ impl Points {
         let (most_d, most_f) = self.most;
         for point in &mut self.list {
             let place = || point.place.clone();
-            if point.d.abs() <= NOTHING * most_d {
+            if point.d.abs() <= ZERO_SHARE * most_d {
                 point.d = 0.0;
             }
-            if point.d < 0.0 && point.f.abs() > NOTHING * most_f {
+            if point.d < 0.0 && point.f.abs() > ZERO_SHARE * most_f {
                 let (deflection_m, force_n) = (point.d, point.f);
                 return Err(error!(
                     CurveFile,
@@ -250,7 +250,7 @@ impl Points {
                     place = place()
                 ));
             }
-            if point.f < -NOTHING * most_f {
+            if point.f < -ZERO_SHARE * most_f {
                 return Err(error!(
                     CurveFile,
                     "{place}: the force is {force_n} N against the others' sign: an interface only pushes, so write pull as 0",
@@ -346,7 +346,7 @@ impl Points {
                 // Behind the last point there is room, but none below zero.
                 let behind = if first > end { d } else { largest_m };
                 let room = next.map_or(behind, |next| (next.d - d).abs());
-                let hair = (HAIR * largest_m).min(0.5 * room) / (step.len() - 1) as f64;
+                let hair = (STEP_WIDTH_SHARE * largest_m).min(0.5 * room) / (step.len() - 1) as f64;
                 let peak = match first.cmp(&end) {
                     Ordering::Less => step.len() - 1,
                     Ordering::Equal => peak(&step),
@@ -416,7 +416,7 @@ fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
     };
     (!steps.is_empty()).then(|| {
         format!(
-            "points: the force jumps {}{more}: the points there are set apart by {HAIR} of the largest deflection, at most half the way to the next",
+            "points: the force jumps {}{more}: the points there are set apart by {STEP_WIDTH_SHARE} of the largest deflection, at most half the way to the next",
             shown.join(", ")
         )
     })
@@ -427,7 +427,7 @@ mod tests {
     use super::*;
 
     /// Points and notes of a table, or its error.
-    fn tidied(points: &[(f64, f64)]) -> Result<(Vec<(f64, f64)>, usize), String> {
+    fn sorted_loading(points: &[(f64, f64)]) -> Result<(Vec<(f64, f64)>, usize), String> {
         let mut columns = Columns::at(Places::Lines((1..=points.len() as u64).collect()));
         (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
         let curve = columns.curve().map_err(|e| e.to_string())?;
@@ -438,7 +438,7 @@ mod tests {
     #[test]
     fn every_change_is_one_that_a_note_says() {
         fn t(points: &[(f64, f64)], expected: &[(f64, f64)], notes: usize) {
-            assert_eq!(tidied(points).unwrap(), (expected.to_vec(), notes), "{points:?}");
+            assert_eq!(sorted_loading(points).unwrap(), (expected.to_vec(), notes), "{points:?}");
         }
         let plain = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (3.0, 3.0)];
         t(&plain, &plain, 0);
@@ -451,7 +451,7 @@ mod tests {
         t(&behind.map(|(d, f)| (-d, -f)), &plain, 2);
         let guarded = [&[(-0.5, 0.0)], &plain[..], &[(3.5, 3.0)]].concat();
         t(&guarded, &plain, 2);
-        // A plateau is no guard point.
+        // A plateau is not a guard point.
         t(&guarded[1..], &guarded[1..], 0);
         t(&[&plain[..1], &plain[..]].concat(), &plain, 1);
         let unloading = [&plain[..], &[(2.9, 1.0), (2.8, 0.0)]].concat();
@@ -526,7 +526,7 @@ mod tests {
     #[test]
     fn what_is_no_curve_is_refused_with_its_line() {
         fn t(points: &[(f64, f64)], expected: &str) {
-            let error = tidied(points).unwrap_err();
+            let error = sorted_loading(points).unwrap_err();
             assert!(error.contains(expected), "{points:?}: {error}");
         }
         let plain = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (3.0, 3.0)];

@@ -4,12 +4,12 @@ use crate::error::{Error, ErrorCode, error};
 use std::path::Path;
 
 use super::columns::{Columns, MAX_POINTS, Places};
-use super::curve::{self, Facts, title};
+use super::curve::{self, Metadata, title};
 use super::encoding::decoded;
 use super::error::{Place, shown};
-use super::frame::{self, Fit, Frame};
+use super::frame::{self, Frame, MatchQuality};
 use super::label::Quantity;
-use super::layout::{Lack, Layout};
+use super::layout::{Layout, Missing};
 use super::{ColumnNames, Input, open};
 use crate::curve::{DrivingCurve, Envelope};
 use crate::table::{CsvTable, NoNumber, Row, separator};
@@ -22,7 +22,7 @@ pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, Error> {
     let (bytes, _) = open(path)?;
     let read = || {
         let text = decoded(&bytes).bytes;
-        let table = Table::read(&text, None, &ColumnNames::default(), Lack::OfColumn)?;
+        let table = Table::read(&text, None, &ColumnNames::default(), Missing::OfColumn)?;
         let envelope = Envelope::new(table.deflection_m, table.force_n)?;
         match envelope.first_pulling_point() {
             Some(point) => Err(error!(
@@ -45,15 +45,17 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     }
     let Some(frame) = Frame::find(input.beginning(), &[], true) else { return false };
     match frame.fit {
-        Fit::Header => !frame.is_plain_pair,
-        Fit::Named | Fit::Numbers => frame.titles.is_empty() && !frame.is_plain_pair,
-        Fit::Above => false,
+        MatchQuality::Header => !frame.is_plain_pair,
+        MatchQuality::Named | MatchQuality::Numbers => {
+            frame.titles.is_empty() && !frame.is_plain_pair
+        }
+        MatchQuality::Above => false,
     }
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let options = input.options;
-    let mut table = Table::read(input.text, options.units, &options.columns, Lack::OfUnit)?;
+    let mut table = Table::read(input.text, options.units, &options.columns, Missing::OfUnit)?;
     Ok(Columns {
         deflection_m: table.deflection_m,
         force_n: table.force_n,
@@ -73,7 +75,7 @@ struct Table {
     force_n: Vec<f64>,
     time_s: Option<Vec<f64>>,
     lines: Vec<u64>,
-    facts: Facts,
+    facts: Metadata,
     /// The first line above the header.
     title: String,
     notes: Vec<String>,
@@ -86,10 +88,10 @@ impl Table {
         text: &[u8],
         units: Option<UnitSystem>,
         asked: &ColumnNames,
-        lack: Lack,
+        lack: Missing,
     ) -> Result<Self, Error> {
         let mut table = Self::default();
-        let found = Frame::find(text, &asked.all(), lack == Lack::OfUnit);
+        let found = Frame::find(text, &asked.all(), lack == Missing::OfUnit);
         let frame = found.unwrap_or_else(|| Frame::at_first_line(text, separator(text)));
         let comment = table.comments(&text[..frame.begin])?;
         table.title = frame.titles.first().map_or(String::new(), |(_, title)| title.clone());
@@ -101,7 +103,7 @@ impl Table {
         let mut names: Vec<String> =
             csv.header().iter().take(frame::MOST_COLUMNS).map(Into::into).collect();
         let mut rows = csv.rows().peekable();
-        let is_bare = frame.fit == Fit::Numbers && lack == Lack::OfUnit;
+        let is_bare = frame.fit == MatchQuality::Numbers && lack == Missing::OfUnit;
         let above = comment.and_then(|(line, text)| {
             let names = frame::names(&text, frame.separator, names.len())?;
             (is_bare && frame::names_both(&names, &[])).then_some((line, names))

@@ -21,7 +21,7 @@ pub struct ReadCurve {
     /// one that the obstacle feels.
     pub body_force_n: Option<Vec<f64>>,
     /// What the file says of the curve.
-    pub facts: Facts,
+    pub facts: Metadata,
     /// Title of the curve in the file.
     pub title: Option<String>,
     /// Units of the file, if they are one system.
@@ -55,7 +55,7 @@ impl ReadFile {
 
 /// What a file says of its curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Facts {
+pub struct Metadata {
     /// Which force it is.
     pub force: Option<ForceKind>,
     /// Impact speed in m/s.
@@ -74,7 +74,7 @@ pub struct Facts {
     pub max_deflection_m: Option<f64>,
 }
 
-impl Facts {
+impl Metadata {
     /// Takes what a comment `key: value` says; other comments say nothing. `mark` is the
     /// comment's, for messages.
     pub(super) fn take(&mut self, mark: &str, comment: &str, place: Place) -> Result<(), Error> {

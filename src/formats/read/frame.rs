@@ -75,16 +75,16 @@ pub(super) struct Frame {
     pub lines: u64,
     /// The titles above it: each with its line.
     pub titles: Vec<(u64, String)>,
-    /// The names of the columns; those of a first row that is no header are numbers.
+    /// The names of the columns; those of a first row that is not a header are numbers.
     pub header: Vec<String>,
-    pub fit: Fit,
+    pub fit: MatchQuality,
     /// Whether it could be read as two columns of plain numbers below one line.
     pub is_plain_pair: bool,
 }
 
 /// How well a line fits as the header, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Fit {
+pub(super) enum MatchQuality {
     /// It names a deflection and a force, and numbers follow.
     Header,
     Named,
@@ -111,11 +111,11 @@ impl Frame {
         let most = if titles { MOST_TITLES } else { 1 };
         let candidates = (0..lines.len().min(most))
             .flat_map(|k| Separator::ALL.into_iter().map(move |separator| (k, separator)));
-        let mut best: Option<(Fit, usize, Separator, Vec<String>)> = None;
+        let mut best: Option<(MatchQuality, usize, Separator, Vec<String>)> = None;
         for (k, separator) in candidates {
             let Some((fit, header)) = fit(&lines[k..], separator, asked) else { continue };
             // A header above numbers wins wherever it stands; else the first line that fits at all.
-            let rank = |fit: Fit, k: usize| (fit != Fit::Header, k, fit);
+            let rank = |fit: MatchQuality, k: usize| (fit != MatchQuality::Header, k, fit);
             if best.as_ref().is_none_or(|(other, at, ..)| rank(fit, k) < rank(*other, *at)) {
                 best = Some((fit, k, separator, header));
             }
@@ -149,7 +149,7 @@ impl Frame {
             lines: before,
             titles: Vec::new(),
             header: Vec::new(),
-            fit: Fit::Named,
+            fit: MatchQuality::Named,
             is_plain_pair: false,
         }
     }
@@ -191,7 +191,7 @@ impl Frame {
     }
 }
 
-/// The first lines that hold more than separators and are no comments.
+/// The first lines that hold more than separators and are not comments.
 fn lines(text: &[u8], most: usize) -> Vec<Line<'_>> {
     let mut begin = 0;
     let split = text.split_inclusive(|&b| b == b'\n').enumerate().map(|(k, line)| {
@@ -207,7 +207,11 @@ fn lines(text: &[u8], most: usize) -> Vec<Line<'_>> {
 }
 
 /// How the first of these lines fits as the header of a table, and its names.
-fn fit(lines: &[Line<'_>], separator: Separator, asked: &[&str]) -> Option<(Fit, Vec<String>)> {
+fn fit(
+    lines: &[Line<'_>],
+    separator: Separator,
+    asked: &[&str],
+) -> Option<(MatchQuality, Vec<String>)> {
     let (first, behind) = lines.split_first()?;
     let row = |line: &Line<'_>| separator.fields(&line.text).len();
     let units =
@@ -223,19 +227,19 @@ fn fit(lines: &[Line<'_>], separator: Separator, asked: &[&str]) -> Option<(Fit,
     let all_numbers = fields.len() > 1 && fields.iter().all(|field| separator.is_number(field));
     let owned = || fields.iter().map(std::string::ToString::to_string).collect();
     match header {
-        _ if all_numbers => Some((Fit::Numbers, owned())),
-        Some(header) if names_both(&header, asked) => Some((Fit::Header, header)),
+        _ if all_numbers => Some((MatchQuality::Numbers, owned())),
+        Some(header) if names_both(&header, asked) => Some((MatchQuality::Header, header)),
         // A title of two words stands above two columns as well as a header does.
         Some(header)
             if separator == Separator::Blanks && !header.iter().any(|name| is_name(name)) =>
         {
             None
         }
-        Some(header) => Some((Fit::Above, header)),
+        Some(header) => Some((MatchQuality::Above, header)),
         None => {
             let header: Vec<String> = owned();
             let is_header = separator != Separator::Blanks && names_both(&header, asked);
-            is_header.then_some((Fit::Named, header))
+            is_header.then_some((MatchQuality::Named, header))
         }
     }
 }

@@ -11,7 +11,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
-use super::curve::{Facts, ReadFile, title};
+use super::curve::{Metadata, ReadFile, title};
 use super::encoding::decoded;
 use super::error::{Place, shown};
 use super::label::Quantity;
@@ -147,7 +147,7 @@ fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
 }
 
 /// Takes masses (kg) and velocities (m/s) of the test objects.
-fn described(bytes: &[u8], facts: &mut Facts) {
+fn described(bytes: &[u8], facts: &mut Metadata) {
     let header = Header::read(bytes);
     let of = |what: &str, k: usize| {
         let text = |key: String| number(header.text(&key));
@@ -161,8 +161,8 @@ fn described(bytes: &[u8], facts: &mut Facts) {
 }
 
 /// What the first that says anything says.
-fn merged(first: Facts, others: &[Facts]) -> Facts {
-    others.iter().fold(first, |a, b| Facts {
+fn merged(first: Metadata, others: &[Metadata]) -> Metadata {
+    others.iter().fold(first, |a, b| Metadata {
         force: a.force.or(b.force),
         speed_m_per_s: a.speed_m_per_s.or(b.speed_m_per_s),
         speed_kind: a.speed_kind.or(b.speed_kind),
@@ -173,7 +173,7 @@ fn merged(first: Facts, others: &[Facts]) -> Facts {
 }
 
 /// Takes the facts of lines `Comments :key: value`.
-fn comments(bytes: &[u8], facts: &mut Facts) -> Result<(), Error> {
+fn comments(bytes: &[u8], facts: &mut Metadata) -> Result<(), Error> {
     for (at, line) in lines(bytes) {
         if let Some((key, value)) = line.split_once(':')
             && key.trim().eq_ignore_ascii_case("comments")
@@ -238,7 +238,7 @@ struct Channel {
     times: Times,
     values: Vec<f64>,
     lines: Vec<u64>,
-    facts: Facts,
+    facts: Metadata,
     file: ReadFile,
 }
 
@@ -333,7 +333,7 @@ impl Channel {
             Quantity::Deflection | Quantity::Force => header.times()?,
         };
         let (values, lines) = header.values(bytes, size)?;
-        let mut facts = Facts::default();
+        let mut facts = Metadata::default();
         comments(bytes, &mut facts)?;
         Ok(Some(Self {
             code: code.into(),

@@ -3,7 +3,7 @@
 use crate::error::{Error, error};
 use std::path::Path;
 
-use super::curve::{Facts, ReadCurve, title};
+use super::curve::{Metadata, ReadCurve, title};
 use super::{Input, MIN_POINTS, curve};
 use crate::curve::{ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
@@ -22,14 +22,14 @@ pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, Error> {
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, Error> {
     let curve: PredictedCurve = serde_json::from_slice(bytes)
-        .map_err(|source| error!(CurveFile, "{path}: this is no predicted curve ({source}): give a JSON file made by crumple predict", path = path.display()).caused_by(source))?;
+        .map_err(|source| error!(CurveFile, "{path}: this is not a predicted curve ({source}): give a JSON file made by crumple predict", path = path.display()).caused_by(source))?;
     curve.envelope().map_err(|source| {
         error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
     })?;
     Ok(curve)
 }
 
-/// Whether the first byte that is no blank opens an object.
+/// Whether the first byte that is not a blank opens an object.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.text.trim_ascii_start().starts_with(b"{")
 }
@@ -70,7 +70,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         Some(Parameter::Number(mass)) => Some(*mass),
         _ => None,
     };
-    let facts = Facts {
+    let facts = Metadata {
         force: Some(curve.provenance.force_kind),
         speed_m_per_s: Some(curve.speed_m_per_s),
         speed_kind: Some(curve.speed_kind),

@@ -10,7 +10,7 @@ use crate::unit::UnitSystem;
 
 /// What a column without a unit lacks: a scenario cannot give units beside the file.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Lack {
+pub(super) enum Missing {
     OfColumn,
     OfUnit,
 }
@@ -38,7 +38,7 @@ pub(super) struct Layout {
 
 /// How well a column fits, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Fit {
+enum MatchQuality {
     Unit,
     NoUnit,
     UnknownUnit,
@@ -46,11 +46,11 @@ enum Fit {
 
 impl Column {
     /// By its unit, and whether its whole name is that of the quantity.
-    fn fit(&self) -> (Fit, bool) {
+    fn fit(&self) -> (MatchQuality, bool) {
         let fit = match &self.label.unit {
-            None => Fit::NoUnit,
-            Some(unit) if self.label.quantity.size_of(unit).is_some() => Fit::Unit,
-            Some(_) => Fit::UnknownUnit,
+            None => MatchQuality::NoUnit,
+            Some(unit) if self.label.quantity.size_of(unit).is_some() => MatchQuality::Unit,
+            Some(_) => MatchQuality::UnknownUnit,
         };
         (fit, Label::parse(&self.name).is_none())
     }
@@ -84,7 +84,7 @@ impl Layout {
         names: &[String],
         line: u64,
         units: Option<&Row>,
-        lack: Lack,
+        lack: Missing,
         asked: &ColumnNames,
     ) -> Result<Self, Error> {
         let mut layout = Self { columns: Vec::new(), others: Vec::new() };
@@ -119,15 +119,15 @@ impl Layout {
         quantity: Quantity,
         mut found: Vec<Column>,
         (names, line): (&[String], u64),
-        lack: Lack,
+        lack: Missing,
     ) -> Result<(), Error> {
         let place = Place::Line(line);
-        found.retain(|column| lack == Lack::OfUnit || column.label.unit.is_some());
+        found.retain(|column| lack == Missing::OfUnit || column.label.unit.is_some());
         found.sort_by_key(Column::fit);
         let best = found.first().map(Column::fit);
         let alike = found.iter().filter(|c| Some(c.fit()) == best);
         let alike: Vec<String> = alike.map(|c| format!("\"{}\"", shown(&c.name))).collect();
-        if alike.len() > 1 && lack == Lack::OfUnit {
+        if alike.len() > 1 && lack == Missing::OfUnit {
             let (what, option) = (quantity.name(), quantity.option());
             let found = alike[..alike.len().min(LISTED)].join(", ");
             return Err(error!(
@@ -143,10 +143,10 @@ impl Layout {
                 let usual = usize::from(quantity == Quantity::Force);
                 let found = shown(names.get(usual).map_or("", |name| name));
                 let remedy = match lack {
-                    Lack::OfUnit => {
+                    Missing::OfUnit => {
                         format!("; or say which column it is with {}", quantity.option())
                     }
-                    Lack::OfColumn => String::new(),
+                    Missing::OfColumn => String::new(),
                 };
                 let (wanted, example) = (quantity.name(), quantity.example());
                 return Err(error!(
@@ -250,7 +250,7 @@ fn named(names: &[String], line: u64, quantity: Quantity, asked: &str) -> Result
                 names.iter().take(LISTED).map(|n| format!("\"{}\"", shown(n))).collect();
             Err(error!(
                 CurveFile,
-                "{place}: {option} \"{asked}\" is no column: expected a number from 1, or one of {known}",
+                "{place}: {option} \"{asked}\" is not a column: expected a number from 1, or one of {known}",
                 asked = shown(asked),
                 known = known.join(", "),
                 option = quantity.option(),

@@ -73,7 +73,7 @@ struct Found {
     points: Vec<(f64, f64)>,
     lines: Vec<u64>,
     /// What the comments in front of its points say.
-    facts: super::Facts,
+    facts: super::Metadata,
     units: Option<(crate::unit::UnitSystem, u64)>,
 }
 
@@ -91,7 +91,7 @@ enum Next {
 #[derive(Default)]
 struct Deck {
     curves: Vec<Found>,
-    facts: super::Facts,
+    facts: super::Metadata,
     units: Option<(crate::unit::UnitSystem, u64)>,
     /// The last comment between a keyword and its first card: it may have been meant as a title.
     comment_line: Option<u64>,
@@ -301,9 +301,9 @@ impl<'a> Fields<'a> {
     }
 
     /// A number; 0 for an empty field where that may be.
-    pub(super) fn number(&self, field: usize, may_be_empty: bool) -> Result<f64, Error> {
+    pub(super) fn number(&self, field: usize, allow_empty_states: bool) -> Result<f64, Error> {
         let text = self.text(field).trim();
-        if text.is_empty() && may_be_empty {
+        if text.is_empty() && allow_empty_states {
             return Ok(0.0);
         }
         number(text).ok_or_else(|| match text.split_whitespace().count() {

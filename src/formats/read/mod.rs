@@ -35,7 +35,7 @@ use crate::curve::ForceKind;
 use crate::file;
 use crate::unit::UnitSystem;
 use columns::Columns;
-pub(crate) use curve::Facts;
+pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
 pub(crate) use curve::ReadFile;
 use label::Quantity;
@@ -210,7 +210,7 @@ impl Input<'_> {
     }
 }
 
-/// Whether `path` is a folder of ISO-MME tests; other folders are no curves.
+/// Whether `path` is a folder of ISO-MME tests; other folders are not curves.
 pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
     path.is_dir() && !iso_mme::tests(path).is_empty()
 }
@@ -292,7 +292,7 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
         .iter()
         .find(|r| (r.recognise)(input))
         .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
-        .ok_or_else(|| error!(CurveFile, "{path}: neither content nor extension tell the format of this file: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
+        .ok_or_else(|| error!(CurveFile, "{path}: the format of this file follows neither from its content nor from its extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.

@@ -6,7 +6,7 @@
 
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Facts, stated_units, units};
+use super::curve::{Metadata, stated_units, units};
 use super::error::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
@@ -72,7 +72,7 @@ struct Table {
     /// SI values of the units in its comment: of deflection and force.
     sizes: Option<(f64, f64)>,
     /// What the comments in front of it say.
-    facts: Facts,
+    facts: Metadata,
     values: Vec<f64>,
     /// Line of each row's first value.
     lines: Vec<u64>,
@@ -80,13 +80,13 @@ struct Table {
 
 struct File {
     tables: Vec<Table>,
-    facts: Facts,
+    facts: Metadata,
     units: Option<(UnitSystem, u64)>,
 }
 
 impl File {
     fn read(bytes: &[u8]) -> Result<Self, Error> {
-        let mut file = Self { tables: Vec::new(), facts: Facts::default(), units: None };
+        let mut file = Self { tables: Vec::new(), facts: Metadata::default(), units: None };
         for (at, line) in lines(bytes) {
             let (text, comment) = line.split_once('#').unwrap_or((&line, ""));
             if text.trim().is_empty() {

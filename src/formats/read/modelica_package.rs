@@ -5,7 +5,7 @@
 
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Facts, title};
+use super::curve::{Metadata, title};
 use super::error::{Place, shown};
 use super::text::{lines, number};
 use crate::error::{Error, error};
@@ -82,14 +82,14 @@ impl Array {
 #[derive(Clone, Debug, Default)]
 struct Package {
     name: String,
-    facts: Facts,
+    facts: Metadata,
     d: Array,
     f: Array,
 }
 
 /// The packages that hold a table.
 fn packages(text: &[u8]) -> Result<Vec<Package>, Error> {
-    let (mut packages, mut facts) = (Vec::<Package>::new(), Facts::default());
+    let (mut packages, mut facts) = (Vec::<Package>::new(), Metadata::default());
     // The array that goes on in the next line.
     let mut open: Option<&'static str> = None;
     for (at, line) in lines(text) {

@@ -6,7 +6,7 @@
 
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Facts, stated_units, title, units};
+use super::curve::{Metadata, stated_units, title, units};
 use super::error::{Place, shown};
 use super::lsdyna::Fields;
 use super::text::{lines, number};
@@ -57,7 +57,7 @@ struct Found {
     points: Vec<(f64, f64)>,
     lines: Vec<u64>,
     /// What the comments in front of it say.
-    facts: Facts,
+    facts: Metadata,
     units: Option<(UnitSystem, u64)>,
 }
 
@@ -76,7 +76,7 @@ enum Next {
 #[derive(Default)]
 struct Deck {
     functions: Vec<Found>,
-    facts: Facts,
+    facts: Metadata,
     units: Option<(UnitSystem, u64)>,
 }
 

@@ -4,7 +4,7 @@
 pub(super) fn number(text: &str) -> Option<f64> {
     let text = text.trim();
     let parsed = text.parse::<f64>().ok().or_else(|| fortran(text)?.parse().ok());
-    // A word such as "nan" or "inf" is no value of a curve.
+    // A word such as "nan" or "inf" is not a value of a curve.
     parsed.filter(|value| value.is_finite())
 }
 

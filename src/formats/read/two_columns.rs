@@ -7,7 +7,7 @@
 
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Facts, stated_units, title};
+use super::curve::{Metadata, stated_units, title};
 use super::error::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
@@ -126,14 +126,14 @@ pub(super) fn pieces(text: &str) -> Vec<String> {
 
 struct File {
     curves: Vec<Found>,
-    facts: Facts,
+    facts: Metadata,
     units: Option<UnitSystem>,
 }
 
 impl File {
     fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut file =
-            Self { curves: vec![Found::default()], facts: Facts::default(), units: None };
+            Self { curves: vec![Found::default()], facts: Metadata::default(), units: None };
         for (at, line) in lines(bytes) {
             if let Some(comment) = line.strip_prefix(['$', '#']) {
                 let comment = comment.trim_start_matches(['$', '#']).trim();

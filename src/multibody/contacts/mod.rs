@@ -7,7 +7,7 @@ mod contact;
 mod work;
 
 use super::law::{ForceLaw, Piece};
-use super::rows::{LANES, Layout, Row, Rows, Slot, ahead, each, larger};
+use super::rows::{LANES, LaneIndex, Layout, Row, Rows, ahead, each, larger};
 pub(super) use contact::Move;
 use contact::{Contact, Stage};
 use work::Totals;
@@ -140,7 +140,7 @@ impl<'a> Contacts<'a> {
     }
 
     #[inline(always)]
-    fn set(&mut self, k: usize, slot: Slot, piece: &Piece) {
+    fn set(&mut self, k: usize, slot: LaneIndex, piece: &Piece) {
         let contact = &self.contacts[k];
         self.lanes[slot.row()].set(slot.lane(), contact.stage, piece);
         self.totals[slot.row()].set(slot.lane(), contact, piece);
@@ -164,7 +164,7 @@ impl<'a> Contacts<'a> {
         &self.force_n[at as usize]
     }
 
-    pub(crate) fn slope_n_per_m(&self, slot: Slot) -> f64 {
+    pub(crate) fn slope_n_per_m(&self, slot: LaneIndex) -> f64 {
         self.lanes[slot.row()].slope_n_per_m[slot.lane()]
     }
 
@@ -265,11 +265,11 @@ impl<'a> Contacts<'a> {
     /// Calls `leave` with the slot of each interface that has left its piece in the last
     /// [`Self::evaluate`].
     #[inline(always)]
-    pub(crate) fn left(&self, mut leave: impl FnMut(Slot)) {
+    pub(crate) fn left(&self, mut leave: impl FnMut(LaneIndex)) {
         for (row, outside) in self.outside_m.values(self.lanes.len()).iter().enumerate() {
             for (lane, &outside) in outside.iter().enumerate() {
                 if outside > 0.0 {
-                    leave(Slot::new(row, lane));
+                    leave(LaneIndex::new(row, lane));
                 }
             }
         }
@@ -277,7 +277,7 @@ impl<'a> Contacts<'a> {
 
     /// Whether the deflection of `k` has fallen below its largest, along the envelope so far.
     #[inline(always)]
-    pub(crate) fn turns(&self, at: StepPoint, k: usize, slot: Slot) -> bool {
+    pub(crate) fn turns(&self, at: StepPoint, k: usize, slot: LaneIndex) -> bool {
         self.is_loading(k)
             && self.deflections_m(at)[slot] < self.lanes[slot.row()].from_m[slot.lane()]
     }
@@ -289,7 +289,7 @@ impl<'a> Contacts<'a> {
         &mut self,
         at: StepPoint,
         k: usize,
-        slot: Slot,
+        slot: LaneIndex,
         top_m: Option<f64>,
     ) -> Move {
         let contact = &mut self.contacts[k];

@@ -1,7 +1,7 @@
 //! Work of the contacts, which only outputs and corrections ask for: exact from the laws' tables.
 
 use super::super::law::{OnEnvelope, Piece};
-use super::super::rows::{LANES, Row, Rows, Slot, each, larger};
+use super::super::rows::{LANES, LaneIndex, Row, Rows, each, larger};
 use super::contact::{Contact, Stage};
 use super::{Contacts, StepPoint};
 
@@ -51,7 +51,7 @@ impl Contacts<'_> {
     /// Work done at an interface so far in J (what is stored and dissipated, from the law's
     /// tables), and its integral over the deflection in J m.
     #[inline(always)]
-    pub(crate) fn work(&self, at: StepPoint, slot: Slot) -> (f64, f64) {
+    pub(crate) fn work(&self, at: StepPoint, slot: LaneIndex) -> (f64, f64) {
         let (totals, lane) = (&self.totals[slot.row()], slot.lane());
         let along = self.deflections_m(at)[slot] - totals.known_m[lane];
         let (known, force) = (totals.known_n[lane], self.forces_n(at)[slot]);
@@ -93,7 +93,7 @@ impl Contacts<'_> {
             lost[c] = totals.dissipated_j;
             for j in 0..LANES {
                 if totals.largest_m[j] == f64::NEG_INFINITY {
-                    let k = self.fixed.layout.index(Slot::new(c, j));
+                    let k = self.fixed.layout.index(LaneIndex::new(c, j));
                     let Some(law) = self.fixed.laws[k] else { continue };
                     let (deflection_m, force_n, work_j) = (d[c][j], f[c][j], work_j[c][j]);
                     let piece = self.contacts[k].index;

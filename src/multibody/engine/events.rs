@@ -2,7 +2,7 @@
 
 use super::super::contacts::{Direction, Move, StepPoint};
 use super::super::recorder::Moment;
-use super::super::rows::Slot;
+use super::super::rows::LaneIndex;
 use super::super::run::SimulationError;
 use super::state::{Crossing, Engine, Scheme, Turn};
 
@@ -37,7 +37,7 @@ impl Engine<'_> {
     }
 
     #[inline(always)]
-    fn settle_one(&mut self, direction: Direction, slot: Slot, at: StepPoint, speeds: Speeds) {
+    fn settle_one(&mut self, direction: Direction, slot: LaneIndex, at: StepPoint, speeds: Speeds) {
         let k = self.fixed.layout.index(slot);
         let known = self.crossings.iter().position(|c| c.k == k && c.direction == direction);
         let known = known.unwrap_or_else(|| {

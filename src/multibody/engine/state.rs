@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::super::chain::Chain;
 use super::super::contacts::{Contacts, Direction, Move, StepPoint};
 use super::super::recorder::EventRecorder;
-use super::super::rows::{Layout, Rows, Slot, each};
+use super::super::rows::{LaneIndex, Layout, Rows, each};
 
 /// How the engine steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub(super) struct Engine<'a> {
     /// What has happened in the step.
     pub crossings: Vec<Crossing>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
-    pub left: Vec<(Direction, Slot)>,
+    pub left: Vec<(Direction, LaneIndex)>,
     /// End of the present step.
     pub end_s: f64,
     pub losses: Losses,
@@ -89,7 +89,7 @@ pub(super) struct Power {
 pub(super) struct Crossing {
     pub direction: Direction,
     pub k: usize,
-    pub slot: Slot,
+    pub slot: LaneIndex,
     /// Work done up to the start of the step in J, and its integral over the deflection.
     pub work_j: f64,
     pub sum_jm: f64,

@@ -77,7 +77,7 @@ impl ForceLaw {
         Self::with(envelope, unloading, UnloadingShape::line(), end, StoredBy::Force)
     }
 
-    /// The same with an unloading branch that is no straight line; its energy is that of the
+    /// The same with an unloading branch that is not a straight line; its energy is that of the
     /// line of the unloading stiffness.
     pub fn shaped(
         envelope: Envelope,

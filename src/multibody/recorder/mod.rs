@@ -15,7 +15,7 @@ mod mean;
 mod spans;
 
 use super::chain::Chain;
-use super::rows::{LANES, Layout, Row, Rows, Slot, each, larger};
+use super::rows::{LANES, LaneIndex, Layout, Row, Rows, each, larger};
 use super::run::{Record, Run};
 use extremes::Extremes;
 use mean::moving_mean;
@@ -141,7 +141,7 @@ impl EventRecorder {
         }
     }
 
-    fn enter(&mut self, i: usize, slot: Slot, phase: Phase) {
+    fn enter(&mut self, i: usize, slot: LaneIndex, phase: Phase) {
         let body = &mut self.bodies[i];
         body.phase = phase;
         let (least, most) = phase.nothing_new_between(body.least_a);

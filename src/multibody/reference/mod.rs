@@ -17,7 +17,7 @@ use super::rows::{Layout, Rows};
 use super::run::{Grid, Record, Run, RunSettings, SimulationError};
 use motion::{Contact, Motion};
 
-/// A shorter step, in s, says that the force is no function of the state.
+/// A shorter step, in s, says that the force is not a function of the state.
 const SHORTEST_S: f64 = 1e-15;
 /// A closing speed below this share of the fastest body's counts as zero: the deflection then is
 /// within `(1e-8)²` of its top.

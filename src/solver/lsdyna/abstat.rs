@@ -8,7 +8,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const COMPONENTS: [&str; 12] = [
@@ -62,7 +62,7 @@ impl Body for Abstat {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text.trim_ascii_start();
         if line.is_blank() || (text.starts_with(b"time   airbag/cv #") && line.is_heading()) {
             return;
@@ -84,7 +84,7 @@ impl Body for Abstat {
         self.airbag = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 /// Columns of the k-th number.
@@ -97,7 +97,7 @@ fn field(k: usize) -> (usize, usize) {
 }
 
 impl Abstat {
-    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let count = [10, 12].into_iter().find(|&n| field(n - 1).1 == text.len())?;
         (text.len() >= self.width).then_some(())?;
@@ -113,7 +113,7 @@ impl Abstat {
         Some(())
     }
 
-    fn material(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn material(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text;
         let from = memchr::memmem::find(text, MATERIAL)? + MATERIAL.len();
         let to = memchr::memmem::find(text, AREAS[0].label.as_bytes())?;

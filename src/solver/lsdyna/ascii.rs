@@ -22,7 +22,7 @@ use super::header::{self, LegendFence};
 use super::line::{Line, Lines};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
-use crate::solver::states::States;
+use crate::solver::states::StateReader;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
@@ -31,23 +31,23 @@ pub(crate) trait Body {
     fn is_signature(&self, line: &[u8]) -> bool;
 
     /// One line below the header, outside a legend, with its line end.
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>);
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>);
 
     /// A damaged line was left out: what was begun before it cannot go on after it.
     fn interrupt(&mut self) {}
 
     /// The file ends within `line`: ends the pending state if the line cannot belong to it.
-    fn unfinished(&mut self, _line: &Line<'_>, _states: &mut States<'_>) {}
+    fn unfinished(&mut self, _line: &Line<'_>, _states: &mut StateReader<'_>) {}
 
     /// The end of the file, at `place`.
-    fn end(&mut self, place: Place, states: &mut States<'_>);
+    fn end(&mut self, place: Place, states: &mut StateReader<'_>);
 
     /// Offered after every line: reads the states from there on at once, if they are laid
     /// out like the ones above, and says at which line to go on.
     fn leap(
         &mut self,
         _source: &dyn Source,
-        _states: &mut States<'_>,
+        _states: &mut StateReader<'_>,
     ) -> io::Result<Option<Place>> {
         Ok(None)
     }
@@ -59,10 +59,10 @@ pub(crate) trait Body {
 }
 
 /// Header, legend and states of a file, while it is read.
-pub(crate) struct Frame<'a> {
+pub(crate) struct AsciiReader<'a> {
     format: &'static str,
     lines: Lines<Stream<'a>>,
-    pub states: States<'a>,
+    pub states: StateReader<'a>,
     fence: LegendFence,
     legend: Vec<(i64, Option<String>)>,
     title: Option<String>,
@@ -112,7 +112,7 @@ fn read_from_state(
     selection: &Selection,
     mut body: impl Body,
 ) -> io::Result<Attempt> {
-    let mut frame = Frame::new(format, source, selection);
+    let mut frame = AsciiReader::new(format, source, selection);
     frame.states.skip(skipped);
     while frame.step(&mut body)? {
         if let Some(place) = body.leap(source, &mut frame.states)? {
@@ -123,7 +123,7 @@ fn read_from_state(
     Ok(Attempt { file: frame.finish(&mut body), disputed })
 }
 
-impl<'a> Frame<'a> {
+impl<'a> AsciiReader<'a> {
     pub(crate) fn new(
         format: &'static str,
         source: &'a dyn Source,
@@ -132,7 +132,7 @@ impl<'a> Frame<'a> {
         Self {
             format,
             lines: Lines::new(Stream::new(source)),
-            states: States::new(selection),
+            states: StateReader::new(selection),
             fence: LegendFence::default(),
             legend: Vec::new(),
             title: None,
@@ -147,7 +147,7 @@ impl<'a> Frame<'a> {
         let in_header = line.number <= 2 || self.fence.is_open();
         if in_header && (line.text.len() > MAX_HEADER_LINE || line.is_binary()) {
             let message =
-                "the line is no title, version or legend entry: was the file overwritten?";
+                "the line is not a title, version or legend entry: was the file overwritten?";
             states.problems.add(ProblemCode::BadLine, Some((&line).into()), None, message.into());
         }
         if line.number == 1 {
@@ -255,14 +255,14 @@ impl<'a> Frame<'a> {
 }
 
 /// Whether a line is text; says if not, or if it is too long.
-fn is_text(line: &Line<'_>, states: &mut States<'_>) -> bool {
+fn is_text(line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
     if line.overlong {
         let message = "the line is longer than any line of this file can be; its end is left out";
         states.problems.add(ProblemCode::BadLine, Some(line.into()), None, message.into());
     }
     let is_binary = line.is_binary();
     if is_binary {
-        let message = "expected text, found bytes that are no text: was the file overwritten?";
+        let message = "expected text, found bytes that are not text: was the file overwritten?";
         states.damage(line, None, message.into());
     }
     !is_binary

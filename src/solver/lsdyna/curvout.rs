@@ -9,7 +9,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" curve data for time step";
@@ -33,8 +33,8 @@ impl Body for Curvout {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
-        states.may_be_empty();
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
+        states.allow_empty_states();
         if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
             return;
         }
@@ -52,11 +52,11 @@ impl Body for Curvout {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Curvout {
-    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let start = text.iter().position(|b| !b.is_ascii_whitespace())?;
         let id_end = start + text[start..].iter().position(u8::is_ascii_whitespace)?;

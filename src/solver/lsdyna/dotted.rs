@@ -7,7 +7,7 @@ use super::label_values::is_number;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
 const LABEL: usize = 30;
@@ -65,7 +65,7 @@ impl Body for Dotted {
         label(line).is_some_and(|label| self.entities.contains(&label))
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             return;
         }
@@ -80,11 +80,11 @@ impl Body for Dotted {
         self.entity = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Dotted {
-    fn value(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let (label, from) = split(text, LABEL)?;
         let value = &text[from..];

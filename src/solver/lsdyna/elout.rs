@@ -16,7 +16,7 @@ use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const STRESS: &[u8] = b" e l e m e n t   s t r e s s   c a l c u l a t i o n s";
@@ -97,8 +97,8 @@ impl Body for Elout {
         signature(line) || signature_of_details(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
-        states.may_be_empty();
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
+        states.allow_empty_states();
         if line.is_blank() {
             return;
         }
@@ -122,7 +122,7 @@ impl Body for Elout {
         self.entity = None;
     }
 
-    fn end(&mut self, _: Place, states: &mut States<'_>) {
+    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
         if self.unread.is_some() {
             let message = "rows of muscle data are not read".into();
             states.problems.add(ProblemCode::UnreadRows, self.unread, None, message);
@@ -132,7 +132,7 @@ impl Body for Elout {
 
 impl Elout {
     /// Whether the line begins a block; begins its state if it is a new one.
-    fn heading(&mut self, line: &Line<'_>, states: &mut States<'_>) -> bool {
+    fn heading(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
         let quantities = [
             (STRESS, Quantity::Stress),
             (STRAIN, Quantity::Strain),
@@ -205,7 +205,7 @@ impl Elout {
     fn table(
         &mut self,
         key: Key,
-        states: &mut States<'_>,
+        states: &mut StateReader<'_>,
         names: impl FnOnce() -> Vec<String>,
     ) -> Option<TableId> {
         if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == key) {
@@ -219,7 +219,7 @@ impl Elout {
         Some(table)
     }
 
-    fn beam(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn beam(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         if let Some(rest) = text.strip_prefix(b" beam/truss # =") {
             let digits = rest.trim_ascii_start();
@@ -260,7 +260,7 @@ impl Elout {
     }
 
     /// An element's or node's line, or one of its tensors.
-    fn tensor(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn tensor(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         if text.len() < LABEL + WIDTH {
             // "id-part" of an element, "id-" of a node.

@@ -10,7 +10,7 @@ use super::dotted::split;
 use super::line::{Field, Line, integer, is_whole_real, real};
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::States;
+use crate::solver::states::StateReader;
 use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" dt of cycle";
@@ -46,7 +46,7 @@ impl Body for Glstat {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
             if !line.is_heading() {
@@ -92,7 +92,7 @@ impl Body for Glstat {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 /// Where the value that begins behind `from` ends: with a whole number, else where values

@@ -218,7 +218,7 @@ pub(crate) fn integer(field: &[u8]) -> Option<i64> {
     std::str::from_utf8(field.trim_ascii()).ok()?.parse().ok()
 }
 
-/// A field's text for messages, with bytes that are no text replaced.
+/// A field's text for messages, with bytes that are not text replaced.
 pub(crate) fn shown(field: &[u8]) -> String {
     String::from_utf8_lossy(field)
         .chars()

@@ -129,7 +129,7 @@ const MAX_PATH: usize = 1024;
 const NEAR: usize = 64;
 const MANY: usize = 1 << 14;
 
-/// Reads the header; `None` if this is no container.
+/// Reads the header; `None` if this is not a container.
 pub(crate) fn header(source: &dyn Source) -> io::Result<Option<Header>> {
     let mut window = Window::new(source);
     Ok(window.get(0, 8, 0)?.and_then(Header::parse))
@@ -228,7 +228,7 @@ fn record<'a>(
             let Some(path) = window.get(from, near, 0)? else { return Ok(Err(None)) };
             match text(path) {
                 Some(path) => Ok(Ok(Record { length, event: Some(Event::Directory(path)) })),
-                None => Ok(Err(Some("expected a path, found bytes that are no text".into()))),
+                None => Ok(Err(Some("expected a path, found bytes that are not text".into()))),
             }
         }
         DATA => {

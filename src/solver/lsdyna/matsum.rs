@@ -8,7 +8,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" time =";
@@ -72,7 +72,7 @@ impl Body for Matsum {
         signature(line) || line.starts_with(STATE)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         if line.is_blank() {
             return;
@@ -114,11 +114,11 @@ impl Body for Matsum {
         self.part = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Matsum {
-    fn values(&mut self, index: usize, part: i64, line: &Line<'_>, states: &mut States<'_>) {
+    fn values(&mut self, index: usize, part: i64, line: &Line<'_>, states: &mut StateReader<'_>) {
         let tables = *self.tables.get_or_insert_with(|| {
             LINES.map(|(name, labels)| {
                 let components: Vec<&str> = labels.iter().map(|l| l.component).collect();

@@ -28,7 +28,7 @@ pub(super) mod sleout;
 pub(super) mod spcforc;
 pub(super) mod swforc;
 
-use super::states::States;
+use super::states::StateReader;
 
 /// The time in `( at time … )` of a state's heading.
 fn at_time(line: &[u8]) -> Option<f64> {
@@ -42,7 +42,7 @@ fn at_time(line: &[u8]) -> Option<f64> {
 }
 
 /// Begins the state whose line ends with its time, `rest`, in `width` columns.
-fn begin_at(rest: &[u8], width: usize, line: &line::Line<'_>, states: &mut States<'_>) {
+fn begin_at(rest: &[u8], width: usize, line: &line::Line<'_>, states: &mut StateReader<'_>) {
     match line::real(rest) {
         line::Field::Real(time) if rest.trim_ascii_end().len() == width => {
             states.begin(Some(time), line.into());

@@ -6,7 +6,7 @@ use super::label_values::{Labelled, components, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::{Place, ProblemCode};
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 
 const WIDTH: usize = 13;
 /// Marks of a row: a node, or a rigid body.
@@ -75,7 +75,7 @@ impl NodeForces {
         }
     }
 
-    fn enter(&mut self, name: String, line: &Line<'_>, states: &mut States<'_>) {
+    fn enter(&mut self, name: String, line: &Line<'_>, states: &mut StateReader<'_>) {
         let known = self.blocks.iter().position(|b| b.name == name);
         if known.is_none() && self.blocks.len() == MAX_BLOCKS {
             let message = format!("\"{name}\" is left out: there are too many groups");
@@ -90,11 +90,11 @@ impl NodeForces {
     }
 
     /// The tables of the current block; `None` where its heading is missing.
-    fn tables(&mut self, states: &mut States<'_>) -> Option<[TableId; 2]> {
+    fn tables(&mut self, states: &mut StateReader<'_>) -> Option<[TableId; 2]> {
         let current = self.current?;
         let prefix = self.prefix(current);
         let tables = *self.blocks[current].tables.get_or_insert_with(|| {
-            let table = |states: &mut States<'_>, what, names: &[&str]| {
+            let table = |states: &mut StateReader<'_>, what, names: &[&str]| {
                 let names: Vec<String> = names.iter().map(|n| format!("{prefix}{n}")).collect();
                 states.table(what, &names.iter().map(String::as_str).collect::<Vec<_>>())
             };
@@ -106,7 +106,7 @@ impl NodeForces {
         Some(tables)
     }
 
-    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text;
         let from = memchr::memchr(b'#', text)? + 1;
         let to = memchr::memmem::find(text, ID)?;
@@ -119,7 +119,7 @@ impl NodeForces {
         Some(())
     }
 
-    fn moments(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn moments(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let fields = fields(line, &MOMENTS)?;
         let id = self.body?;
         fields.iter().all(Option::is_some).then_some(())?;
@@ -128,7 +128,7 @@ impl NodeForces {
         Some(())
     }
 
-    fn totals(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn totals(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let fields = fields(line, &TOTALS)?;
         let prefix = self.prefix(self.current?);
         for (label, field) in TOTALS.iter().zip(fields) {
@@ -145,7 +145,7 @@ impl Body for NodeForces {
         line.starts_with(self.layout.state)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         let start = text.trim_ascii_start();
         if line.is_blank() {
@@ -193,5 +193,5 @@ impl Body for NodeForces {
         self.body = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }

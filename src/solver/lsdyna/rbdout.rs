@@ -10,7 +10,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
@@ -65,7 +65,7 @@ impl Body for Rbdout {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || self.value(line, states).is_some() {
             return;
         }
@@ -78,11 +78,11 @@ impl Body for Rbdout {
         self.body = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Rbdout {
-    fn value(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         if text.starts_with(STATE) {
             self.body = None;
@@ -108,7 +108,7 @@ impl Rbdout {
         }
         let index = LINES.iter().position(|(label, ..)| start.starts_with(label))?;
         let tables = self.tables.get_or_insert_with(|| {
-            let table = |states: &mut States<'_>, names| states.table("rigid bodies", names);
+            let table = |states: &mut StateReader<'_>, names| states.table("rigid bodies", names);
             LINES
                 .iter()
                 .map(|(_, global, local)| [table(states, global), table(states, local)])

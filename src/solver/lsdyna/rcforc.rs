@@ -7,7 +7,7 @@ use super::line::{Field, Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 /// Printed twice per state, without a time, for single-surface contacts.
@@ -70,7 +70,7 @@ impl Body for Rcforc {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             return;
         }
@@ -92,7 +92,7 @@ impl Body for Rcforc {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 
     fn single_surfaces(&self) -> &[i64] {
         &self.undefined
@@ -100,7 +100,7 @@ impl Body for Rcforc {
 }
 
 impl Rcforc {
-    fn row(&mut self, side: Side, id_from: usize, line: &Line<'_>, states: &mut States<'_>) {
+    fn row(&mut self, side: Side, id_from: usize, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         let parsed = time_at(text).and_then(|at| {
             let id = integer(text.get(id_from..at)?)?;
@@ -133,7 +133,7 @@ impl Rcforc {
     }
 
     /// Says what a row lacks.
-    fn damage(&self, id_from: usize, line: &Line<'_>, states: &mut States<'_>) {
+    fn damage(&self, id_from: usize, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         let at = time_at(text).filter(|&at| {
             let time = text.get(at + TIME.len()..at + TIME.len() + WIDTH);

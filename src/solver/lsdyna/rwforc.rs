@@ -7,7 +7,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const COMPONENTS: [&str; 4] = ["normal_force", "x_force", "y_force", "z_force"];
@@ -38,7 +38,7 @@ impl Body for Rwforc {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         if line.is_blank() {
             return;
@@ -60,7 +60,7 @@ impl Body for Rwforc {
         }
     }
 
-    fn end(&mut self, _: Place, states: &mut States<'_>) {
+    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
         if self.unread_rows > 0 {
             states.problems.add(
                 ProblemCode::UnreadRows,
@@ -76,7 +76,7 @@ impl Body for Rwforc {
 }
 
 impl Rwforc {
-    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text.trim_ascii_end();
         // A wide wall id pushes the forces to the right.
         let forces = text.len().saturating_sub(COMPONENTS.len() * VALUE_WIDTH).max(WALL.1);

@@ -10,7 +10,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 /// "(1) id I12, time E15.5, then fields of 15, 12, 12, 12; (2), (3) 27 columns of system or
@@ -46,7 +46,7 @@ impl Body for Secforc {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             self.section = None;
         } else if !(line.text.trim_ascii_start().starts_with(b"line#") && line.is_heading()) {
@@ -58,11 +58,11 @@ impl Body for Secforc {
         self.section = None;
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Secforc {
-    fn values(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn values(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let tables = *self.tables.get_or_insert_with(|| {
             LINES.each_ref().map(|(name, components)| states.table(name, components))
         });

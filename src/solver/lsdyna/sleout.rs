@@ -8,7 +8,7 @@ use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" contact interface energy file, time=";
@@ -49,7 +49,7 @@ impl Body for Sleout {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         if line.is_blank() || (text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
             return;
@@ -66,11 +66,11 @@ impl Body for Sleout {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Sleout {
-    fn values(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn values(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let sum = SUMS.iter().find_map(|(label, name)| {
             Some((memchr::memmem::find(text, label)? + label.len(), name))

@@ -11,7 +11,7 @@ use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const HEADING: &[u8] = b"single point constraint forces";
@@ -52,7 +52,7 @@ impl Body for Spcforc {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || line.text.trim_ascii() == HEADING {
             return;
         }
@@ -69,11 +69,11 @@ impl Body for Spcforc {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Spcforc {
-    fn values(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn values(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let labels = [(FORCES, Some(0)), (MOMENTS, Some(1)), (RESULTANT, None)];
         let (at, label, kind) = labels.into_iter().find_map(|(label, kind)| {
@@ -105,7 +105,7 @@ impl Spcforc {
     }
 
     /// The table of the nodes' `row`-th forces or moments. `None` if there are too many.
-    fn table(&mut self, row: usize, kind: usize, states: &mut States<'_>) -> Option<TableId> {
+    fn table(&mut self, row: usize, kind: usize, states: &mut StateReader<'_>) -> Option<TableId> {
         if row > MAX_SETS {
             return None;
         }

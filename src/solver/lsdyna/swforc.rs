@@ -8,7 +8,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 
 const COLUMN_LINE: &[u8] = b" constraint #";
@@ -45,7 +45,7 @@ impl Body for Swforc {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
             return;
         }
@@ -59,11 +59,11 @@ impl Body for Swforc {
         }
     }
 
-    fn end(&mut self, _: Place, _: &mut States<'_>) {}
+    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Swforc {
-    fn row(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<()> {
+    fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         integer(text.get(..AXIAL.0 - 1)?)?;
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };

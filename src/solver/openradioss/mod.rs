@@ -22,7 +22,7 @@ use super::{Selection, SolverFile};
 use crate::history::{EntityId, History, Side};
 use crate::signal::derivative;
 use header::{Header, Records};
-use states::States;
+use states::StateReader;
 
 /// Types of history groups that are read.
 const NODES: i32 = 0;
@@ -84,7 +84,7 @@ pub(crate) fn read(
         };
         return Ok(vec![file]);
     };
-    let mut states = States::new(&header, selection);
+    let mut states = StateReader::new(&header, selection);
     states.read(&header, &mut records)?;
     Ok(states.finish(&header, selection))
 }

@@ -10,7 +10,7 @@ use super::{
     history, magnitude,
 };
 use crate::history::{EntityId, Side};
-use crate::solver::problem::{Place, ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, Place, ProblemCode};
 use crate::solver::restart;
 use crate::solver::{Entity, Selection, SolverFile};
 
@@ -25,7 +25,7 @@ struct Channel {
 const STANDING: usize = 6;
 
 /// The states, of selected values only.
-pub(crate) struct States {
+pub(crate) struct StateReader {
     time: Vec<f64>,
     globals: Vec<Channel>,
     /// Channels per group, in order of the offsets asked for.
@@ -35,10 +35,10 @@ pub(crate) struct States {
     first_group: usize,
     /// Where each kept state begins.
     starts: Vec<u64>,
-    /// Kept values that are no finite numbers.
+    /// Kept values that are not finite numbers.
     not_finite: usize,
     /// What was found to be wrong on the way.
-    problems: Problems,
+    problems: Diagnostics,
 }
 
 /// The channels of a group's selected objects and variables.
@@ -66,7 +66,7 @@ fn channels_of(group: &Group, section: &str, selection: &Selection) -> Vec<Chann
         .collect()
 }
 
-impl States {
+impl StateReader {
     pub(crate) fn new(header: &Header, selection: &Selection) -> Self {
         let wants_section = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
         let channel = |offset| Channel { offset, values: Vec::new() };
@@ -99,7 +99,7 @@ impl States {
             first_group,
             starts: Vec::new(),
             not_finite: 0,
-            problems: Problems::default(),
+            problems: Diagnostics::default(),
         }
     }
 
@@ -142,7 +142,7 @@ impl States {
         self.look_for_zeros(header, &above, None);
         if self.not_finite > 0 {
             let message = format!(
-                "{} values are no finite numbers; they are returned as such",
+                "{} values are not finite numbers; they are returned as such",
                 self.not_finite
             );
             self.problems.add(ProblemCode::NotFinite, None, None, message);

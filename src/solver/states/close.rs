@@ -1,9 +1,9 @@
 //! Ends states: a whole one is kept, one that lacks something is left out and said.
 
-use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, States};
+use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, StateReader};
 use crate::solver::problem::ProblemCode;
 
-impl States<'_> {
+impl StateReader<'_> {
     /// Ends the pending state; keeps it if it is whole.
     pub(crate) fn close(&mut self, at_end: bool) {
         let Some(pending) = self.pending.take() else { return };
@@ -89,7 +89,7 @@ impl States<'_> {
             Some(last) if at_end && self.sealed && last.pending.is_none() => {
                 Some(format!("its labels end before \"{}\"", last.component))
             }
-            _ if !self.may_be_empty
+            _ if !self.allow_empty_states
                 && self.tables.iter().all(|t| t.filled_rows.is_empty())
                 && pending.labels == 0 =>
             {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::States;
+use super::StateReader;
 use super::table::collect_tables;
 use crate::history::{EntityId, History};
 use crate::solver::problem::{Problem, ProblemCode};
@@ -16,7 +16,7 @@ pub(crate) struct Collected {
     pub problems: Vec<Problem>,
 }
 
-impl States<'_> {
+impl StateReader<'_> {
     /// Ends the file.
     pub(crate) fn finish(mut self) -> Collected {
         self.close(true);

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use super::Selection;
 use super::lsdyna::line::{Field, Line, real, shown};
-use super::problem::{Place, Problem, ProblemCode, Problems};
+use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
 pub(crate) use finish::Collected;
 use table::Table;
@@ -48,7 +48,7 @@ struct Pending {
 }
 
 /// The states of one file while it is read.
-pub(crate) struct States<'a> {
+pub(crate) struct StateReader<'a> {
     selection: &'a Selection,
     tables: Vec<Table>,
     scalars: Vec<Scalar>,
@@ -61,21 +61,21 @@ pub(crate) struct States<'a> {
     /// States left out because their rows are not those of the first whole state.
     disagreeing: usize,
     /// Whether a state without rows is whole.
-    may_be_empty: bool,
+    allow_empty_states: bool,
     /// Values that the kept states have and lack, selected or not.
     present_cells: usize,
     absent_cells: usize,
     /// Places of the kept states' beginnings, and their cycles where the file has them.
     places: Vec<Place>,
     cycles: Vec<Option<i64>>,
-    pub problems: Problems,
+    pub problems: Diagnostics,
 }
 
-/// Index of a table, from [`States::table`].
+/// Index of a table, from [`StateReader::table`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct TableId(usize);
 
-impl<'a> States<'a> {
+impl<'a> StateReader<'a> {
     pub(crate) fn new(selection: &'a Selection) -> Self {
         Self {
             selection,
@@ -86,12 +86,12 @@ impl<'a> States<'a> {
             sealed: false,
             skip: 0,
             disagreeing: 0,
-            may_be_empty: false,
+            allow_empty_states: false,
             present_cells: 0,
             absent_cells: 0,
             places: Vec::new(),
             cycles: Vec::new(),
-            problems: Problems::default(),
+            problems: Diagnostics::default(),
         }
     }
 
@@ -101,8 +101,8 @@ impl<'a> States<'a> {
     }
 
     /// Says that a state without rows is whole.
-    pub(crate) fn may_be_empty(&mut self) {
-        self.may_be_empty = true;
+    pub(crate) fn allow_empty_states(&mut self) {
+        self.allow_empty_states = true;
     }
 
     /// Whether more states disagree with the first whole state than agree with it.

@@ -1,9 +1,9 @@
 //! Leaves out the states that a restart wrote again.
 
-use super::States;
+use super::StateReader;
 use crate::solver::restart;
 
-impl States<'_> {
+impl StateReader<'_> {
     pub(super) fn resolve_restarts(&mut self) {
         let cycles = &self.cycles;
         // Times have few digits: only a cycle that does not rise tells the same state.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Collected;
 use crate::history::{EntityId, History};
 use crate::solver::Selection;
-use crate::solver::problem::{Problem, ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 
 /// Rows of the same components.
 pub(crate) struct Table {
@@ -125,9 +125,9 @@ impl Table {
 
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
-pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Problems {
+pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Diagnostics {
     let states = collected.time.len();
-    let mut problems = Problems::default();
+    let mut problems = Diagnostics::default();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
     for mut table in tables.into_iter().filter(|table| !table.rows.is_empty()) {
         problems.extend(table.absent_rows(states));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::bytes::Bytes;
 use super::metadata::Metadata;
 use super::records::{Component, DataRecord, Section};
-use super::states::States;
+use super::states::StateReader;
 use crate::history::EntityId;
 use crate::solver::problem::{Problem, ProblemCode};
 
@@ -21,7 +21,7 @@ const HAVE_ONE_ROW: [&str; 6] =
 
 /// Whom the values of a component belong to.
 #[derive(Clone)]
-pub(super) enum Owners {
+pub(super) enum Entities {
     Global,
     /// One value per entity, in this order in every state.
     Fixed(Arc<[EntityId]>),
@@ -32,19 +32,19 @@ pub(super) enum Owners {
 /// What is found of a component's owners.
 pub(super) enum Found {
     /// Owners, and values of each of them: one, or one for each integration point.
-    Owners(Owners, usize),
+    Entities(Entities, usize),
     /// The component has no values.
     Nothing,
     /// Its values fit no ids.
     Unfit(Problem),
 }
 
-impl Owners {
+impl Entities {
     pub(crate) fn of(
         section: &Section,
         component: &Component,
         metadata: &Metadata,
-        states: &States,
+        states: &StateReader,
         bytes: Bytes<'_>,
     ) -> io::Result<Found> {
         let first = states.whole.iter().find_map(|state| component.records.get(state));
@@ -54,7 +54,7 @@ impl Owners {
         };
         if width == 0 || is_total(&component.name) {
             let is_one = width == 1;
-            return Ok(if is_one { Found::Owners(Self::Global, 1) } else { Found::Nothing });
+            return Ok(if is_one { Found::Entities(Self::Global, 1) } else { Found::Nothing });
         }
         if let Some(ids) = &states.ids {
             let with = (0..states.whole.len())
@@ -64,14 +64,14 @@ impl Owners {
                 let mut known = HashSet::new();
                 let each = ids.iter().flat_map(|ids| ids.iter());
                 let all = each.filter(|&&id| known.insert(id)).map(|id| EntityId::new(*id));
-                return Ok(Found::Owners(Self::OfState(all.collect()), points));
+                return Ok(Found::Entities(Self::OfState(all.collect()), points));
             }
         }
         if let Some(ids) = metadata.entities(&component.name, width) {
-            return Ok(Found::Owners(Self::Fixed(ids.into()), 1));
+            return Ok(Found::Entities(Self::Fixed(ids.into()), 1));
         }
         if width == 1 {
-            return Ok(Found::Owners(Self::Global, 1));
+            return Ok(Found::Entities(Self::Global, 1));
         }
         let message = format!(
             "{}: {} has {width} values a state and no ids of that number; it is not read",
@@ -101,7 +101,7 @@ impl Owners {
 /// section says that all have the same number of them (`nip`).
 fn points(
     section: &Section,
-    states: &States,
+    states: &StateReader,
     count: usize,
     width: usize,
     bytes: Bytes<'_>,
@@ -131,7 +131,7 @@ pub(super) struct EntityList {
 
 impl EntityList {
     /// The list, and which entities are there more often than they can be.
-    pub(crate) fn of(section: &Section, owners: &Owners) -> (Self, Option<Problem>) {
+    pub(crate) fn of(section: &Section, owners: &Entities) -> (Self, Option<Problem>) {
         let entities: Arc<[EntityId]> = owners.entities().into();
         let ordinals = ordinals(&entities);
         let rows = || ordinals.iter().zip(&*entities).filter(|(_, id)| !section.is_lost(id.id));

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::super::lsda::{self, Event, Header, Payload, change_directory};
-use crate::solver::problem::{ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, ProblemCode};
 use crate::solver::source::Source;
 
 /// Sections by which a container is known to be a binout.
@@ -34,7 +34,7 @@ pub(super) struct DataRecord {
 /// All sections of the family of containers.
 #[derive(Default)]
 pub(super) struct Tree {
-    /// By part; `None` where a part is no container.
+    /// By part; `None` where a part is not a container.
     pub headers: Vec<Option<Header>>,
     pub sections: Vec<Section>,
     index: HashMap<String, usize>,
@@ -42,7 +42,7 @@ pub(super) struct Tree {
     /// Whether sections were left out.
     is_full: bool,
     /// Damage of the containers themselves.
-    pub problems: Problems,
+    pub problems: Diagnostics,
 }
 
 /// The records of one section.
@@ -80,7 +80,7 @@ impl Tree {
         let header = lsda::header(source)?;
         self.headers.push(header);
         let Some(header) = header else {
-            let message = "this is no LSDA container, or its header is cut";
+            let message = "this is not an LSDA container, or its header is cut";
             self.problems.add(ProblemCode::CutRecord, None, None, message.into());
             return Ok(());
         };

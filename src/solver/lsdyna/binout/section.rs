@@ -8,16 +8,16 @@ use rayon::prelude::*;
 
 use super::bytes::Bytes;
 use super::metadata::Metadata;
-use super::owners::{EntityList, Found, Owners, row_name};
+use super::owners::{Entities, EntityList, Found, row_name};
 use super::records::Section;
-use super::states::States;
+use super::states::StateReader;
 use super::values::Series;
 use crate::history::{EntityId, History};
-use crate::solver::problem::{Problem, ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::zeros;
 use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
-/// Components of a state that are no results.
+/// Components of a state that are not results.
 const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 
 /// Reads one section.
@@ -26,8 +26,8 @@ pub(super) struct SectionReader<'a> {
     bytes: Bytes<'a>,
     selection: &'a Selection,
     metadata: Metadata,
-    states: States,
-    problems: Problems,
+    states: StateReader,
+    problems: Diagnostics,
 }
 
 /// What the section has, and what of it is to be read.
@@ -45,11 +45,11 @@ impl<'a> SectionReader<'a> {
         selection: &'a Selection,
     ) -> io::Result<Self> {
         let metadata = Metadata::of(section, bytes)?;
-        let (states, problems) = States::of(section, bytes)?;
+        let (states, problems) = StateReader::of(section, bytes)?;
         Ok(Self { section, bytes, selection, metadata, states, problems })
     }
 
-    pub(crate) fn read(mut self) -> io::Result<(SolverFile, Problems)> {
+    pub(crate) fn read(mut self) -> io::Result<(SolverFile, Diagnostics)> {
         self.problems.extend(self.beyond_bound());
         self.problems.extend(self.states.absent(self.section));
         self.problems.extend(self.lost_ids());
@@ -105,9 +105,9 @@ impl<'a> SectionReader<'a> {
         let mut lists: Vec<EntityList> = Vec::new();
         let results = section.components.iter().filter(|c| !NOT_RESULTS.contains(&&*c.name));
         for component in results {
-            let found = Owners::of(section, component, &self.metadata, &self.states, self.bytes)?;
+            let found = Entities::of(section, component, &self.metadata, &self.states, self.bytes)?;
             let (owners, points) = match found {
-                Found::Owners(owners, points) => (owners, points),
+                Found::Entities(owners, points) => (owners, points),
                 Found::Nothing => continue,
                 Found::Unfit(problem) => {
                     self.problems.push(problem);

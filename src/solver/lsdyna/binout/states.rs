@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use super::bytes::Bytes;
 use super::records::{Component, DataRecord, LISTS, Section};
-use crate::solver::problem::{Place, Problem, ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 
 /// The whole states of a section.
-pub(super) struct States {
+pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
     pub whole: Vec<usize>,
     pub time: Arc<[f64]>,
@@ -21,11 +21,11 @@ pub(super) struct States {
 /// A state's ids; states with the same ones share them.
 pub(super) type Ids = Arc<[i64]>;
 
-impl States {
+impl StateReader {
     /// A state is whole if it has a time and no damage; the last one must also have what the
     /// one before has. Of states that a restart wrote again the last ones are kept.
-    pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
-        let mut problems = Problems::default();
+    pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
+        let mut problems = Diagnostics::default();
         problems.extend(order_of(section));
         let (mut timed, left_out) = Timed::of(section, bytes)?;
         problems.append(left_out);
@@ -91,13 +91,13 @@ struct Timed {
 
 impl Timed {
     /// The states without damage, in order of their numbers, and why others are left out.
-    fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Problems)> {
+    fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
         let mut order: Vec<usize> = (0..section.states.len()).collect();
         order.sort_by_key(|&i| section.states[i]);
         let times = section.component("time");
         let last = order.last().copied();
         let before = order.len().checked_sub(2).map(|k| order[k]);
-        let (mut states, mut time, mut problems) = (Vec::new(), Vec::new(), Problems::default());
+        let (mut states, mut time, mut problems) = (Vec::new(), Vec::new(), Diagnostics::default());
         for state in order {
             let record = times.and_then(|t| t.records.get(&state));
             let value = match record {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::bytes::{Bytes, Scratch};
 use super::columns::{Columns, Pick, positions_of};
-use super::owners::{MAX_ROWS, Owners, ordinals, row_name};
+use super::owners::{Entities, MAX_ROWS, ordinals, row_name};
 use super::records::{Component, DataRecord, Section};
-use super::states::{Ids, States};
+use super::states::{Ids, StateReader};
 use crate::history::{EntityId, History};
 use crate::solver::Selection;
 use crate::solver::problem::{Problem, ProblemCode};
@@ -18,7 +18,7 @@ pub(super) struct Series<'a> {
     pub section: &'a Section,
     pub component: &'a Component,
     pub name: Arc<str>,
-    pub owners: Owners,
+    pub owners: Entities,
     /// Which of the values that each entity has in a state; `None` if it has one.
     pub point: Option<usize>,
 }
@@ -38,7 +38,7 @@ impl Series<'_> {
     /// The histories of the selected entities; of all of them for an audit.
     pub(crate) fn histories(
         &self,
-        states: &States,
+        states: &StateReader,
         selection: &Selection,
         bytes: Bytes<'_>,
     ) -> io::Result<(Vec<History>, Vec<Problem>)> {
@@ -61,7 +61,7 @@ impl Series<'_> {
     }
 
     fn kept(&self, ordinals: &[usize], selection: &Selection) -> Vec<Kept> {
-        if matches!(self.owners, Owners::Global) {
+        if matches!(self.owners, Entities::Global) {
             return vec![(0, None)];
         }
         let all = self.owners.entities().iter().enumerate();
@@ -73,7 +73,7 @@ impl Series<'_> {
     }
 
     /// Damage can spread few values over very many entities and states.
-    fn too_sparse(&self, kept: usize, states: &States) -> Option<Problem> {
+    fn too_sparse(&self, kept: usize, states: &StateReader) -> Option<Problem> {
         let states = &states.whole;
         let records = states.iter().filter_map(|state| self.component.records.get(state));
         let present: usize = records.map(DataRecord::width).sum();
@@ -93,7 +93,7 @@ impl Series<'_> {
     fn columns(
         &self,
         kept: &[Kept],
-        states: &States,
+        states: &StateReader,
         bytes: Bytes<'_>,
     ) -> io::Result<(Columns, Lacks)> {
         let mut columns = Columns::new(kept.len(), states.whole.len());
@@ -105,9 +105,9 @@ impl Series<'_> {
         for (k, state) in states.whole.iter().enumerate() {
             let values = columns.row();
             let width = match &self.owners {
-                Owners::Global => 1,
-                Owners::Fixed(ids) => ids.len(),
-                Owners::OfState(_) => {
+                Entities::Global => 1,
+                Entities::Fixed(ids) => ids.len(),
+                Entities::OfState(_) => {
                     let Some(ids) = states.ids.as_ref().map(|ids| &ids[k]) else {
                         values.fill(f64::NAN);
                         continue;
@@ -136,7 +136,7 @@ impl Series<'_> {
         Ok((columns, lacks))
     }
 
-    fn problems(&self, lacks: &Lacks, is_none_kept: bool, states: &States) -> Vec<Problem> {
+    fn problems(&self, lacks: &Lacks, is_none_kept: bool, states: &StateReader) -> Vec<Problem> {
         let mut problems = Vec::new();
         let Self { section, name, .. } = self;
         if lacks.absent > 0 && !is_none_kept {
@@ -150,7 +150,7 @@ impl Series<'_> {
         }
         if lacks.not_finite > 0 {
             let message = format!(
-                "{}: {name} has {} values that are no finite numbers; they are returned as such",
+                "{}: {name} has {} values that are not finite numbers; they are returned as such",
                 section.name, lacks.not_finite
             );
             problems.push(Problem::new(ProblemCode::NotFinite, message));

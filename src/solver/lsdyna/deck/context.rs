@@ -6,7 +6,7 @@ use super::contents::{Deck, DeckPlace};
 use super::keyword::{Format, Keyword};
 use super::kind::Kind;
 use super::parameters::{NoNumber, Parameters};
-use crate::solver::problem::{Place, Problem, ProblemCode, Problems};
+use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 
 /// Entries kept of each list.
 pub(super) const MAX_ENTRIES: usize = 100_000;
@@ -34,7 +34,7 @@ pub(super) struct Missing;
 #[derive(Default)]
 pub(super) struct Context {
     pub deck: Deck,
-    pub problems: Problems,
+    pub problems: Diagnostics,
     pub parameters: Parameters,
     /// Included files that are being read, outermost first: index in the deck's includes, and
     /// the name they were opened by.

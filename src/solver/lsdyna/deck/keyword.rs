@@ -11,7 +11,8 @@ const MAX_NAME: usize = 200;
 
 /// Keywords that stand alone, and the first words of families. Other programs have some
 /// of them too (Abaqus has `*NODE`), but go on with a comma or a blank.
-const ALONE: [&str; 6] = ["KEYWORD", "TITLE", "NODE", "PART", "INITIAL_VELOCITY", "INCLUDE_PATH"];
+const KEYWORDS_WITHOUT_OPTIONS: [&str; 6] =
+    ["KEYWORD", "TITLE", "NODE", "PART", "INITIAL_VELOCITY", "INCLUDE_PATH"];
 const FAMILIES: [&str; 14] = [
     "BOUNDARY_",
     "CONSTRAINED_",
@@ -33,7 +34,8 @@ const FAMILIES: [&str; 14] = [
 pub(crate) fn signature(line: &[u8]) -> bool {
     Keyword::parse(line).is_some_and(|k| {
         let bare = k.arguments.is_empty() || k.name == "KEYWORD";
-        bare && (ALONE.contains(&&*k.name) || FAMILIES.iter().any(|f| k.name.starts_with(f)))
+        bare && (KEYWORDS_WITHOUT_OPTIONS.contains(&&*k.name)
+            || FAMILIES.iter().any(|f| k.name.starts_with(f)))
     })
 }
 

@@ -49,7 +49,7 @@ pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<
 
 /// A file of the deck that is being read.
 struct OpenFile<'a> {
-    lines: Lines<Bounded<'a>>,
+    lines: Lines<SizeLimited<'a>>,
     /// Format of its cards where their keyword asks for none.
     format: Format,
     block: Option<Block>,
@@ -65,24 +65,24 @@ impl<'a> OpenFile<'a> {
         format: Format,
         included: Option<(String, Place)>,
     ) -> Self {
-        let lines = Lines::new(Bounded { source, left: left.clone() });
+        let lines = Lines::new(SizeLimited { source, left: left.clone() });
         Self { lines, format, block: None, included }
     }
 }
 
 /// A file of the deck, read as long as the whole deck keeps within its bound.
-struct Bounded<'a> {
+struct SizeLimited<'a> {
     source: Box<dyn BufRead + 'a>,
     left: Rc<Cell<u64>>,
 }
 
-impl Read for Bounded<'_> {
+impl Read for SizeLimited<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         read_buffered(self, out)
     }
 }
 
-impl BufRead for Bounded<'_> {
+impl BufRead for SizeLimited<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.left.get() == 0 {
             let message = format!(

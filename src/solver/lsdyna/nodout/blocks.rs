@@ -13,7 +13,7 @@ use super::Nodout;
 use super::rows::Wanted;
 use super::stride::Stride;
 use crate::history::EntityId;
-use crate::solver::lsdyna::ascii::Frame;
+use crate::solver::lsdyna::ascii::AsciiReader;
 use crate::solver::problem;
 use crate::solver::source::{Source, Window};
 use crate::solver::states::TableId;
@@ -47,7 +47,7 @@ impl Blocks {
     /// `None` if the file is damaged, has too few states to tell their layout, or too few
     /// values to be worth it: then the line reader gives what there is.
     pub(crate) fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
-        let mut frame = Frame::new("nodout", &*source, selection);
+        let mut frame = AsciiReader::new("nodout", &*source, selection);
         let mut body = Nodout::default();
         let mut above = None;
         let start = loop {

@@ -19,7 +19,7 @@ use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 use crate::solver::{Selection, SolverFile};
 pub use blocks::Blocks;
 use stride::Stride;
@@ -93,7 +93,7 @@ impl Body for Nodout {
         signature(line)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             // The blank line between state line and column line ends nothing.
             self.block = None;
@@ -116,7 +116,7 @@ impl Body for Nodout {
         }
     }
 
-    fn unfinished(&mut self, line: &Line<'_>, states: &mut States<'_>) {
+    fn unfinished(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         // Outside a block, the state above is over; without a state line the rows below
         // cannot be placed.
         if self.block.is_none() && !self.continue_announced(states) {
@@ -129,7 +129,11 @@ impl Body for Nodout {
         self.announced = None;
     }
 
-    fn leap(&mut self, source: &dyn Source, states: &mut States<'_>) -> io::Result<Option<Place>> {
+    fn leap(
+        &mut self,
+        source: &dyn Source,
+        states: &mut StateReader<'_>,
+    ) -> io::Result<Option<Place>> {
         let Some(start) = self.new_start.take() else { return Ok(None) };
         let above = self.pending_start.replace(start);
         let kept = states.kept();
@@ -152,7 +156,7 @@ impl Body for Nodout {
         Ok(None)
     }
 
-    fn end(&mut self, _: Place, states: &mut States<'_>) {
+    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
         // A state line without the rows it announces.
         if self.continue_announced(states) {
             states.mark_damaged();
@@ -162,7 +166,7 @@ impl Body for Nodout {
 
 impl Nodout {
     /// Notes the place of the announced state if it is not the pending one's other block.
-    fn note_start(&mut self, states: &States<'_>) {
+    fn note_start(&mut self, states: &StateReader<'_>) {
         if let Some((cycle, time, place)) = self.announced
             && (states.pending_time() != Some(time) || self.cycle != Some(cycle))
         {
@@ -171,7 +175,11 @@ impl Nodout {
     }
 
     /// Cycle number right after `s t e p`, time between `( at time` and `)`.
-    fn state_line(&self, line: &Line<'_>, states: &mut States<'_>) -> Option<(i64, f64, Place)> {
+    fn state_line(
+        &self,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> Option<(i64, f64, Place)> {
         let parsed = cycle_and_time(line.text).map(|(cycle, time)| (cycle, time, line.into()));
         if parsed.is_none() {
             // Without its time the block cannot be placed: what was pending ends here.
@@ -187,7 +195,7 @@ impl Nodout {
 
     /// Makes the announced state the pending one, unless its other block already did.
     /// Returns whether a state was announced.
-    fn continue_announced(&mut self, states: &mut States<'_>) -> bool {
+    fn continue_announced(&mut self, states: &mut StateReader<'_>) -> bool {
         let Some((cycle, time, place)) = self.announced.take() else { return false };
         if states.pending_time() != Some(time) || self.cycle != Some(cycle) {
             states.begin(Some(time), place);
@@ -197,7 +205,7 @@ impl Nodout {
         true
     }
 
-    fn column_line(&mut self, line: &Line<'_>, states: &mut States<'_>) -> Option<Block> {
+    fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<Block> {
         let [translations, rotations] = *self.tables.get_or_insert_with(|| {
             [
                 states.table("translational rows", &TRANSLATIONS),
@@ -243,7 +251,7 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
 
 /// One node. Ids of more than nine digits push l2a's rows to the right, so the first
 /// field begins where the id ends; a row of any other width is damaged or cut.
-fn row(block: Block, line: &Line<'_>, states: &mut States<'_>) {
+fn row(block: Block, line: &Line<'_>, states: &mut StateReader<'_>) {
     let text = line.text.trim_ascii_end();
     let id_end = id_end(text);
     let first = id_end.max(ID_WIDTH - 1) + 1;

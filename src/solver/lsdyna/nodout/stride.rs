@@ -21,7 +21,7 @@ use super::{COLUMN_LINE, ROTATIONS, STATE, TRANSLATIONS};
 use crate::solver::lsdyna::line::Lines;
 use crate::solver::problem::Place;
 use crate::solver::source::{Source, Stream, Window};
-use crate::solver::states::{States, TableId};
+use crate::solver::states::{StateReader, TableId};
 
 /// Values held while a batch of states waits to be handed on.
 const BATCH_VALUES: usize = 1 << 20;
@@ -99,7 +99,7 @@ impl Stride {
         source: &dyn Source,
         from: Place,
         to: Place,
-        states: &States<'_>,
+        states: &StateReader<'_>,
         tables: [TableId; 2],
     ) -> io::Result<Option<Self>> {
         let Some((blocks, tail)) = blocks(source, from, to, tables)? else { return Ok(None) };
@@ -110,7 +110,7 @@ impl Stride {
     }
 
     /// Whether the blocks hold the rows of the tables, in their order.
-    fn fits(&self, states: &States<'_>, tables: [TableId; 2]) -> bool {
+    fn fits(&self, states: &StateReader<'_>, tables: [TableId; 2]) -> bool {
         let is_once = |table| self.blocks.iter().filter(|b| b.table == table).count() <= 1;
         tables.into_iter().all(|table| {
             let block = self.blocks.iter().find(|b| b.table == table);
@@ -125,7 +125,7 @@ impl Stride {
         &self,
         source: &dyn Source,
         start: Place,
-        states: &mut States<'_>,
+        states: &mut StateReader<'_>,
     ) -> io::Result<Option<Place>> {
         let wanted = &self.wanted;
         let audit = states.is_audit();
@@ -186,7 +186,7 @@ impl Stride {
     }
 
     /// What the states keep of each block, in their order of values.
-    fn wanted(&self, states: &States<'_>) -> Vec<Wanted> {
+    fn wanted(&self, states: &StateReader<'_>) -> Vec<Wanted> {
         let mut wanted: Vec<Wanted> = self
             .blocks
             .iter()
@@ -208,7 +208,7 @@ impl Stride {
     }
 
     /// The same for a table whose columns are to stand one behind the other.
-    pub(crate) fn wanted_by_column(&self, states: &States<'_>) -> Vec<Wanted> {
+    pub(crate) fn wanted_by_column(&self, states: &StateReader<'_>) -> Vec<Wanted> {
         let mut wanted = self.wanted(states);
         for wanted in &mut wanted {
             (wanted.row_step, wanted.column_step) = (1, wanted.rows.len());

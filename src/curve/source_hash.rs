@@ -7,8 +7,8 @@ use super::Case;
 impl Case {
     /// Hash over the recipe without names and paths, and over the bytes of the sources: equal for
     /// a run and for its case under an earlier name. `None` if the case is of no run.
-    pub(crate) fn made_of(&self) -> Option<String> {
-        made_of(
+    pub(crate) fn source_hash(&self) -> Option<String> {
+        source_hash(
             &self.provenance.recipe,
             self.provenance.sources.iter().map(|source| source.blake3.as_str()),
         )
@@ -16,7 +16,10 @@ impl Case {
 }
 
 /// The same of a run's recipe, as JSON, and the hashes of its files.
-pub(crate) fn made_of<'a>(recipe: &str, files: impl Iterator<Item = &'a str>) -> Option<String> {
+pub(crate) fn source_hash<'a>(
+    recipe: &str,
+    files: impl Iterator<Item = &'a str>,
+) -> Option<String> {
     let mut recipe: serde_json::Value = serde_json::from_str(recipe).ok()?;
     let run = recipe.get_mut("run")?.as_object_mut()?;
     run.remove("path");
