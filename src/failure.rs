@@ -12,6 +12,23 @@ use crate::multibody::SimulationError;
 use crate::solver::ReadError;
 use crate::study::RunError;
 
+/// Exit code of a command that did its work.
+pub const DONE: u8 = 0;
+/// Exit code of a command that could not do its work, or only part of it.
+pub const FAILED: u8 = 1;
+/// Exit code for arguments that make no sense or do not fit together.
+pub const USAGE: u8 = 2;
+/// Exit code of a command that did its work, but with damage or warnings, under `--strict`.
+pub const DONE_WITH_WARNINGS: u8 = 3;
+
+/// The exit codes with their meanings, as docs/error-codes.md has them.
+pub const EXIT_CODES: [(u8, &str); 4] = [
+    (DONE, "done"),
+    (FAILED, "failed: nothing was done, or only part of it; standard error says which"),
+    (USAGE, "the arguments make no sense, or do not fit together or with the file"),
+    (DONE_WITH_WARNINGS, "done, but with damage or warnings, and `--strict` was given"),
+];
+
 /// What `--json` prints on standard output when a command fails.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ErrorDocument {

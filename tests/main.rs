@@ -29,6 +29,7 @@ mod new_user;
 mod nsdm;
 mod openradioss;
 mod overwritten;
+mod pages;
 mod plots;
 mod rating;
 mod readers;

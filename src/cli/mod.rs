@@ -39,18 +39,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use crate::error::ErrorCode;
-use crate::failure::{self, ErrorDocument};
+use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::is_same;
 use clap::{FromArgMatches, Parser, Subcommand};
-
-/// Everything went well.
-const DONE: u8 = 0;
-/// The command could not do its work.
-const FAILED: u8 = 1;
-/// The command line makes no sense. clap uses the same code.
-const USAGE: u8 = 2;
-/// Done, but with damage or warnings, and `--strict` was given.
-const DONE_WITH_WARNINGS: u8 = 3;
 
 #[derive(Parser)]
 #[command(name = "crumple", version, about, propagate_version = true)]
