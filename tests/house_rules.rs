@@ -319,6 +319,37 @@ fn no_unwrap_outside_tests() {
     }
 }
 
+/// What src/ may hold. Growth is a decision: the commit that raises a number says why.
+const BUDGET: [(&str, usize); 4] =
+    [("lines", 0), ("files", 0), ("public types", 0), ("error types", 0)];
+
+#[test]
+fn the_source_keeps_its_budget() {
+    let (mut lines, mut files, mut public, mut errors) = (0, 0, 0, 0);
+    for path in self::files(&root().join("src"), "rs") {
+        let text = fs::read_to_string(&path).unwrap();
+        files += 1;
+        for line in text.lines() {
+            lines += 1;
+            let types = ["pub struct ", "pub enum ", "pub trait ", "pub type ", "pub union "];
+            public += usize::from(types.iter().any(|t| line.starts_with(t)));
+            errors +=
+                usize::from(line.starts_with("#[derive") && line.contains("thiserror::Error"));
+        }
+    }
+    for ((what, most), found) in BUDGET.into_iter().zip([lines, files, public, errors]) {
+        assert!(
+            found <= most,
+            "src/ holds {found} {what}, its budget is {most}: shrink it, or raise BUDGET and say why in the commit"
+        );
+        // A budget far above what is there holds nothing.
+        assert!(
+            found + most / 50 + 2 >= most,
+            "src/ holds {found} {what}: lower BUDGET from {most}"
+        );
+    }
+}
+
 #[test]
 fn every_source_file_says_first_what_it_is_for() {
     for folder in ["src", "tests", "examples", "benches"] {
