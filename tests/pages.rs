@@ -29,7 +29,7 @@ fn subcommands(help: &str) -> Vec<String> {
 
 fn describe(page: &mut String, command: &[String]) {
     let arguments: Vec<&str> = command.iter().map(String::as_str).chain(["--help"]).collect();
-    let help = crumple_ok(&root(), &arguments);
+    let help = crumple_ok(root(), &arguments);
     let name = [&["crumple".to_string()], command].concat().join(" ");
     writeln!(
         page,

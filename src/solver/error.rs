@@ -4,6 +4,7 @@ use crate::guess;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::format::entity_word;
 use super::{Entity, NoDataReason, Selection, SolverFile, WantedId};
 
 crate::error::passes_on!(ReadError => SolverFile);
@@ -125,25 +126,6 @@ pub enum ReadError {
         /// Its components, as a list.
         known: String,
     },
-}
-
-/// What an id of this format counts, for messages.
-pub(crate) fn entity_word(format: &str) -> &'static str {
-    match format {
-        "nodout" => "node",
-        "rwforc" | "rwforc/forces" => "rigid wall",
-        "secforc" => "section",
-        "matsum" => "part",
-        "rcforc" | "sleout" => "interface",
-        "spcforc" | "bndout" | "nodfor" | "eloutdet" => "node",
-        "elout" | "deforc" => "element",
-        "swforc" => "weld",
-        "abstat" => "airbag",
-        "jntforc" => "joint",
-        "rbdout" => "rigid body",
-        "curvout" => "curve",
-        _ => "entity",
-    }
 }
 
 /// Holds every selected id and component against what the file has.

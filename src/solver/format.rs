@@ -10,65 +10,72 @@ use super::{ReadError, Selection, SolverFile, lsdyna, openradioss};
 pub struct Format {
     /// Named as the solver names the file.
     pub name: &'static str,
+    /// What an id in it counts, for messages.
+    pub(super) entity: &'static str,
     reader: Reader,
 }
 
 /// Reads a family of files; one result per section.
 type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
+type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<SolverFile>;
 
 enum Reader {
     /// Lines of text. A signature is a line below the header that shows the kind.
-    Text {
-        signature: fn(&[u8]) -> bool,
-        read: fn(&dyn Source, &Selection) -> io::Result<SolverFile>,
-    },
+    Text { signature: fn(&[u8]) -> bool, read: ReadText },
     /// Bytes, told by the first of them; over one or several files; sections inside.
     Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
 }
 
-const fn text(
-    name: &'static str,
-    signature: fn(&[u8]) -> bool,
-    read: fn(&dyn Source, &Selection) -> io::Result<SolverFile>,
-) -> Format {
-    Format { name, reader: Reader::Text { signature, read } }
-}
-
-/// Every file we read. To add one: write its module, add its line here.
+/// Every file we read, in the order in which their signatures are tried. To add one: write its
+/// module with its `FORMAT`, and add that here.
 pub const FORMATS: &[Format] = &[
-    text("nodout", lsdyna::nodout::signature, lsdyna::nodout::read),
-    text("rcforc", lsdyna::rcforc::signature, lsdyna::rcforc::read),
-    text("rwforc", lsdyna::rwforc::signature, lsdyna::rwforc::read),
-    text("secforc", lsdyna::secforc::signature, lsdyna::secforc::read),
-    text("glstat", lsdyna::glstat::signature, lsdyna::glstat::read),
-    text("matsum", lsdyna::matsum::signature, lsdyna::matsum::read),
-    text("spcforc", lsdyna::spcforc::signature, lsdyna::spcforc::read),
-    text("bndout", lsdyna::bndout::signature, lsdyna::bndout::read),
-    text("sleout", lsdyna::sleout::signature, lsdyna::sleout::read),
-    text("swforc", lsdyna::swforc::signature, lsdyna::swforc::read),
-    text("abstat", lsdyna::abstat::signature, lsdyna::abstat::read),
-    text("curvout", lsdyna::curvout::signature, lsdyna::curvout::read),
-    text("deforc", lsdyna::deforc::signature, lsdyna::deforc::read),
-    text("jntforc", lsdyna::jntforc::signature, lsdyna::jntforc::read),
-    text("rbdout", lsdyna::rbdout::signature, lsdyna::rbdout::read),
-    text("nodfor", lsdyna::nodfor::signature, lsdyna::nodfor::read),
+    lsdyna::nodout::FORMAT,
+    lsdyna::rcforc::FORMAT,
+    lsdyna::rwforc::FORMAT,
+    lsdyna::secforc::FORMAT,
+    lsdyna::glstat::FORMAT,
+    lsdyna::matsum::FORMAT,
+    lsdyna::spcforc::FORMAT,
+    lsdyna::bndout::FORMAT,
+    lsdyna::sleout::FORMAT,
+    lsdyna::swforc::FORMAT,
+    lsdyna::abstat::FORMAT,
+    lsdyna::curvout::FORMAT,
+    lsdyna::deforc::FORMAT,
+    lsdyna::jntforc::FORMAT,
+    lsdyna::rbdout::FORMAT,
+    lsdyna::nodfor::FORMAT,
     // Before elout, whose name begins the same.
-    text("eloutdet", lsdyna::elout::signature_of_details, lsdyna::elout::read_details),
-    text("elout", lsdyna::elout::signature, lsdyna::elout::read),
-    Format {
-        name: "binout",
-        reader: Reader::Binary {
-            recognises: lsdyna::binout::recognises,
-            read: lsdyna::binout::read,
-        },
-    },
-    Format {
-        name: "t01",
-        reader: Reader::Binary { recognises: openradioss::recognises, read: openradioss::read },
-    },
+    lsdyna::elout::DETAILS,
+    lsdyna::elout::FORMAT,
+    lsdyna::binout::FORMAT,
+    openradioss::FORMAT,
 ];
 
+/// What an id of this format or section counts, for messages.
+pub(crate) fn entity_word(section: &str) -> &'static str {
+    let name = section.strip_suffix("/forces").unwrap_or(section);
+    FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
+}
+
 impl Format {
+    pub(super) const fn text(
+        name: &'static str,
+        entity: &'static str,
+        signature: fn(&[u8]) -> bool,
+        read: ReadText,
+    ) -> Self {
+        Self { name, entity, reader: Reader::Text { signature, read } }
+    }
+
+    pub(super) const fn binary(
+        name: &'static str,
+        recognises: fn(&[u8]) -> bool,
+        read: ReadSections,
+    ) -> Self {
+        Self { name, entity: "entity", reader: Reader::Binary { recognises, read } }
+    }
+
     pub(super) fn is_signature(&self, line: &[u8]) -> bool {
         match self.reader {
             Reader::Text { signature, .. } => signature(line),
@@ -89,12 +96,12 @@ impl Format {
 
     /// One result per section; a text file is one section.
     pub(super) fn read(
-        &self,
+        &'static self,
         parts: &[Box<dyn Source>],
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         let mut sections = match (&self.reader, parts) {
-            (Reader::Text { read, .. }, [first, ..]) => vec![read(&**first, selection)?],
+            (Reader::Text { read, .. }, [first, ..]) => vec![read(self, &**first, selection)?],
             (Reader::Text { .. }, []) => Vec::new(),
             (Reader::Binary { read, .. }, parts) => read(parts, selection)?,
         };

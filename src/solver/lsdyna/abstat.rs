@@ -1,15 +1,11 @@
 //! `abstat`: state of airbags and control volumes, and of the materials they are made of.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::{Labelled, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const COMPONENTS: [&str; 12] = [
     "volume",
@@ -39,14 +35,13 @@ const AREAS: [Labelled; 3] = [
 ];
 const MAX_MATERIALS: usize = 1_000;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     let text = line.trim_ascii_start();
     text.starts_with(b"time   airbag/cv #") || (text.starts_with(MATERIAL) && text.len() > 60)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("abstat", source, selection, Abstat::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("abstat", "airbag", signature, ascii::read_default::<Abstat>);
 
 #[derive(Default)]
 struct Abstat {
@@ -58,10 +53,6 @@ struct Abstat {
 }
 
 impl Body for Abstat {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text.trim_ascii_start();
         if line.is_blank() || (text.starts_with(b"time   airbag/cv #") && line.is_heading()) {
@@ -83,8 +74,6 @@ impl Body for Abstat {
     fn interrupt(&mut self) {
         self.airbag = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 /// Columns of the k-th number.

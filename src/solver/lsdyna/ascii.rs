@@ -20,6 +20,7 @@ use std::io;
 
 use super::header::{self, LegendFence};
 use super::line::{Line, Lines};
+use crate::solver::format::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
@@ -27,8 +28,10 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
 pub(crate) trait Body {
-    /// Whether a line can only stand below the header.
-    fn is_signature(&self, line: &[u8]) -> bool;
+    /// Whether a line that is not the format's signature can only stand below the header.
+    fn is_signature(&self, _line: &[u8]) -> bool {
+        false
+    }
 
     /// One line below the header, outside a legend, with its line end.
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>);
@@ -40,7 +43,7 @@ pub(crate) trait Body {
     fn unfinished(&mut self, _line: &Line<'_>, _states: &mut StateReader<'_>) {}
 
     /// The end of the file, at `place`.
-    fn end(&mut self, place: Place, states: &mut StateReader<'_>);
+    fn end(&mut self, _place: Place, _states: &mut StateReader<'_>) {}
 
     /// Offered after every line: reads the states from there on at once, if they are laid
     /// out like the ones above, and says at which line to go on.
@@ -60,7 +63,7 @@ pub(crate) trait Body {
 
 /// Header, legend and states of a file, while it is read.
 pub(crate) struct AsciiReader<'a> {
-    format: &'static str,
+    format: &'static Format,
     lines: Lines<Stream<'a>>,
     pub states: StateReader<'a>,
     fence: LegendFence,
@@ -81,7 +84,7 @@ const MAX_SKIPPED: usize = 3;
 /// The first whole state tells which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
 pub(crate) fn read<B: Body>(
-    format: &'static str,
+    format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
     body: impl Fn() -> B,
@@ -99,6 +102,15 @@ pub(crate) fn read<B: Body>(
     Ok(best.file)
 }
 
+/// The same through a body that needs nothing to begin with.
+pub(crate) fn read_default<B: Body + Default>(
+    format: &'static Format,
+    source: &dyn Source,
+    selection: &Selection,
+) -> io::Result<SolverFile> {
+    read(format, source, selection, B::default)
+}
+
 struct Attempt {
     file: SolverFile,
     /// Whether more states disagree with the first whole state than agree.
@@ -107,7 +119,7 @@ struct Attempt {
 
 fn read_from_state(
     skipped: usize,
-    format: &'static str,
+    format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
     mut body: impl Body,
@@ -125,7 +137,7 @@ fn read_from_state(
 
 impl<'a> AsciiReader<'a> {
     pub(crate) fn new(
-        format: &'static str,
+        format: &'static Format,
         source: &'a dyn Source,
         selection: &'a Selection,
     ) -> Self {
@@ -171,7 +183,9 @@ impl<'a> AsciiReader<'a> {
                 body.interrupt();
             }
         } else if is_text(&line, states) {
-            if self.fence.is_open() && body.is_signature(line.text) {
+            if self.fence.is_open()
+                && (self.format.is_signature(line.text) || body.is_signature(line.text))
+            {
                 self.fence.close();
                 let message = "expected {END LEGEND} before the first state";
                 let place = Some((&line).into());
@@ -238,8 +252,8 @@ impl<'a> AsciiReader<'a> {
             reason: NoDataReason::LegendOnly,
         }));
         SolverFile {
-            format: self.format,
-            section: self.format.to_string(),
+            format: self.format.name,
+            section: self.format.name.to_string(),
             solver: self.version.is_some().then(|| "LS-DYNA".to_string()),
             version: self.version,
             title: self.title,

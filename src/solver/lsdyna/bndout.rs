@@ -3,12 +3,9 @@
 //! Rigid bodies (`mat#`), pressures and discrete forces have only been seen in the source of
 //! LSTC's converter `l2a`.
 
-use std::io;
-
 use super::ascii;
 use super::node_forces::{Layout, NodeForces};
-use crate::solver::source::Source;
-use crate::solver::{Selection, SolverFile};
+use crate::solver::format::Format;
 
 const LAYOUT: Layout =
     Layout { state: b" n o d a l   f o r c e/e n e r g y    o u t p u t", block: heading };
@@ -22,10 +19,11 @@ fn heading(line: &[u8]) -> Option<String> {
         .then(|| first.to_ascii_lowercase())
 }
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(LAYOUT.state)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("bndout", source, selection, || NodeForces::new(&LAYOUT))
-}
+pub(crate) const FORMAT: Format =
+    Format::text("bndout", "node", signature, |format, source, selection| {
+        ascii::read(format, source, selection, || NodeForces::new(&LAYOUT))
+    });

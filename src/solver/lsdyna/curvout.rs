@@ -2,26 +2,21 @@
 //!
 //! Seen only with states that list no curve.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" curve data for time step";
 const COLUMN_LINE: &[u8] = b" curve id";
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("curvout", source, selection, Curvout::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("curvout", "curve", signature, ascii::read_default::<Curvout>);
 
 #[derive(Default)]
 struct Curvout {
@@ -29,10 +24,6 @@ struct Curvout {
 }
 
 impl Body for Curvout {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         states.allow_empty_states();
         if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
@@ -51,8 +42,6 @@ impl Body for Curvout {
             states.damage(line, None, message);
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Curvout {

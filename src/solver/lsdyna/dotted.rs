@@ -6,7 +6,6 @@ use super::ascii::Body;
 use super::label_values::is_number;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
 use crate::solver::states::{StateReader, TableId};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
@@ -61,10 +60,6 @@ fn component(label: &str) -> String {
 }
 
 impl Body for Dotted {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        label(line).is_some_and(|label| self.entities.contains(&label))
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             return;
@@ -79,8 +74,6 @@ impl Body for Dotted {
     fn interrupt(&mut self) {
         self.entity = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Dotted {

@@ -9,15 +9,12 @@
 //! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
 //! that looks like erosion cannot fill the memory.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
+use crate::solver::format::Format;
 use crate::solver::problem::{Place, ProblemCode};
-use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const STRESS: &[u8] = b" e l e m e n t   s t r e s s   c a l c u l a t i o n s";
 const STRAIN: &[u8] = b" e l e m e n t   s t r a i n   c a l c u l a t i o n s";
@@ -41,22 +38,20 @@ const BEAM_STRESS_WIDTH: usize = 15;
 /// Combinations of quantity, point and surface in one file; more are damage.
 const MAX_TABLES: usize = 1_000;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
 }
 
 /// Whether a line can only stand in an `eloutdet`.
-pub(crate) fn signature_of_details(line: &[u8]) -> bool {
+fn signature_of_details(line: &[u8]) -> bool {
     line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("elout", source, selection, Elout::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("elout", "element", signature, ascii::read_default::<Elout>);
 
-pub(crate) fn read_details(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("eloutdet", source, selection, Elout::default)
-}
+pub(crate) const DETAILS: Format =
+    Format::text("eloutdet", "node", signature_of_details, ascii::read_default::<Elout>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Quantity {

@@ -3,15 +3,11 @@
 //! A state is label → value, and labels may be absent. A cut removes them from the end, so a last state that ends
 //! early is not whole.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::dotted::split;
 use super::line::{Field, Line, integer, is_whole_real, real};
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::StateReader;
-use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" dt of cycle";
 /// "label padded with dots to column 32, value columns 33–46".
@@ -25,13 +21,12 @@ const NAMES: [(&str, &str); 3] = [
     ("time per zone cycle.(nanosec)", "nzc"),
 ];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("glstat", source, selection, Glstat::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("glstat", "entity", signature, ascii::read_default::<Glstat>);
 
 #[derive(Default)]
 struct Glstat {
@@ -42,10 +37,6 @@ struct Glstat {
 const PROPERTIES: &[u8] = b"m a s s   p r o p e r t i e s";
 
 impl Body for Glstat {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
@@ -91,8 +82,6 @@ impl Body for Glstat {
             _ => states.damage(line, Some(columns), "expected a time".into()),
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 /// Where the value that begins behind `from` ends: with a whole number, else where values

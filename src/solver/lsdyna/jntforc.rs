@@ -1,18 +1,16 @@
 //! `jntforc`: forces of joints and moments of joint stiffnesses.
 
-use std::io;
-
 use super::ascii;
 use super::dotted::{self, Dotted};
-use crate::solver::source::Source;
-use crate::solver::{Selection, SolverFile};
+use crate::solver::format::Format;
 
 const ENTITIES: &[&str] = &["joint number", "joint ID", "joint stiffness id number"];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     dotted::label(line).is_some_and(|label| ENTITIES.contains(&label))
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("jntforc", source, selection, || Dotted::new(ENTITIES))
-}
+pub(crate) const FORMAT: Format =
+    Format::text("jntforc", "joint", signature, |format, source, selection| {
+        ascii::read(format, source, selection, || Dotted::new(ENTITIES))
+    });

@@ -1,15 +1,11 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::{Labelled, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" time =";
 const PART: &[u8] = b" mat.#=";
@@ -53,13 +49,12 @@ const LINES: [(&str, &[Labelled]); 4] = [
     ),
 ];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(PART)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("matsum", source, selection, Matsum::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("matsum", "part", signature, ascii::read_default::<Matsum>);
 
 #[derive(Default)]
 struct Matsum {
@@ -69,7 +64,7 @@ struct Matsum {
 
 impl Body for Matsum {
     fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line) || line.starts_with(STATE)
+        line.starts_with(STATE)
     }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
@@ -113,8 +108,6 @@ impl Body for Matsum {
     fn interrupt(&mut self) {
         self.part = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Matsum {

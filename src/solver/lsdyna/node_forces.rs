@@ -5,7 +5,7 @@ use super::ascii::Body;
 use super::label_values::{Labelled, components, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::problem::ProblemCode;
 use crate::solver::states::{StateReader, TableId};
 
 const WIDTH: usize = 13;
@@ -141,10 +141,6 @@ impl NodeForces {
 }
 
 impl Body for NodeForces {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        line.starts_with(self.layout.state)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         let start = text.trim_ascii_start();
@@ -192,6 +188,4 @@ impl Body for NodeForces {
     fn interrupt(&mut self) {
         self.body = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }

@@ -2,16 +2,12 @@
 //!
 //! Never seen with data; read as the source of LSTC's converter `l2a` writes it.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
 const BODIES: [&[u8]; 2] = [b" nodal rigid body", b" rigid body"];
@@ -45,13 +41,12 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
     (b"row 3", &["dircos_31", "dircos_32", "dircos_33"], &[]),
 ];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("rbdout", source, selection, Rbdout::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("rbdout", "rigid body", signature, ascii::read_default::<Rbdout>);
 
 #[derive(Default)]
 struct Rbdout {
@@ -61,10 +56,6 @@ struct Rbdout {
 }
 
 impl Body for Rbdout {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || self.value(line, states).is_some() {
             return;
@@ -77,8 +68,6 @@ impl Body for Rbdout {
     fn interrupt(&mut self) {
         self.body = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Rbdout {

@@ -1,14 +1,10 @@
 //! `rcforc`: resultant forces of contact interfaces, one line per side and state.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 /// Printed twice per state, without a time, for single-surface contacts.
 const UNDEFINED: &[u8] = b"is single surface";
@@ -49,13 +45,12 @@ const COLUMNS: [Column; 9] = [
     column("tie_area", b"  tied area ", 163, false),
 ];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some())
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("rcforc", source, selection, Rcforc::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("rcforc", "interface", signature, ascii::read_default::<Rcforc>);
 
 #[derive(Default)]
 struct Rcforc {
@@ -66,10 +61,6 @@ struct Rcforc {
 }
 
 impl Body for Rcforc {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             return;
@@ -91,8 +82,6 @@ impl Body for Rcforc {
             );
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 
     fn single_surfaces(&self) -> &[i64] {
         &self.undefined

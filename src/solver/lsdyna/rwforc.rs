@@ -1,14 +1,11 @@
 //! `rwforc`: forces on rigid walls, one line per wall and state.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
+use crate::solver::format::Format;
 use crate::solver::problem::{Place, ProblemCode};
-use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const COMPONENTS: [&str; 4] = ["normal_force", "x_force", "y_force", "z_force"];
 /// "time columns 1–12 E12.5, wall id 13–20, four values of 15 (E15.6)".
@@ -16,13 +13,12 @@ const TIME: (usize, usize) = (1, 12);
 const WALL: (usize, usize) = (13, 20);
 const VALUE_WIDTH: usize = 15;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     is_column_line(line) || is_node_set_heading(line)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("rwforc", source, selection, Rwforc::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("rwforc", "rigid wall", signature, ascii::read_default::<Rwforc>);
 
 #[derive(Default)]
 struct Rwforc {
@@ -34,10 +30,6 @@ struct Rwforc {
 }
 
 impl Body for Rwforc {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         if line.is_blank() {

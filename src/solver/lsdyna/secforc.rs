@@ -3,15 +3,11 @@
 //! Seen with data only as LSTC's converter `l2a` writes it; of the solver's own files only
 //! ones that end after the header.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 /// "(1) id I12, time E15.5, then fields of 15, 12, 12, 12; (2), (3) 27 columns of system or
 /// blanks, then the same fields".
@@ -26,13 +22,12 @@ const LINES: [(&str, [&str; 4]); 3] = [
     ("sections' centroids", ["x_centroid", "y_centroid", "z_centroid", "area"]),
 ];
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.trim_ascii_start().starts_with(b"line#1  section#")
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("secforc", source, selection, Secforc::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("secforc", "section", signature, ascii::read_default::<Secforc>);
 
 #[derive(Default)]
 struct Secforc {
@@ -42,10 +37,6 @@ struct Secforc {
 }
 
 impl Body for Secforc {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             self.section = None;
@@ -57,8 +48,6 @@ impl Body for Secforc {
     fn interrupt(&mut self) {
         self.section = None;
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Secforc {

@@ -1,15 +1,11 @@
 //! `sleout`: energies of contact interfaces, one row each, and their sums.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const STATE: &[u8] = b" contact interface energy file, time=";
 const TIME_WIDTH: usize = 14;
@@ -29,13 +25,12 @@ const SUMS: [(&[u8], &str); 6] = [
 ];
 const SUM_WIDTH: usize = 14;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("sleout", source, selection, Sleout::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("sleout", "interface", signature, ascii::read_default::<Sleout>);
 
 #[derive(Default)]
 struct Sleout {
@@ -45,10 +40,6 @@ struct Sleout {
 }
 
 impl Body for Sleout {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         let text = line.text;
         if line.is_blank() || (text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
@@ -65,8 +56,6 @@ impl Body for Sleout {
             states.damage(line, None, message);
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Sleout {

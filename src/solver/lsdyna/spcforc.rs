@@ -2,17 +2,13 @@
 //!
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
-use std::collections::HashMap;
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
+use std::collections::HashMap;
 
 const HEADING: &[u8] = b"single point constraint forces";
 const STATE: &[u8] = b" output at time =";
@@ -27,13 +23,12 @@ const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.trim_ascii() == HEADING || line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("spcforc", source, selection, Spcforc::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("spcforc", "node", signature, ascii::read_default::<Spcforc>);
 
 /// Forces and moments.
 const COMPONENTS: [[&str; 3]; 2] =
@@ -48,10 +43,6 @@ struct Spcforc {
 }
 
 impl Body for Spcforc {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || line.text.trim_ascii() == HEADING {
             return;
@@ -68,8 +59,6 @@ impl Body for Spcforc {
             states.damage(line, None, message);
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Spcforc {

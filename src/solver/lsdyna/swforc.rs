@@ -1,15 +1,11 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
-use std::io;
-
 use super::ascii::{self, Body};
 use super::label_values::{is_number, numbers};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::problem::Place;
-use crate::solver::source::Source;
+use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 
 const COLUMN_LINE: &[u8] = b" constraint #";
 const COMPONENTS: [&str; 7] =
@@ -27,13 +23,12 @@ const FAILURE_TIME_WIDTH: usize = 12;
 /// Kinds of connection, each with ids of its own.
 const MAX_KINDS: usize = 20;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(COLUMN_LINE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("swforc", source, selection, Swforc::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("swforc", "weld", signature, ascii::read_default::<Swforc>);
 
 #[derive(Default)]
 struct Swforc {
@@ -41,10 +36,6 @@ struct Swforc {
 }
 
 impl Body for Swforc {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
             return;
@@ -58,8 +49,6 @@ impl Body for Swforc {
             states.damage(line, Some([1, line.text.len().max(1)]), message);
         }
     }
-
-    fn end(&mut self, _: Place, _: &mut StateReader<'_>) {}
 }
 
 impl Swforc {

@@ -15,6 +15,7 @@ mod states;
 use std::io;
 use std::sync::Arc;
 
+use super::format::Format;
 use super::lsdyna::nodout::TRANSLATIONS;
 use super::problem::{Problem, ProblemCode};
 use super::source::{Source, Stream};
@@ -61,18 +62,17 @@ const GLOBAL_COMPONENTS: [&str; 22] = [
 const FORCE_COMPONENTS: [&str; 3] = ["x_force", "y_force", "z_force"];
 const IMPULSES: usize = 6;
 
+pub(crate) const FORMAT: Format = Format::binary("t01", recognises, read);
+
 /// Whether a file begins like a T01: a record of a code and a title of 80 characters.
-pub(crate) fn recognises(head: &[u8]) -> bool {
+fn recognises(head: &[u8]) -> bool {
     let Some(words) = head.get(..8) else { return false };
     let code = i32::from_be_bytes([words[4], words[5], words[6], words[7]]);
     words[..4] == 84i32.to_be_bytes() && (1_000..100_000).contains(&code)
 }
 
 /// Reads the selected histories of every section, or of the one selected.
-pub(crate) fn read(
-    parts: &[Box<dyn Source>],
-    selection: &Selection,
-) -> io::Result<Vec<SolverFile>> {
+fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
     let Some(source) = parts.first() else { return Ok(Vec::new()) };
     let input = Stream::new(&**source);
     let mut records = Records::new(input);

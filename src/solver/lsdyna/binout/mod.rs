@@ -28,11 +28,14 @@ mod values;
 use std::io;
 
 use super::lsda::Header;
+use crate::solver::format::Format;
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};
 use bytes::Bytes;
 use records::Tree;
 use section::SectionReader;
+
+pub(crate) const FORMAT: Format = Format::binary("binout", recognises, read);
 
 /// Whether a file begins with the header of an LSDA container.
 pub(crate) fn recognises(head: &[u8]) -> bool {
@@ -41,10 +44,7 @@ pub(crate) fn recognises(head: &[u8]) -> bool {
 
 /// Reads the selected histories of every section, or of the one selected. Empty if no
 /// section is one of a binout.
-pub(crate) fn read(
-    parts: &[Box<dyn Source>],
-    selection: &Selection,
-) -> io::Result<Vec<SolverFile>> {
+fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
     let mut tree = Tree::default();
     for (number, part) in parts.iter().enumerate() {
         tree.walk(number, &**part)?;

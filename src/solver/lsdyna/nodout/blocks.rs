@@ -47,7 +47,7 @@ impl Blocks {
     /// `None` if the file is damaged, has too few states to tell their layout, or too few
     /// values to be worth it: then the line reader gives what there is.
     pub(crate) fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
-        let mut frame = AsciiReader::new("nodout", &*source, selection);
+        let mut frame = AsciiReader::new(&super::FORMAT, &*source, selection);
         let mut body = Nodout::default();
         let mut above = None;
         let start = loop {

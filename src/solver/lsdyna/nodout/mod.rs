@@ -17,10 +17,10 @@ use std::io;
 use super::ascii::{self, Body};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
+use crate::solver::format::Format;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile};
 pub use blocks::Blocks;
 use stride::Stride;
 
@@ -60,13 +60,12 @@ const ROTATIONS: [&str; 9] = [
 const ID_WIDTH: usize = 10;
 const FIELD_WIDTH: usize = 12;
 
-pub(crate) fn signature(line: &[u8]) -> bool {
+fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
 }
 
-pub(crate) fn read(source: &dyn Source, selection: &Selection) -> io::Result<SolverFile> {
-    ascii::read("nodout", source, selection, Nodout::default)
-}
+pub(crate) const FORMAT: Format =
+    Format::text("nodout", "node", signature, ascii::read_default::<Nodout>);
 
 #[derive(Default)]
 struct Nodout {
@@ -89,10 +88,6 @@ struct Block {
 }
 
 impl Body for Nodout {
-    fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line)
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
         if line.is_blank() {
             // The blank line between state line and column line ends nothing.
