@@ -11,7 +11,7 @@ use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, run_python,
 };
 use crumple::formats::FORMATS;
-use crumple::formats::{ReadOptions, read};
+use crumple::formats::{ReadOptions, Tail, read};
 use crumple::unit::UnitSystem;
 use serde_json::{Value, json};
 
@@ -817,4 +817,32 @@ fn the_targets_rebound_is_said() {
         );
     }
     assert!((work("soft.csv") / work("hard.csv") - 1.0).abs() < 1e-3);
+}
+
+/// What a format says it can hold it holds, and what it does not say is refused.
+#[test]
+fn formats_hold_what_they_declare() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for format in FORMATS.iter().filter(|f| !f.takes_model() && !f.takes_case()) {
+        let output = format!("c.{}", format.extensions[0]);
+        let with = |more: &[&str]| {
+            let arguments = ["export", "lead50.json", "--to", format.name, "-o", &output];
+            let done = crumple_in(here, &[&arguments, more].concat());
+            (done.status.code(), fs::read(here.join(&output)).unwrap_or_default())
+        };
+        let (_, plain) = with(&[]);
+        for (more, is_declared) in [
+            (&["--deck"][..], format.deck),
+            (&["--curve-id", "77"], format.ids),
+            (&["--material", "s06"], format.materials),
+            (&["--tail", "none"], format.tail != Tail::None),
+        ] {
+            let (code, bytes) = with(more);
+            assert_eq!(code, Some(if is_declared { 0 } else { 2 }), "{} {more:?}", format.name);
+            assert_eq!(bytes != plain, is_declared, "{} {more:?} changes nothing", format.name);
+        }
+        let has_band = plain.windows(6).any(|w| w == b"fd_low" || w == b",lo,hi");
+        assert!(has_band == format.band || format.name == "json", "{}", format.name);
+    }
 }

@@ -213,9 +213,9 @@ impl Target {
     pub(super) fn check(&self, formats: &[&Format]) -> Result<(), Failure> {
         let is_of_none = |takes: fn(&Format) -> bool| !formats.iter().any(|f| takes(f));
         for (option, is_asked, takes) in [
-            ("--deck", self.deck, Format::has_deck as fn(&Format) -> bool),
-            ("--material", self.material.is_some(), Format::has_materials),
-            ("--curve-id", self.curve_id.is_some(), Format::has_ids),
+            ("--deck", self.deck, (|f| f.deck) as fn(&Format) -> bool),
+            ("--material", self.material.is_some(), |f| f.materials),
+            ("--curve-id", self.curve_id.is_some(), |f| f.ids),
             ("--tail", self.tail.is_some(), Format::takes_tail),
             ("--soften", self.soften, Format::takes_tail),
         ] {
@@ -231,7 +231,7 @@ impl Target {
     /// Refuses what a whole model has no use for.
     fn check_for_model(&self, format: &Format) -> Result<(), Failure> {
         let of_curves = self.units.is_some() || self.soften;
-        let forced = self.force.is_some() && format.name == "onnx";
+        let forced = self.force.is_some() && !format.over_speeds;
         if of_curves || forced {
             Err(Failure::Usage(format!(
                 "{} holds a whole model in SI: remove --units and --soften{}",
@@ -288,7 +288,7 @@ fn export(
     input.check_said(&chosen)?;
     if format.takes_model() {
         args.target.check_for_model(format)?;
-        chosen.check_for_model(format.name == "table")?;
+        chosen.check_for_model(format.over_speeds)?;
         let model = input.model(format.name)?;
         let mut options = args.target.options(output);
         options.speeds_m_per_s = speed.clone();

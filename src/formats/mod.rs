@@ -43,7 +43,7 @@ pub use read::error::Place;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};
 pub use tail::Tail;
 
-/// One target: its name, its file extensions, how it is written.
+/// One target: its name, its file extensions, what it can hold, how it is written.
 pub struct Format {
     /// As `--to` takes it.
     pub name: &'static str,
@@ -51,8 +51,19 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// One line for `export --list`.
     pub description: &'static str,
-    /// What its curves do beyond the maximal crush if nothing else is asked for.
+    /// What its curves do beyond the maximal crush if nothing else is asked for; `Tail::None` of
+    /// files whose curves cannot go on.
     pub tail: Tail,
+    /// Whether it can be a complete input of one mass on the spring (`--deck`).
+    pub deck: bool,
+    /// Whether it has several spring materials (`--material`).
+    pub materials: bool,
+    /// Whether curves have numbers in it (`--curve-id`).
+    pub ids: bool,
+    /// Whether a band stands beside its curves.
+    pub band: bool,
+    /// Whether it holds a model at several speeds, so that it takes what is asked of a model.
+    pub(crate) over_speeds: bool,
     writer: Writer,
 }
 
@@ -69,99 +80,124 @@ enum Writer {
     Case(fn(&Case, &Options) -> Result<Exported, Error>),
 }
 
-/// Every format we write. To add one: write its module, add its line here.
+/// Every format we write. To add one: write its module, add its line here with what it can hold.
 pub const FORMATS: &[Format] = &[
+    Format::new(
+        "json",
+        &["json"],
+        "predicted curve with everything known of it, SI (master format)",
+        Tail::None,
+        Writer::Whole(json::write),
+    ),
     Format {
-        name: "json",
-        extensions: &["json"],
-        description: "predicted curve with everything known of it, SI (master format)",
-        tail: Tail::None,
-        writer: Writer::Whole(json::write),
+        band: true,
+        ..Format::new(
+            "csv",
+            &["csv"],
+            "columns of deflection and force with # header lines, SI or --units",
+            Tail::Bottom,
+            Writer::Each(csv::write),
+        )
     },
     Format {
-        name: "csv",
-        extensions: &["csv"],
-        description: "columns of deflection and force with # header lines, SI or --units",
-        tail: Tail::Bottom,
-        writer: Writer::Each(csv::write),
+        deck: true,
+        materials: true,
+        ids: true,
+        ..Format::new(
+            "lsdyna",
+            &["k", "key", "dyn"],
+            "LS-DYNA curves with a spring material, in the study's units or --units; --deck",
+            Tail::Bottom,
+            Writer::Together(lsdyna::write),
+        )
     },
     Format {
-        name: "lsdyna",
-        extensions: &["k", "key", "dyn"],
-        description: "LS-DYNA curves with a spring material, in the study's units or --units; --deck",
-        tail: Tail::Bottom,
-        writer: Writer::Together(lsdyna::write),
+        deck: true,
+        ids: true,
+        ..Format::new(
+            "radioss",
+            &["rad"],
+            "Radioss /FUNCT and /PROP/TYPE4, in the study's units or --units; --deck",
+            Tail::Bottom,
+            Writer::Together(radioss::write),
+        )
     },
     Format {
-        name: "radioss",
-        extensions: &["rad"],
-        description: "Radioss /FUNCT and /PROP/TYPE4, in the study's units or --units; --deck",
-        tail: Tail::Bottom,
-        writer: Writer::Together(radioss::write),
+        deck: true,
+        ids: true,
+        ..Format::new(
+            "calculix",
+            &["inp"],
+            "CalculiX or Abaqus *SPRING, NONLINEAR (elastic, at most 200 rows), SI or --units",
+            Tail::Bottom,
+            Writer::Together(calculix::write),
+        )
     },
     Format {
-        name: "calculix",
-        extensions: &["inp"],
-        description: "CalculiX or Abaqus *SPRING, NONLINEAR (elastic, at most 200 rows), SI or --units",
-        tail: Tail::Bottom,
-        writer: Writer::Together(calculix::write),
+        ids: true,
+        ..Format::new(
+            "adams",
+            &["cmd", "adm", "spr"],
+            "Adams spline: View command, Solver statement or spring property file",
+            Tail::Bottom,
+            Writer::Together(adams::write),
+        )
     },
+    Format::new(
+        "fmi2",
+        &["fmu"],
+        "FMU of FMI 2.0, model exchange and co-simulation, whole law with memory, SI",
+        Tail::Bottom,
+        Writer::Each(fmu_export::write_fmi2),
+    ),
+    Format::new(
+        "fmi3",
+        &["fmu"],
+        "the same of FMI 3.0",
+        Tail::Bottom,
+        Writer::Each(fmu_export::write_fmi3),
+    ),
+    Format::new(
+        "modelica",
+        &["mo", "txt"],
+        "Modelica package with the spring and its memory, or a CombiTable text, SI",
+        Tail::Bottom,
+        Writer::Together(modelica::write),
+    ),
     Format {
-        name: "adams",
-        extensions: &["cmd", "adm", "spr"],
-        description: "Adams spline: View command, Solver statement or spring property file",
-        tail: Tail::Bottom,
-        writer: Writer::Together(adams::write),
+        band: true,
+        ..Format::new(
+            "mat",
+            &["mat"],
+            "MAT v4 matrices for MATLAB, Octave, scipy and Modelica, SI",
+            Tail::Bottom,
+            Writer::Together(mat::write),
+        )
     },
+    Format::new(
+        "iso-mme",
+        &["mme"],
+        "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
+        Tail::None,
+        Writer::Case(iso_mme::write_case),
+    ),
     Format {
-        name: "fmi2",
-        extensions: &["fmu"],
-        description: "FMU of FMI 2.0, model exchange and co-simulation, whole law with memory, SI",
-        tail: Tail::Bottom,
-        writer: Writer::Each(fmu_export::write_fmi2),
+        over_speeds: true,
+        ..Format::new(
+            "table",
+            &["h5", "hdf5"],
+            "force over speed and deflection of a model, HDF5 or CSV, SI",
+            Tail::Hold,
+            Writer::Model(table::write),
+        )
     },
-    Format {
-        name: "fmi3",
-        extensions: &["fmu"],
-        description: "the same of FMI 3.0",
-        tail: Tail::Bottom,
-        writer: Writer::Each(fmu_export::write_fmi3),
-    },
-    Format {
-        name: "modelica",
-        extensions: &["mo", "txt"],
-        description: "Modelica package with the spring and its memory, or a CombiTable text, SI",
-        tail: Tail::Bottom,
-        writer: Writer::Together(modelica::write),
-    },
-    Format {
-        name: "mat",
-        extensions: &["mat"],
-        description: "MAT v4 matrices for MATLAB, Octave, scipy and Modelica, SI",
-        tail: Tail::Bottom,
-        writer: Writer::Together(mat::write),
-    },
-    Format {
-        name: "iso-mme",
-        extensions: &["mme"],
-        description: "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
-        tail: Tail::None,
-        writer: Writer::Case(iso_mme::write_case),
-    },
-    Format {
-        name: "table",
-        extensions: &["h5", "hdf5"],
-        description: "force over speed and deflection of a model, HDF5 or CSV, SI",
-        tail: Tail::Hold,
-        writer: Writer::Model(table::write),
-    },
-    Format {
-        name: "onnx",
-        extensions: &["onnx"],
-        description: "forest model (of crumple train) as ONNX, SI; splits double, output float",
-        tail: Tail::None,
-        writer: Writer::Model(onnx::write),
-    },
+    Format::new(
+        "onnx",
+        &["onnx"],
+        "forest model (of crumple train) as ONNX, SI; splits double, output float",
+        Tail::None,
+        Writer::Model(onnx::write),
+    ),
 ];
 
 /// Choices that some targets take.
@@ -235,6 +271,28 @@ pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
+    const fn new(
+        name: &'static str,
+        extensions: &'static [&'static str],
+        description: &'static str,
+        tail: Tail,
+        writer: Writer,
+    ) -> Self {
+        let (deck, materials, ids, band, over_speeds) = (false, false, false, false, false);
+        Self {
+            name,
+            extensions,
+            description,
+            tail,
+            deck,
+            materials,
+            ids,
+            band,
+            over_speeds,
+            writer,
+        }
+    }
+
     /// Whether it is made of a whole model, not of its curves.
     pub fn takes_model(&self) -> bool {
         matches!(self.writer, Writer::Model(_))
@@ -250,33 +308,9 @@ impl Format {
         matches!(self.writer, Writer::Whole(_))
     }
 
-    /// Whether it can be a complete input of one mass on the spring.
-    pub(crate) fn has_deck(&self) -> bool {
-        ["lsdyna", "radioss", "calculix"].contains(&self.name)
-    }
-
-    /// Whether it has several spring materials.
-    pub(crate) fn has_materials(&self) -> bool {
-        self.name == "lsdyna"
-    }
-
     /// Whether its curves can go on beyond the maximal crush.
     pub(crate) fn takes_tail(&self) -> bool {
-        match self.writer {
-            Writer::Each(_) | Writer::Together(_) => true,
-            Writer::Model(_) => self.name == "table",
-            Writer::Whole(_) | Writer::Case(_) => false,
-        }
-    }
-
-    /// Whether a band stands beside its curves.
-    pub(crate) fn holds_band(&self) -> bool {
-        ["csv", "mat"].contains(&self.name)
-    }
-
-    /// Whether curves have numbers in it.
-    pub(crate) fn has_ids(&self) -> bool {
-        self.has_deck() || self.name == "adams"
+        self.tail != Tail::None
     }
 
     /// The files of a model.
@@ -355,7 +389,7 @@ impl Format {
     /// What has been done to the curves, and what is not written, behind the target's own notes.
     fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
         exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
-        if self.holds_band() {
+        if self.band {
             exported.notes.extend(curves.iter().filter_map(ExportCurve::no_band_note));
         }
         exported
