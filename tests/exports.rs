@@ -825,11 +825,16 @@ fn formats_hold_what_they_declare() {
     let folder = demo_folder();
     let here = folder.path();
     for format in FORMATS.iter().filter(|f| !f.takes_model() && !f.takes_case()) {
-        let output = format!("c.{}", format.extensions[0]);
         let with = |more: &[&str]| {
+            // Several files go into a folder of that name.
+            let output = format!("{}{}", format.name, more.concat());
             let arguments = ["export", "lead50.json", "--to", format.name, "-o", &output];
             let done = crumple_in(here, &[&arguments, more].concat());
-            (done.status.code(), fs::read(here.join(&output)).unwrap_or_default())
+            let path = here.join(&output);
+            let first = |path: &Path| fs::read(path.join(&entries(path)[0])).unwrap();
+            let bytes =
+                if path.is_dir() { first(&path) } else { fs::read(&path).unwrap_or_default() };
+            (done.status.code(), bytes)
         };
         let (_, plain) = with(&[]);
         for (more, is_declared) in [
@@ -840,7 +845,7 @@ fn formats_hold_what_they_declare() {
         ] {
             let (code, bytes) = with(more);
             assert_eq!(code, Some(if is_declared { 0 } else { 2 }), "{} {more:?}", format.name);
-            assert_eq!(bytes != plain, is_declared, "{} {more:?} changes nothing", format.name);
+            assert!(!is_declared || bytes != plain, "{} {more:?} changes nothing", format.name);
         }
         let has_band = plain.windows(6).any(|w| w == b"fd_low" || w == b",lo,hi");
         assert!(has_band == format.band || format.name == "json", "{}", format.name);

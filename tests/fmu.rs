@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::{build_fixture, python_of, root};
-use crumple::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind};
+use crumple::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::formats::{FmiVersion, Spring, archive, binaries};
@@ -63,7 +63,7 @@ fn recorded() -> ForceLaw {
     let cases = database.cases("lead-car-wall");
     let case =
         cases.iter().find(|c| (c.conditions.speed.m_per_s - SPEED_M_PER_S).abs() < 0.1).unwrap();
-    let curve = DrivingCurve::recorded(case).unwrap();
+    let curve = ForceCurve::recorded(case).unwrap();
     assert!(matches!(curve.unloading, CurveUnloading::Recorded { .. }));
     ForceLaw::of_curve(&curve, UnloadingChoice::Own, EnvelopeEnd::Hold)
 }

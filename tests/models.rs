@@ -8,8 +8,8 @@ use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::audit;
 use crumple::curve::unloading_stiffness;
 use crumple::curve::{
-    Case, CaseId, Conditions, Curve, DrivingCurve, ForceKind, Masses, Parameter, Provenance,
-    Quality, RecordedCurves,
+    Case, CaseId, Conditions, Curve, ForceCurve, ForceKind, Masses, Parameter, Provenance, Quality,
+    RecordedCurves,
 };
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
@@ -1212,8 +1212,7 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
         assert_eq!(cases.len(), speeds);
         for case in cases {
             let reference = crumple::assess::Reference::of(case).unwrap();
-            let run =
-                reference.run(&crumple::curve::DrivingCurve::recorded(case).unwrap()).unwrap();
+            let run = reference.run(&crumple::curve::ForceCurve::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
             assert!(errors.velocity_l1 < 0.004, "{group} {}: {errors:?}", case.id.name);
             assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.id.name);
@@ -1238,7 +1237,7 @@ fn what_drives_a_train_is_the_prediction() {
                     let reported = curve.driving(force).unwrap();
                     assert_eq!(driving.loading, reported.loading);
                     assert!(driving.beyond.is_some() && reported.beyond.is_none());
-                    let stiffness = |c: &DrivingCurve| c.unloading.stiffness_n_per_m().unwrap();
+                    let stiffness = |c: &ForceCurve| c.unloading.stiffness_n_per_m().unwrap();
                     assert!((stiffness(&driving) / stiffness(&reported) - 1.0).abs() < 1e-12);
                     assert!(!warnings.is_empty() || mass.is_none());
                 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::error::NotLeftOut;
 use super::reference::{MotionErrors, Reference};
-use crate::curve::driving::DrivingCurve;
+use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
 use crate::signal::l1_ratio;
@@ -86,7 +86,7 @@ impl<'a> LeftOutCase<'a> {
     /// That of the body's motion is made from FE's speeds, so its errors check that curve, force law
     /// and run are consistent; only a contact force's are a floor for predictions of it.
     pub(crate) fn floors(&self) -> Result<Vec<Floor>, Error> {
-        let floor = |(kind, curve): (ForceKind, DrivingCurve)| {
+        let floor = |(kind, curve): (ForceKind, ForceCurve)| {
             let errors = self.reference.errors_with(&curve)?;
             Ok(Floor {
                 force: kind.name().into(),
@@ -102,9 +102,9 @@ impl<'a> LeftOutCase<'a> {
     }
 
     /// FE's own curves, by force.
-    fn own_curves(&self) -> Vec<(ForceKind, DrivingCurve)> {
+    fn own_curves(&self) -> Vec<(ForceKind, ForceCurve)> {
         let of_body = |envelope: &Envelope| {
-            let recorded = DrivingCurve::recorded(self.case);
+            let recorded = ForceCurve::recorded(self.case);
             (ForceKind::Body, recorded.unwrap_or_else(|| rebounding(self.own, envelope)))
         };
         match self.rest.force_kind {
@@ -216,8 +216,8 @@ pub(super) fn forces_n(envelope: &Envelope, deflection_m: &[f64]) -> Vec<f64> {
 }
 
 /// The recipe's force, or another of the case, with the unloading that gives FE's rebound.
-pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> DrivingCurve {
-    DrivingCurve::bare(envelope.clone()).rebounding(
+pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> ForceCurve {
+    ForceCurve::bare(envelope.clone()).rebounding(
         own.effective_mass_kg,
         own.motion.rebound_speed_m_per_s,
         own.unloading_stiffness_n_per_m,

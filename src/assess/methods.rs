@@ -4,7 +4,7 @@ use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
 use super::settings::ComparisonSettings;
 use super::validate::choose_and_fit;
-use crate::curve::{Case, DrivingCurve, Envelope, ForceKind};
+use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
 use crate::error::Error;
 use crate::nsdm::{self, Target};
@@ -20,7 +20,7 @@ pub(super) struct Method {
     pub name: &'static str,
     /// What its curve was made from.
     pub made_from: String,
-    pub curve: DrivingCurve,
+    pub curve: ForceCurve,
     /// FE's force and the method's, of one kind of force.
     pub forces: (Envelope, Envelope),
     pub times: Times,
@@ -60,15 +60,15 @@ pub(super) fn of_fe(left_out: &LeftOutCase<'_>) -> Vec<Method> {
     let declared = of_recipe(own, case.curves.force_kind);
     let mut methods = vec![method("fe", declared, &own.envelope)];
     if case.curves.force_kind == ForceKind::Contact {
-        let recorded = DrivingCurve::recorded(case);
+        let recorded = ForceCurve::recorded(case);
         methods.extend(recorded.map(|curve| method("fe_body", curve, &own.motion.force)));
     }
     methods
 }
 
 /// The recipe's force of a case, rebounding as FE does.
-fn of_recipe(case: &TrainingCase, force: ForceKind) -> DrivingCurve {
-    DrivingCurve { force: Some(force), ..rebounding(case, &case.envelope) }
+fn of_recipe(case: &TrainingCase, force: ForceKind) -> ForceCurve {
+    ForceCurve { kind: Some(force), ..rebounding(case, &case.envelope) }
 }
 
 /// The FE curve of one other speed, as it is.
@@ -184,7 +184,7 @@ fn method(
     made_from: String,
     left_out: &LeftOutCase<'_>,
     curve: &PredictedCurve,
-    driving: DrivingCurve,
+    driving: ForceCurve,
     (fit_s, predict_s): (f64, f64),
 ) -> Result<Method, Error> {
     let forces = (left_out.own.envelope.clone(), curve.envelope()?);

@@ -6,7 +6,7 @@
 //! is scaled by the mean force and not by the force itself.
 
 use crate::curve::body::filtered;
-use crate::curve::{Case, DrivingCurve};
+use crate::curve::{Case, ForceCurve};
 use crate::error::{Error, error};
 use crate::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, UnloadingChoice, simulate,
@@ -82,11 +82,11 @@ impl Reference {
         self.time_s[self.inside - 1]
     }
 
-    /// Runs one body of the case's effective mass against a wall with a driving curve.
+    /// Runs one body of the case's effective mass against a wall with a force curve.
     ///
     /// # Errors
     /// If the curve makes no run.
-    pub fn run(&self, curve: &DrivingCurve) -> Result<Run, Error> {
+    pub fn run(&self, curve: &ForceCurve) -> Result<Run, Error> {
         let body = Body::new("body", self.mass_kg, self.speed_m_per_s);
         let law = ForceLaw::of_curve(curve, UnloadingChoice::Own, EnvelopeEnd::Hold);
         let interface = Interface::new("body|wall", law, 0.0);
@@ -97,8 +97,8 @@ impl Reference {
         Ok(simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?)
     }
 
-    /// Errors of the one-mass run that a driving curve gives.
-    pub(crate) fn errors_with(&self, curve: &DrivingCurve) -> Result<MotionErrors, Error> {
+    /// Errors of the one-mass run that a force curve gives.
+    pub(crate) fn errors_with(&self, curve: &ForceCurve) -> Result<MotionErrors, Error> {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
         let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];

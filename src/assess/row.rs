@@ -86,7 +86,7 @@ impl RowBuilder<'_> {
         };
         let force: Vec<f64> = truth.deflection_m().iter().map(|&d| ours.force_at(d)).collect();
         let force_l1 = Some(l1_ratio(truth.force_n(), &force));
-        let row = self.rated(name, made_from, curve.force, motion, times)?;
+        let row = self.rated(name, made_from, curve.kind, motion, times)?;
         Ok(Row { force_l1, ..row })
     }
 

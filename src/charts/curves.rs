@@ -1,7 +1,7 @@
 //! Force over deflection: the runs of a group, predictions, and a speed that was left out.
 
 use super::speed;
-use crate::curve::{Case, CurveUnloading, DrivingCurve, ForceKind};
+use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::{ModelCase, PredictedCurve};
@@ -31,7 +31,7 @@ fn both_ways(case: &Case, force: ForceKind) -> Option<(Vec<f64>, Vec<f64>)> {
     if force == ForceKind::Contact {
         return None;
     }
-    let driving = DrivingCurve::recorded(case)?;
+    let driving = ForceCurve::recorded(case)?;
     let (mut d, mut f) =
         (driving.loading.deflection_m().to_vec(), driving.loading.force_n().to_vec());
     if let CurveUnloading::Recorded { deflection_m, force_n, .. } = &driving.unloading {

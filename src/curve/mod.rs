@@ -4,10 +4,10 @@
 
 pub(crate) mod body;
 pub(crate) mod contact;
-pub(crate) mod driving;
 pub(crate) mod energy;
 pub(crate) mod envelope;
 pub(crate) mod extract;
+pub(crate) mod force_curve;
 pub(crate) mod from_table;
 pub(crate) mod loading;
 pub(crate) mod recipe;
@@ -24,14 +24,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
-pub use driving::CurveUnloading;
-pub use driving::DrivingCurve;
 pub use energy::ImpossibleRun;
 pub use energy::audit;
 pub use envelope::Envelope;
 pub use extract::input::DeckSpeed;
 pub use extract::input::StatedContact;
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
+pub use force_curve::CurveUnloading;
+pub use force_curve::ForceCurve;
 pub use from_table::{Impact, Table, from_table};
 pub use loading::Loading;
 pub use loading::unloading_stiffness;

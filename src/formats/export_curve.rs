@@ -4,7 +4,7 @@ use super::Options;
 use super::tail::{Tail, with_tail};
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use crate::curve::{DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::curve::{Envelope, ForceCurve, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
@@ -182,12 +182,12 @@ impl ExportCurve {
     }
 
     /// The curve as it drives an interface, tail included.
-    pub fn driving(&self) -> DrivingCurve {
-        DrivingCurve {
-            force: Some(self.predicted.provenance.force_kind),
+    pub fn driving(&self) -> ForceCurve {
+        ForceCurve {
+            kind: Some(self.predicted.provenance.force_kind),
             speed_kind: Some(self.predicted.speed_kind),
             speed_m_per_s: Some(self.predicted.speed_m_per_s),
-            ..DrivingCurve::bare(self.loading.clone()).unloading_with(self.stiffness_n_per_m())
+            ..ForceCurve::bare(self.loading.clone()).unloading_with(self.stiffness_n_per_m())
         }
     }
 

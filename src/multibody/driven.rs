@@ -1,7 +1,7 @@
-//! From a driving curve to the force law of an interface.
+//! From a force curve to the force law of an interface.
 
 use super::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
-use crate::curve::{CurveUnloading, DrivingCurve};
+use crate::curve::{CurveUnloading, ForceCurve};
 
 /// How a curve unloads in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub enum UnloadingChoice {
 
 impl ForceLaw {
     /// The law that follows a curve.
-    pub fn of_curve(curve: &DrivingCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    pub fn of_curve(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
         let memory = |stiffness_n_per_m: f64| {
             if stiffness_n_per_m > 0.0 {

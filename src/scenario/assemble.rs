@@ -291,7 +291,7 @@ impl<'a> Builder<'a> {
             spring(source, table, slot, speed).map_err(|error| self.no_spring(curve, error))?;
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
-        let force = spring.curve.force.map(super::super::curve::ForceKind::name);
+        let force = spring.curve.kind.map(super::super::curve::ForceKind::name);
         let (law, said) =
             spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;
         let used = CurveInUse { curve: curve.into(), force, speed_m_per_s };

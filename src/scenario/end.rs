@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::layout::{Connection, End, Role};
-use crate::curve::{CurveUnloading, DrivingCurve, Envelope};
+use crate::curve::{CurveUnloading, Envelope, ForceCurve};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
     Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
@@ -24,7 +24,7 @@ const PLATES_N_S_PER_M: f64 = 3e5;
 /// A crush force as the chain takes it, with what must be said of it.
 pub(super) struct Crush {
     /// Loads from (0, 0); of an end over its own deflection.
-    pub curve: DrivingCurve,
+    pub curve: ForceCurve,
     pub rate: RateFactor,
     /// Of an end; between vehicles of one mass the curve contains it.
     pub stopping: Option<Stopping>,
@@ -96,7 +96,7 @@ pub(super) fn crush_end(
         );
     }
     Ok(Crush {
-        curve: DrivingCurve { unloading, ..DrivingCurve::bare(loading) },
+        curve: ForceCurve { unloading, ..ForceCurve::bare(loading) },
         rate: RateFactor {
             sensitivity_sqrt_s_per_m: law.sensitivity,
             share: coordinates.speed,
@@ -131,10 +131,10 @@ pub(super) fn crush_between(
     let force_n = points.map(|(&d, f)| f * scale * factor(d)).collect();
     let stiffness = model.unloading_n_per_m(speed_m_per_s).map(|k| k * scale);
     let unloading = CurveUnloading::of(stiffness);
-    let curve = DrivingCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
+    let curve = ForceCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
     let sensitivity_sqrt_s_per_m = law.sensitivity;
     Ok(Crush {
-        curve: DrivingCurve { unloading, ..curve },
+        curve: ForceCurve { unloading, ..curve },
         rate: RateFactor { sensitivity_sqrt_s_per_m, share: 1.0, behind, ahead },
         stopping: None,
         speed_m_per_s,

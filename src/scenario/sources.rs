@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::place;
 use super::{CheckedScenario, CurveTable, Scenario, StageTable};
-use crate::curve::{Case, DrivingCurve, Envelope};
+use crate::curve::{Case, Envelope, ForceCurve};
 use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::formats::read::{csv, json};
@@ -22,7 +22,7 @@ pub(crate) struct Sources {
 pub(crate) enum CurveSource {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
-    Curve(Box<DrivingCurve>),
+    Curve(Box<ForceCurve>),
     /// Stages of a device between two bodies.
     Stages(Envelope),
     Case(Box<Case>),
@@ -117,15 +117,15 @@ impl CurveSource {
                 }
                 let read = csv::driving(&file);
                 let mut held = read.map_err(|e| below(Error::below(ErrorCode::CurveFile, e)))?;
-                let stated = table.force.or(held.force);
-                if held.force.is_some() && stated != held.force {
+                let stated = table.force.or(held.kind);
+                if held.kind.is_some() && stated != held.kind {
                     return Err(of_curve(error!(
                         Scenario at "force",
                         "force names another force than {} says it holds: remove force",
                         file.display()
                     )));
                 }
-                held.force = stated;
+                held.kind = stated;
                 Ok(Self::Curve(Box::new(held)))
             }
             (None, None, Some(database), None) => {

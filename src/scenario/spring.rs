@@ -2,8 +2,8 @@
 
 use super::layout::{Connection, Role};
 use super::{CurveSource, CurveTable as Table, EndName, LawName};
-use crate::curve::driving::DrivingCurveError;
-use crate::curve::{DrivingCurve, ForceKind};
+use crate::curve::force_curve::ForceCurveError;
+use crate::curve::{ForceCurve, ForceKind};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::invalid;
@@ -12,7 +12,7 @@ use crate::surrogate::{Model, PredictedCurve, Query, Warning};
 
 /// The curve at one interface, with what must be said of it.
 pub(super) struct Spring {
-    pub curve: DrivingCurve,
+    pub curve: ForceCurve,
     pub warnings: Vec<String>,
 }
 
@@ -46,7 +46,7 @@ pub(super) fn spring(
         CurveSource::Case(case) => {
             (Some(case.curves.force_kind), case.curves.force_kind == ForceKind::Contact)
         }
-        CurveSource::Curve(curve) => (curve.force, curve.force == Some(ForceKind::Body)),
+        CurveSource::Curve(curve) => (curve.kind, curve.kind == Some(ForceKind::Body)),
         CurveSource::Stages(_) => (None, false),
     };
     let force = which_force(table.force, slot, declared, has_body)?;
@@ -61,26 +61,26 @@ pub(super) fn spring(
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
         CurveSource::Predicted(curve) => of_predicted(curve, table, force)?,
         CurveSource::Curve(curve) => Spring {
-            warnings: curve.force.is_none().then(|| UNKNOWN_FORCE.into()).into_iter().collect(),
+            warnings: curve.kind.is_none().then(|| UNKNOWN_FORCE.into()).into_iter().collect(),
             curve: (**curve).clone(),
         },
         // A device between two bodies moves these, and no mass is stopped in it.
         CurveSource::Stages(envelope) => {
-            Spring { curve: DrivingCurve::of_body(envelope.clone()), warnings: Vec::new() }
+            Spring { curve: ForceCurve::of_body(envelope.clone()), warnings: Vec::new() }
         }
         CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
-            let curve = DrivingCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
+            let curve = ForceCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
             let curve = curve.map_err(|error| match error {
-                DrivingCurveError::Envelope(error) => envelope_error(error),
-                DrivingCurveError::NoMotion => {
+                ForceCurveError::Envelope(error) => envelope_error(error),
+                ForceCurveError::NoMotion => {
                     error!(Scenario, "its samples contain no loading branch")
                 }
             })?;
             Spring { curve, warnings: truncated.into_iter().collect() }
         }
     };
-    let only_contact = force != Some(ForceKind::Body) && curve.force == Some(ForceKind::Contact);
+    let only_contact = force != Some(ForceKind::Body) && curve.kind == Some(ForceKind::Contact);
     let stated = table.force.is_some() && !matches!(source, CurveSource::Curve(_));
     if only_contact && !stated && !slot.split && slot.role != Role::Within {
         warnings.push(ONLY_CONTACT.into());

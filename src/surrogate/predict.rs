@@ -26,7 +26,7 @@ pub use super::query::Query;
 use super::query::{ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
-use crate::curve::{DrivingCurve, Envelope, ForceKind};
+use crate::curve::{Envelope, ForceCurve, ForceKind};
 use crate::dataset::{grid, nearest};
 use crate::error::{Error, error};
 
@@ -58,7 +58,7 @@ pub fn predict_driving(
     query: &Query,
     force: ForceKind,
     member: Option<f64>,
-) -> Result<(DrivingCurve, Vec<Warning>), Error> {
+) -> Result<(ForceCurve, Vec<Warning>), Error> {
     let motion = Motion::new(model, query)?;
     let needs_declared = motion.rule() == MaxCrushRule::Energy
         || query.energy_correct
@@ -74,7 +74,7 @@ pub fn predict_driving(
         ForceKind::Contact => prediction.declared,
     };
     let driving = curve.driving_member(force, member)?;
-    Ok((DrivingCurve { beyond: Some(beyond), ..driving }, curve.warnings))
+    Ok((ForceCurve { beyond: Some(beyond), ..driving }, curve.warnings))
 }
 
 /// The forces of a prediction along deflections of which some lie beyond its maximal crush.
@@ -133,7 +133,7 @@ impl<'a> Motion<'a> {
     }
 
     /// The body's force to the maximal crush and how it unloads, without the declared force.
-    fn driving(self) -> Result<(DrivingCurve, Vec<Warning>), Error> {
+    fn driving(self) -> Result<(ForceCurve, Vec<Warning>), Error> {
         let Self { asked, body: beyond, .. } = &self;
         let model = asked.model;
         // The energy rule's answer, which needs the declared force, is not asked for.
@@ -148,11 +148,11 @@ impl<'a> Motion<'a> {
             Some(rebound) => rebound.stiffness_n_per_m,
             None => unloading.unwrap_or(0.0).max(loading.max_slope()),
         };
-        let curve = DrivingCurve {
+        let curve = ForceCurve {
             beyond: Some(beyond.clone()),
             speed_kind: Some(model.speed_kind),
             speed_m_per_s: Some(asked.v),
-            ..DrivingCurve::of_body(loading).unloading_with(stiffness_n_per_m)
+            ..ForceCurve::of_body(loading).unloading_with(stiffness_n_per_m)
         };
         Ok((curve, warnings))
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::Warning;
 use super::band::Band;
 use super::max_crush::{MaxCrush, MaxCrushRule};
-use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Parameter};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A predicted curve: the master format of exports (JSON).
@@ -293,7 +293,7 @@ impl PredictedCurve {
     ///
     /// # Errors
     /// If the curve does not have that force, or its points are not an envelope.
-    pub fn driving(&self, force: ForceKind) -> Result<DrivingCurve, Error> {
+    pub fn driving(&self, force: ForceKind) -> Result<ForceCurve, Error> {
         self.driving_member(force, None)
     }
 
@@ -303,7 +303,7 @@ impl PredictedCurve {
         &self,
         force: ForceKind,
         member: Option<f64>,
-    ) -> Result<DrivingCurve, Error> {
+    ) -> Result<ForceCurve, Error> {
         let mut loading = match (force, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => {
                 return Err(
@@ -318,12 +318,12 @@ impl PredictedCurve {
         }
         // The force law keeps to its bounds by itself; the one constant is for other tools.
         let unloading = CurveUnloading::Stiffness(self.stiffness_at_end(&loading));
-        Ok(DrivingCurve {
+        Ok(ForceCurve {
             unloading,
-            force: Some(force),
+            kind: Some(force),
             speed_kind: Some(self.speed_kind),
             speed_m_per_s: Some(self.speed_m_per_s),
-            ..DrivingCurve::bare(loading)
+            ..ForceCurve::bare(loading)
         })
     }
 

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use super::Warning;
 use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound};
-use crate::curve::driving::DrivingCurveError;
-use crate::curve::{Case, DrivingCurve, Envelope, ForceKind, Parameter};
+use crate::curve::force_curve::ForceCurveError;
+use crate::curve::{Case, Envelope, ForceCurve, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 
 /// The name that stands where a predicted curve has its model's.
@@ -23,9 +23,9 @@ impl PredictedCurve {
     /// If the case's states contain no loading branch.
     pub fn of_case(case: &Case) -> Result<Self, Error> {
         let no_curve =
-            |e: DrivingCurveError| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
+            |e: ForceCurveError| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
         let of_case = |force: ForceKind| {
-            let mut curve = DrivingCurve::of_case(case, force)?;
+            let mut curve = ForceCurve::of_case(case, force)?;
             if case.moves_by_its_force() {
                 curve.loading = corners(curve.loading)?;
             }

@@ -9,7 +9,7 @@ use crate::assess::choose::Purpose;
 use crate::assess::methods::{ddtcm_model, fit_nsdm};
 use crate::assess::settings::ComparisonSettings;
 use crate::assess::validate::{self, Choice};
-use crate::curve::{Case, DrivingCurve};
+use crate::curve::{Case, ForceCurve};
 use crate::database::Database;
 use crate::dataset::TrainingSet;
 use crate::scenario::{
@@ -214,7 +214,7 @@ fn with_nsdm(
             speed_m_per_s: fit.model.damping.nodes().to_vec(),
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
         });
-        let curve = DrivingCurve::of_body(fit.model.envelope()?);
+        let curve = ForceCurve::of_body(fit.model.envelope()?);
         springs.replace(name, CurveSource::Curve(Box::new(curve)));
     }
     Ok((changed, springs))

@@ -11,14 +11,14 @@ use super::frame::{self, Frame, MatchQuality};
 use super::label::Quantity;
 use super::layout::{Layout, Missing};
 use super::{ColumnNames, Input, open};
-use crate::curve::{DrivingCurve, Envelope};
+use crate::curve::{Envelope, ForceCurve};
 use crate::table::{CsvTable, NoNumber, Row, separator};
 use crate::unit::UnitSystem;
 
 /// Reads a curve that drives an interface from a CSV file, as it stands: increasing deflections
 /// from 0, forces of 0 or above, no titles above the header. Which columns it takes and what of the
 /// `# key: value` lines: [`super`].
-pub(crate) fn driving(path: &Path) -> Result<DrivingCurve, Error> {
+pub(crate) fn driving(path: &Path) -> Result<ForceCurve, Error> {
     let (bytes, _) = open(path)?;
     let read = || {
         let text = decoded(&bytes).bytes;

@@ -4,7 +4,7 @@ use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
 use super::error::{Place, shown};
-use crate::curve::{CurveUnloading, DrivingCurve, Envelope, ForceKind};
+use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A curve read from a file: the loading branch, behind it the unloading branch if the file has
@@ -112,13 +112,13 @@ impl Metadata {
     }
 
     /// A loading branch with what drives need to know of it.
-    pub(super) fn driving(&self, loading: Envelope) -> DrivingCurve {
-        DrivingCurve {
+    pub(super) fn driving(&self, loading: Envelope) -> ForceCurve {
+        ForceCurve {
             unloading: CurveUnloading::of(self.unloading_stiffness_n_per_m),
-            force: self.force,
+            kind: self.force,
             speed_kind: self.speed_kind,
             speed_m_per_s: self.speed_m_per_s,
-            ..DrivingCurve::bare(loading)
+            ..ForceCurve::bare(loading)
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Driving curves: what the database, models, files and NSDM give, and what multi-body runs,
+//! Force curves: what the database, models, files and NSDM give, and what multi-body runs,
 //! exports and comparisons take.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
@@ -8,7 +8,7 @@ use crate::unit::SpeedKind;
 
 /// A force–deflection curve that can drive an interface, with what its source knows of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DrivingCurve {
+pub struct ForceCurve {
     /// Loading branch from (0, 0) to the maximal crush.
     pub loading: Envelope,
     /// The same force along deflections of which some lie beyond the maximal crush: neighbours
@@ -17,7 +17,7 @@ pub struct DrivingCurve {
     /// From the end of the loading branch.
     pub unloading: CurveUnloading,
     /// Which force it is; `None` if its source does not say.
-    pub force: Option<ForceKind>,
+    pub kind: Option<ForceKind>,
     /// What its speed is measured against; `None` for a curve without a speed.
     pub speed_kind: Option<SpeedKind>,
     /// Speed that it belongs to.
@@ -44,7 +44,7 @@ pub enum CurveUnloading {
 
 /// Why a case has no curve of the force that was asked for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(crate) enum DrivingCurveError {
+pub(crate) enum ForceCurveError {
     /// Its loading branch is not an envelope.
     #[error("{0}")]
     Envelope(#[from] Error),
@@ -53,14 +53,14 @@ pub(crate) enum DrivingCurveError {
     NoMotion,
 }
 
-impl DrivingCurve {
+impl ForceCurve {
     /// A curve of which nothing else is known.
     pub(crate) fn bare(loading: Envelope) -> Self {
         Self {
             loading,
             beyond: None,
             unloading: CurveUnloading::Unknown,
-            force: None,
+            kind: None,
             speed_kind: None,
             speed_m_per_s: None,
         }
@@ -68,7 +68,7 @@ impl DrivingCurve {
 
     /// A force that moves bodies of one mass, and of which nothing else is known.
     pub(crate) fn of_body(loading: Envelope) -> Self {
-        Self { force: Some(ForceKind::Body), ..Self::bare(loading) }
+        Self { kind: Some(ForceKind::Body), ..Self::bare(loading) }
     }
 
     /// The force that moved the body of a case, with the recorded unloading; `None` if the
@@ -85,7 +85,7 @@ impl DrivingCurve {
         };
         Some(Self {
             unloading,
-            force: Some(ForceKind::Body),
+            kind: Some(ForceKind::Body),
             speed_kind: Some(case.conditions.speed.kind),
             speed_m_per_s: Some(case.conditions.speed.m_per_s),
             ..Self::bare(recorded.loading)
@@ -94,14 +94,14 @@ impl DrivingCurve {
 
     /// The curve of a case: the recipe's force, or for [`ForceKind::Body`] beside a contact
     /// force the recorded one of the body's motion.
-    pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, DrivingCurveError> {
+    pub(crate) fn of_case(case: &Case, force: ForceKind) -> Result<Self, ForceCurveError> {
         let is_other = force == ForceKind::Body && case.curves.force_kind == ForceKind::Contact;
         if is_other && !case.moves_by_its_force() {
-            return Self::recorded(case).ok_or(DrivingCurveError::NoMotion);
+            return Self::recorded(case).ok_or(ForceCurveError::NoMotion);
         }
         Ok(Self {
             unloading: CurveUnloading::of(case.curves.unloading_stiffness_n_per_m),
-            force: Some(force),
+            kind: Some(force),
             speed_kind: Some(case.conditions.speed.kind),
             speed_m_per_s: Some(case.conditions.speed.m_per_s),
             ..Self::bare(case.loading()?.envelope)
@@ -190,8 +190,8 @@ impl CurveUnloading {
 mod tests {
     use super::*;
 
-    fn curve() -> DrivingCurve {
-        DrivingCurve::bare(Envelope::new(vec![0.0, 1.0], vec![0.0, 2e6]).unwrap())
+    fn curve() -> ForceCurve {
+        ForceCurve::bare(Envelope::new(vec![0.0, 1.0], vec![0.0, 2e6]).unwrap())
     }
 
     /// A body of 20 t that leaves 2 MN at 2 m/s takes 40 kJ with it.
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn what_lies_beyond_joins_at_the_level_of_the_end() {
         let beyond = Envelope::new(vec![0.0, 0.5, 1.5, 2.0], vec![0.0, 1e6, 1e6, 3e6]).unwrap();
-        let curve = DrivingCurve { beyond: Some(beyond), ..curve() }.continued().unwrap();
+        let curve = ForceCurve { beyond: Some(beyond), ..curve() }.continued().unwrap();
         assert_eq!(curve.loading.deflection_m(), [0.0, 1.0, 1.5, 2.0]);
         assert_eq!(curve.loading.force_n(), [0.0, 2e6, 2e6, 6e6]);
     }
