@@ -6,12 +6,12 @@ use crate::plural::counted;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::error::NotLeftOut;
 use super::left_out::LeftOutCase;
+use super::left_out::NotLeftOut;
 use super::methods;
+use super::methods::ComparisonSettings;
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
-use super::settings::ComparisonSettings;
 use crate::curve::Case;
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::nsdm::{self, Identifiability, Start};

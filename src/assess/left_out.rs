@@ -3,7 +3,6 @@
 use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
-use super::error::NotLeftOut;
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
@@ -282,4 +281,30 @@ fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakE
             }
         })
         .collect()
+}
+
+/// Why a case cannot be left out.
+#[derive(Debug, thiserror::Error)]
+pub enum NotLeftOut {
+    /// Its largest deflection is not known.
+    #[error("case \"{case}\" ended while loading: not left out")]
+    Truncated {
+        /// Its name.
+        case: String,
+    },
+    /// There is no motion to compare with.
+    #[error(transparent)]
+    Motion(#[from] Error),
+    /// Ratios to its energy would divide by zero.
+    #[error("case \"{case}\" has no energy to compare with")]
+    NoEnergy {
+        /// Its name.
+        case: String,
+    },
+    /// Fewer than two speeds remain.
+    #[error("without case \"{case}\" fewer than 2 speeds remain")]
+    TooFew {
+        /// Its name.
+        case: String,
+    },
 }

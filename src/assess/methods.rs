@@ -2,11 +2,11 @@
 
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
-use super::settings::ComparisonSettings;
 use super::validate::choose_and_fit;
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
 use crate::error::Error;
+use crate::nsdm::Start;
 use crate::nsdm::{self, Target};
 use crate::plural::counted;
 use crate::surrogate::forest::ForestOptions;
@@ -190,4 +190,29 @@ fn method(
     let forces = (left_out.own.envelope.clone(), curve.envelope()?);
     let times = Times { fit_s, predict_s, ..Times::default() };
     Ok(Method { name, made_from, curve: driving, forces, times })
+}
+
+/// How the methods are set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ComparisonSettings {
+    /// Seed of the forests, and first seed of the genetic algorithm.
+    pub seed: u64,
+    /// The one speed whose FE run FDRM and NSDM use, in m/s; the nearest other one if absent.
+    pub fixed_speed_m_per_s: Option<f64>,
+    /// Fits of the spring and damper, each with its own seed; none leaves NSDM out.
+    pub nsdm_seeds: u64,
+    /// Start of the genetic algorithm.
+    pub nsdm_start: Start,
+}
+
+impl ComparisonSettings {
+    pub(super) fn nsdm_seeds(&self) -> Vec<u64> {
+        (0..self.nsdm_seeds).map(|k| self.seed.wrapping_add(k)).collect()
+    }
+}
+
+impl Default for ComparisonSettings {
+    fn default() -> Self {
+        Self { seed: 0, fixed_speed_m_per_s: None, nsdm_seeds: 3, nsdm_start: Start::Random }
+    }
 }

@@ -3,24 +3,22 @@
 
 pub(crate) mod choose;
 pub(crate) mod compare;
-pub(crate) mod error;
 pub(crate) mod left_out;
 mod methods;
 pub(crate) mod reference;
 mod row;
 mod scatter;
-pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod validate;
 
 pub use choose::Gap;
 pub use choose::NextRun;
 pub use choose::{Purpose, Selection, gaps};
-pub use error::NotLeftOut;
+pub use left_out::NotLeftOut;
+pub use methods::ComparisonSettings;
 pub use reference::MotionErrors;
 pub use reference::Reference;
 pub(crate) use row::Row;
-pub use settings::ComparisonSettings;
 pub use train::InterfaceCrush;
 pub use train::TrainComparison;
 pub use train::TrainRow;

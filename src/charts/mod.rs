@@ -20,15 +20,14 @@
 
 mod curves;
 mod histories;
-mod left_out;
 mod motion;
 mod train;
 
 pub use curves::group_curves;
+pub use curves::left_out_at;
 pub use curves::prediction;
 pub use histories::HistoryOptions;
 pub use histories::histories;
-pub use left_out::left_out_at;
 pub use motion::Motion;
 pub use motion::Quantity;
 pub use train::train_speeds;

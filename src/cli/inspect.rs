@@ -8,10 +8,12 @@ use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData};
 use serde::Serialize;
 
+use super::Failure;
 use super::deck_report::DeckReport;
-use super::inspect_runs::{Asked, asked};
 use super::output;
-use super::{CommandResult, GlobalOptions, Outcome, inspect_runs};
+use super::{CommandResult, GlobalOptions, Outcome};
+use crate::solver::decks::Search;
+use crate::solver::runs::{output_files, run_folders};
 
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
@@ -126,7 +128,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 None => reports(one).iter().try_for_each(|file| print(out, file)),
                 Some(folder) => {
                     let rows: Vec<Vec<String>> = reports(one).iter().map(row).collect();
-                    inspect_runs::print(out, folder, &rows)
+                    print_runs(out, folder, &rows)
                 }
             })
         })?;
@@ -233,7 +235,7 @@ fn report<'a>(
 /// Entities printed in full; of longer lists the rest is counted.
 const SHOWN_ENTITIES: usize = 20;
 
-/// A section in one line, as [`inspect_runs::HEADING`] has it.
+/// A section in one line, as [`HEADING`] has it.
 fn row(file: &Report<'_>) -> Vec<String> {
     let name = Path::new(&file.path).file_name();
     let times = file.time.map_or(["-".into(), "-".into()], |time| time.map(|t| format!("{t:?}")));
@@ -300,4 +302,47 @@ fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
         writeln!(out, "  problem     {problem}")?;
     }
     Ok(())
+}
+
+/// What is to be inspected: a file that was named, or the files of a run that was found.
+pub(super) enum Asked {
+    File(PathBuf),
+    Run { folder: PathBuf, files: Vec<PathBuf> },
+}
+
+/// The files that were named, and those of every run at or below the folders that were.
+pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
+    let mut asked = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            asked.push(Asked::File(path.clone()));
+            continue;
+        }
+        let failed = |e| Failure::Failed(format!("{}: {e}", path.display()).into());
+        let found = run_folders(path).map_err(failed)?;
+        if found.runs.is_empty() {
+            let message = format!("{}: no folder in it holds solver files", path.display());
+            return Err(Failure::Failed(message.into()));
+        }
+        for folder in found.runs {
+            let mut files = output_files(&folder).map_err(failed)?;
+            files.extend(match decks::find(&folder) {
+                Search::None => Vec::new(),
+                Search::One(deck) => vec![deck],
+                Search::Several(decks) => decks,
+            });
+            asked.push(Asked::Run { folder, files });
+        }
+    }
+    Ok(asked)
+}
+
+/// Columns of a run's table.
+pub(super) const HEADING: [&str; 7] =
+    ["file", "holds", "states", "first time", "last", "entities", "problems"];
+
+/// A run's files, a line for each section.
+fn print_runs(out: &mut dyn Write, folder: &Path, rows: &[Vec<String>]) -> io::Result<()> {
+    writeln!(out, "{}", folder.display())?;
+    output::table(out, &HEADING, rows)
 }

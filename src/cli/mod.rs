@@ -1,7 +1,6 @@
 //! The commands: one file each, with its arguments and a `run` that calls the library.
 
 mod arguments;
-mod braille;
 mod build;
 mod compare;
 mod curve_file;
@@ -15,7 +14,6 @@ mod file_kind;
 mod histories;
 mod init;
 mod inspect;
-mod inspect_runs;
 mod output;
 mod plot;
 mod predict;
@@ -26,7 +24,6 @@ mod run_channels;
 mod shell;
 mod simulate;
 mod sweep;
-mod terminal;
 mod train;
 mod validate;
 

@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use crate::error::Place;
 
-use super::{Failure, GlobalOptions, terminal};
+use super::{Failure, GlobalOptions};
+use terminal_size::{Width, terminal_size_of};
 
 /// Writes text to standard output.
 pub(super) fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -83,7 +84,7 @@ const WIDEST: usize = 200;
 
 /// Prints the line of a file that an error is about on standard error, with carets below.
 pub(super) fn say_excerpt(place: Option<&Place>) {
-    let width = terminal::error_width().unwrap_or(WIDEST);
+    let width = error_width().unwrap_or(WIDEST);
     if let Some(excerpt) = place.and_then(|place| place.excerpt(width)) {
         say(&excerpt);
     }
@@ -170,7 +171,7 @@ pub(super) fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
 /// column is set left, the others right. What is wider than the terminal is shown in blocks of
 /// columns, each with the first one, or with a line for each cell.
 pub(super) fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
-    table_within(out, terminal::width().unwrap_or(usize::MAX), heading, rows)
+    table_within(out, width().unwrap_or(usize::MAX), heading, rows)
 }
 
 fn table_within(
@@ -290,6 +291,36 @@ pub(super) fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Res
 pub(super) fn counted(number: usize, what: &str) -> String {
     let plural = if number == 1 { "" } else { "s" };
     format!("{number} {what}{plural}")
+}
+
+/// Narrower is taken as this.
+const LEAST: usize = 40;
+
+/// Characters in a line of the terminal that standard output is; `None` if it is none.
+pub(super) fn width() -> Option<usize> {
+    let out = io::stdout();
+    out.is_terminal().then(|| stated().or_else(|| size(&out)).unwrap_or(80).max(LEAST))
+}
+
+/// The same of standard error.
+pub(super) fn error_width() -> Option<usize> {
+    let err = io::stderr();
+    err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))
+}
+
+/// What the user asks for, whatever the terminal has.
+fn stated() -> Option<usize> {
+    std::env::var("COLUMNS").ok()?.parse().ok().filter(|width| *width > 0)
+}
+
+#[cfg(unix)]
+fn size(stream: &impl std::os::fd::AsFd) -> Option<usize> {
+    terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
+}
+
+#[cfg(windows)]
+fn size(stream: &impl std::os::windows::io::AsHandle) -> Option<usize> {
+    terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
 }
 
 #[cfg(test)]

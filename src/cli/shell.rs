@@ -7,7 +7,6 @@ use clap::{Command, CommandFactory};
 use serde::Serialize;
 
 use super::output;
-use super::terminal;
 use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome};
 
 /// Print a completion script for a shell
@@ -68,7 +67,7 @@ const ORDER: [(&str, &str); 9] = [
 /// What `crumple` says without arguments, for a terminal of at least 60 columns.
 pub(super) fn short_help() -> String {
     let about = Cli::command().get_about().map(ToString::to_string).unwrap_or_default();
-    let is_narrow = terminal::error_width().is_some_and(|width| width < 80);
+    let is_narrow = output::error_width().is_some_and(|width| width < 80);
     let about = if is_narrow { about.replacen(" from ", "\nfrom ", 1) } else { about };
     let mut text =
         format!("{about}\n\nUsage: crumple COMMAND [OPTIONS]\n\nThe usual order of work:\n");

@@ -13,7 +13,6 @@ pub(crate) mod loading;
 pub(crate) mod recipe;
 pub(crate) mod replicates;
 pub(crate) mod retrace;
-pub(crate) mod source_hash;
 pub(crate) mod stopped_mass;
 
 use crate::error::{Error, error};
@@ -41,6 +40,7 @@ pub use recipe::Filter;
 pub use recipe::ForceSource;
 pub use recipe::Sampling;
 pub use recipe::{Recipe, RecordedMotion};
+use std::collections::BTreeSet;
 pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
@@ -367,4 +367,36 @@ impl Case {
     pub fn is_truncated(&self) -> bool {
         self.loading_end() + 1 == self.curves.original.time_s.len()
     }
+}
+
+impl Case {
+    /// Hash over the recipe without names and paths, and over the bytes of the sources: equal for
+    /// a run and for its case under an earlier name. `None` if the case is of no run.
+    pub(crate) fn source_hash(&self) -> Option<String> {
+        source_hash(
+            &self.provenance.recipe,
+            self.provenance.sources.iter().map(|source| source.blake3.as_str()),
+        )
+    }
+}
+
+/// The same of a run's recipe, as JSON, and the hashes of its files.
+pub(crate) fn source_hash<'a>(
+    recipe: &str,
+    files: impl Iterator<Item = &'a str>,
+) -> Option<String> {
+    let mut recipe: serde_json::Value = serde_json::from_str(recipe).ok()?;
+    let run = recipe.get_mut("run")?.as_object_mut()?;
+    run.remove("path");
+    run.remove("deck");
+    let recipe = recipe.as_object_mut()?;
+    recipe.remove("study");
+    // Found in the deck where the manifest has none; the files say the same.
+    recipe.remove("units");
+    let mut hash = blake3::Hasher::new();
+    hash.update(serde_json::to_string(recipe).ok()?.as_bytes());
+    for file in files.collect::<BTreeSet<_>>() {
+        hash.update(file.as_bytes());
+    }
+    Some(hash.finalize().to_hex().to_string())
 }

@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::folder::explained;
+use super::explained;
 use crate::error::{Error, error};
 
 /// Held while a database or the result of a sweep is read, changed and written back.

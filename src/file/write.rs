@@ -5,8 +5,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::folder::{explained, folder_of};
 use super::lock::{is_at, lock};
+use super::{explained, folder_of};
 use crate::error::{Error, error};
 
 /// The error of a file that cannot be written; what was there before still is.

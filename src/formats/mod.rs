@@ -38,8 +38,8 @@ pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::Reader;
 pub use read::curve::Metadata;
+pub use read::curve::Place;
 pub use read::curve::ReadFile;
-pub use read::error::Place;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};
 pub use tail::Tail;
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::agree::names_centre_of_gravity;
 use super::agree::{Agreed, percent};
 use super::evidence::{Evidence, Proposed};
 use super::explain::FOLLOWS;
@@ -12,7 +13,6 @@ use super::measure::Measured;
 use super::proposal::Proposal;
 use super::propose::Recorded;
 use super::sources::MOTION;
-use super::titles::names_centre_of_gravity;
 use super::{describe_runs, sampling};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
 use crate::signal::cfc;

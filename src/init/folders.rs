@@ -1,7 +1,7 @@
 //! The folders of a proposal: which hold runs, how they are called, where they are seen from the
 //! study.
 
-use super::error::listed;
+use super::left_out::listed;
 use super::left_out::{LeftOut, Reason};
 use crate::error::{Error, error};
 use crate::guess;

@@ -4,10 +4,8 @@
 //! and says so; what cannot be found is left to fill in.
 
 mod agree;
-mod batches;
 mod describe;
 mod describe_runs;
-mod error;
 mod evidence;
 mod explain;
 mod folders;
@@ -24,8 +22,6 @@ mod series;
 mod sources;
 mod survey;
 mod text;
-mod titles;
-mod trial;
 mod units;
 mod write;
 

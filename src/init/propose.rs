@@ -4,7 +4,7 @@
 //! What does not fit is left out with its reason. A study that is complete is tried before it is
 //! given: what a build would refuse is left out as well.
 
-use super::error::no_usable_run;
+use super::left_out::no_usable_run;
 use crate::error::{Error, error};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 
 use super::agree::Agreed;
+use super::describe;
 use super::folders::{Folders, names, seen_from};
 use super::given::{GivenForce, UserHints};
 use super::left_out::{LeftOut, Reason};
@@ -21,11 +22,12 @@ use super::record::Record;
 use super::sources::Sources;
 use super::survey::Survey;
 use super::units;
-use super::{describe, trial};
 use crate::curve::contact::milliseconds;
 use crate::study::StudyKind;
-use crate::study::twin::is_alike;
+use crate::study::extract::is_alike;
+use crate::study::{self, RunError};
 use crate::unit::UnitSystem;
+use std::path::Path;
 
 /// What a study is to be proposed for.
 #[derive(Clone, Debug)]
@@ -93,7 +95,7 @@ pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Prop
     proposal.warnings = warnings;
     proposal.left_out = left_out;
     describe::entries_of_left_out(&mut proposal, &seen);
-    trial::leave_out_refused(&mut proposal, &request.study)?;
+    leave_out_refused(&mut proposal, &request.study)?;
     Ok(proposal)
 }
 
@@ -300,5 +302,35 @@ fn also_held(sources: &Sources) -> String {
             others.join(" and "),
             sources.motion.shown()
         ),
+    }
+}
+
+/// Extracts every run of a complete proposal, and leaves out those that give no curve.
+pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> {
+    if !proposal.missing().is_empty() {
+        return Ok(());
+    }
+    let study = study::parse(path, &proposal.to_toml())?;
+    let refused: Vec<Option<RunError>> = study
+        .runs()
+        .par_iter()
+        .map(|entry| study.locate(entry).and_then(|run| run.extract()).err())
+        .collect();
+    let runs = std::mem::take(&mut proposal.runs);
+    for (run, refused) in runs.into_iter().zip(refused) {
+        match refused {
+            None => proposal.runs.push(run),
+            Some(error) => {
+                let reason = Reason::Refused { why: error.to_string() };
+                let mut out = LeftOut::new(run.folder, reason);
+                out.entry = Some(run.path);
+                proposal.left_out.push(out);
+            }
+        }
+    }
+    if proposal.runs.is_empty() {
+        Err(no_usable_run(&proposal.left_out, &proposal.warnings))
+    } else {
+        Ok(())
     }
 }

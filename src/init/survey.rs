@@ -8,12 +8,13 @@
 
 use std::collections::HashMap;
 
-use super::batches::HistoryBatches;
 use super::left_out::Reason;
 use super::series::{Fit, by_entity, component, impulse, largest, picked, rising, velocity};
-use super::sources::{FORCES, Source, Sources};
+use super::sources::Source;
+use super::sources::{FORCES, Sources};
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::{EntityId, History, Side};
+use crate::solver::{SolverFile, WantedId};
 
 /// Fewest states of a record that can be judged.
 const FEWEST_STATES: usize = 8;
@@ -362,4 +363,51 @@ fn roughness(velocity: &[f64]) -> f64 {
     let highest = velocity.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let lowest = velocity.iter().copied().fold(f64::INFINITY, f64::min);
     if highest > lowest { way / (highest - lowest) } else { f64::INFINITY }
+}
+
+/// Values that are held at once: 128 MB.
+const MOST_VALUES: usize = 16_000_000;
+
+/// A source's histories, a bounded number of entities at a time.
+pub(super) struct HistoryBatches<'a> {
+    source: &'a Source,
+    components: Vec<&'a str>,
+    /// Ids of each piece; one piece of `None` is the whole.
+    ids: Vec<Option<Vec<WantedId>>>,
+    /// The whole, where it is one piece: read once.
+    held: Option<SolverFile>,
+}
+
+impl<'a> HistoryBatches<'a> {
+    pub(super) fn new(source: &'a Source, components: Vec<&'a str>) -> Self {
+        let values_of_one = (source.states * components.len()).max(1);
+        let at_once = (MOST_VALUES / values_of_one).max(1);
+        let mut all: Vec<i64> = source.entities.iter().map(|entity| entity.id.id).collect();
+        all.sort_unstable();
+        all.dedup();
+        let ids = if all.len() <= at_once {
+            vec![None]
+        } else {
+            all.chunks(at_once)
+                .map(|ids| Some(ids.iter().map(|&id| WantedId { id, side: None }).collect()))
+                .collect()
+        };
+        Self { source, components, ids, held: None }
+    }
+
+    /// Shows every piece to `look`, in the order of the ids.
+    pub(super) fn each(&mut self, look: &mut dyn FnMut(&SolverFile)) -> Result<(), Reason> {
+        if let Some(held) = &self.held {
+            look(held);
+            return Ok(());
+        }
+        for ids in &self.ids {
+            let piece = self.source.read(ids.clone(), &self.components)?;
+            look(&piece);
+            if ids.is_none() {
+                self.held = Some(piece);
+            }
+        }
+        Ok(())
+    }
 }

@@ -1,7 +1,7 @@
 //! What the report says of a group: its runs, how good predictions are, a prediction, the methods.
 
 use super::figure::Figure;
-use super::text::{energy, force, mass, metres, percent, signed_percent};
+use super::page::{energy, force, mass, metres, percent, signed_percent};
 use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::choose::{Purpose, Selection, next_run};

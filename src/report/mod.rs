@@ -7,7 +7,6 @@
 mod figure;
 mod group;
 mod page;
-mod text;
 mod train;
 
 use crate::error::Error;
@@ -134,7 +133,7 @@ pub(crate) fn report(
     mut step: impl FnMut(&str),
 ) -> Result<(String, usize), Error> {
     let mut content = Content {
-        title: settings.title.clone().unwrap_or_else(|| text::file_name(path)),
+        title: settings.title.clone().unwrap_or_else(|| page::file_name(path)),
         subtitle: format!(
             "Curve database {}, crumple {}",
             path.display(),

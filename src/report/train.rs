@@ -4,7 +4,7 @@ use crate::error::Error;
 use std::path::Path;
 
 use super::figure::Figure;
-use super::text::{energy, file_name, force, mass, metres, percent};
+use super::page::{energy, file_name, force, mass, metres, percent};
 use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::files::{Located, force_file, hashed_family, locate_file, shown_name};
 use super::{RunEntry, RunError, Study};
-use crate::curve::source_hash::source_hash;
+use crate::curve::source_hash;
 use crate::file;
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;

@@ -5,13 +5,12 @@
 
 mod check;
 mod error;
-mod extract;
+pub(crate) mod extract;
 pub(crate) mod files;
 mod locate;
 mod manifest;
 mod place;
 mod read;
-pub(crate) mod twin;
 
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! The predicted curve: the master format of exports, and what can be made of it.
 
-use super::predict_error::envelope;
+use super::predict::envelope;
 use crate::error::{Error, error};
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! A recorded case in the form of a predicted curve, so that it exports like one.
 
-use super::predict_error::envelope;
+use super::predict::envelope;
 use crate::error::{Error, error};
 use std::collections::BTreeMap;
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::assess::choose::Purpose;
+use crate::assess::methods::ComparisonSettings;
 use crate::assess::methods::{ddtcm_model, fit_nsdm};
-use crate::assess::settings::ComparisonSettings;
 use crate::assess::validate::{self, Choice};
 use crate::curve::{Case, ForceCurve};
 use crate::database::Database;

@@ -7,7 +7,7 @@ mod row;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::settings::ComparisonSettings;
+use super::methods::ComparisonSettings;
 use crate::error::{Error, KeyPath, error};
 use crate::scenario::{CheckedScenario, Sources};
 use fe::FeTrain;

@@ -9,7 +9,7 @@ use crate::curve::{Case, Parameter};
 use crate::database::Database;
 use crate::unit::{Shown, km_per_h};
 
-use super::super::braille;
+use super::super::predict::draw_curve;
 use super::chosen::Chosen;
 use super::list::{Groups, print_group};
 use super::row::{CaseRow, FullCase};
@@ -125,7 +125,7 @@ fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
     }
     writeln!(out, "\nforce [MN] over deflection [m]")?;
     let (d, f) = (case.curves.original.deflection_m(), case.curves.original.force_n());
-    braille::curve(out, d, f)?;
+    draw_curve(out, d, f)?;
     writeln!(out)
 }
 

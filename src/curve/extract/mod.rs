@@ -12,7 +12,6 @@ mod from_contact;
 pub(crate) mod input;
 mod record;
 mod remarks;
-mod sample;
 mod speed;
 mod start;
 
@@ -30,8 +29,8 @@ pub use input::Setup;
 pub use input::Stated;
 pub(crate) use input::StatedContact;
 use record::Record;
+use record::sample;
 pub(crate) use remarks::Notes;
-use sample::sample;
 use speed::{ImpactSpeed, SpeedBy};
 use start::Start;
 

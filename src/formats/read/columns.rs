@@ -5,8 +5,8 @@ use crate::error::{Error, error};
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
+use super::curve::Place;
 use super::curve::{Metadata, ReadCurve, ReadFile};
-use super::error::Place;
 use crate::unit::UnitSystem;
 
 /// Most points of a curve: guards memory. Test records have some ten thousand.

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::columns::{Columns, MAX_POINTS, Places};
 use super::curve::{self, Metadata, title};
+use super::curve::{Place, shown};
 use super::encoding::decoded;
-use super::error::{Place, shown};
 use super::frame::{self, Frame, MatchQuality};
 use super::label::Quantity;
 use super::layout::{Layout, Missing};

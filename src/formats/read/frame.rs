@@ -162,7 +162,7 @@ impl Frame {
         } else {
             format!("lines {first} to {last} are titles")
         };
-        let shown = self.titles.iter().take(TITLES).map(|(_, title)| super::error::shown(title));
+        let shown = self.titles.iter().take(TITLES).map(|(_, title)| super::curve::shown(title));
         let more = if self.titles.len() > TITLES { ", …" } else { "" };
         let shown: Vec<String> = shown.map(|title| format!("\"{title}\"")).collect();
         Some(format!("titles: {lines} and no part of the table: {}{more}", shown.join(", ")))

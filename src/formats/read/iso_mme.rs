@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
 use super::curve::{Metadata, ReadFile, title};
+use super::curve::{Place, shown};
 use super::encoding::decoded;
-use super::error::{Place, shown};
 use super::label::Quantity;
 use super::text::{lines, number};
 use super::{Input, MAX_CURVE_BYTES};

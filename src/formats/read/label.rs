@@ -1,7 +1,7 @@
 //! Labels of columns and axes: which quantity a text such as `displacement [mm]` or `F_kN` names,
 //! and its unit.
 
-use super::error::{Place, shown};
+use super::curve::{Place, shown};
 use crate::error::{Error, error};
 use crate::guess;
 use crate::unit::{Dimension, FORCE, LENGTH, TIME, UnitSystem};

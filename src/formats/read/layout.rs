@@ -1,7 +1,7 @@
 //! Which columns of a table hold what: by their headers, by a row of units below, or as the user has named them.
 
 use super::ColumnNames;
-use super::error::{Place, shown};
+use super::curve::{Place, shown};
 use super::frame::unit_of;
 use super::label::{Label, Quantity};
 use crate::error::{Error, error};

@@ -7,8 +7,8 @@
 
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
+use super::curve::{Place, shown};
 use super::curve::{stated_units, title, units};
-use super::error::{Place, shown};
 use super::text::{lines, number};
 use crate::error::{Error, error};
 use crate::guess;

@@ -9,7 +9,7 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::units;
-use super::error::{Place, shown};
+use super::curve::{Place, shown};
 use super::modelica::OURS;
 use crate::error::{Error, error};
 use crate::guess;

@@ -12,7 +12,6 @@ mod columns;
 pub(crate) mod csv;
 pub(crate) mod curve;
 mod encoding;
-pub(crate) mod error;
 mod frame;
 mod iso_mme;
 pub(crate) mod json;

@@ -6,7 +6,7 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Metadata, title};
-use super::error::{Place, shown};
+use super::curve::{Place, shown};
 use super::text::{lines, number};
 use crate::error::{Error, error};
 use crate::guess;

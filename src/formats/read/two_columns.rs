@@ -8,7 +8,7 @@
 use super::Input;
 use super::columns::{Columns, MAX_POINTS, Places, check_curves};
 use super::curve::{Metadata, stated_units, title};
-use super::error::{Place, shown};
+use super::curve::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
 use crate::error::{Error, error};

@@ -89,7 +89,9 @@ impl Abstat {
     fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let count = [10, 12].into_iter().find(|&n| field(n - 1).1 == text.len())?;
-        (text.len() >= self.width).then_some(())?;
+        if text.len() < self.width {
+            return None;
+        }
         self.width = text.len();
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
         let airbag = EntityId::new(integer(line.columns(ID.0, ID.1))?);
@@ -108,7 +110,9 @@ impl Abstat {
         let to = memchr::memmem::find(text, AREAS[0].label.as_bytes())?;
         let material = integer(text.get(from..to)?)?;
         let fields = fields(line, &AREAS)?;
-        fields.iter().all(Option::is_some).then_some(())?;
+        if fields.iter().any(Option::is_none) {
+            return None;
+        }
         let known = self.materials.iter().find(|(m, _)| *m == material).map(|(_, t)| *t);
         let table = match known {
             Some(table) => table,

@@ -51,7 +51,9 @@ impl Curvout {
         let id_end = start + text[start..].iter().position(u8::is_ascii_whitespace)?;
         let id = integer(&text[..id_end])?;
         let is_number = matches!(real(&text[id_end..]), Field::Real(_));
-        is_number.then_some(())?;
+        if !is_number {
+            return None;
+        }
         let table = *self.table.get_or_insert_with(|| states.table("curves", &["ordinate"]));
         states.row(table, EntityId::new(id), line, |_| Some((id_end + 1, text.len())));
         Some(())

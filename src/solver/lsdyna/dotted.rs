@@ -86,7 +86,9 @@ impl Dotted {
             self.entity = Some(EntityId::new(integer(value)?));
             return Some(());
         }
-        is_number(value, VALUE_WIDTH).then_some(())?;
+        if !is_number(value, VALUE_WIDTH) {
+            return None;
+        }
         if label == "time" {
             self.entity = None;
             let time = match real(value) {

@@ -206,7 +206,9 @@ impl Elout {
         if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == key) {
             return Some(*table);
         }
-        (self.tables.len() < MAX_TABLES).then_some(())?;
+        if self.tables.len() >= MAX_TABLES {
+            return None;
+        }
         let names = names();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let table = states.varying_table("elements", &names);
@@ -219,7 +221,9 @@ impl Elout {
         if let Some(rest) = text.strip_prefix(b" beam/truss # =") {
             let digits = rest.trim_ascii_start();
             let end = digits.iter().position(|b| !b.is_ascii_digit())?;
-            line.is_heading().then_some(())?;
+            if !line.is_heading() {
+                return None;
+            }
             self.entity = Some(EntityId::new(integer(&digits[..end])?));
             self.at_points = false;
             return Some(());
@@ -228,7 +232,9 @@ impl Elout {
         if !self.at_points {
             let numbers = text.len().checked_sub(RESULTANT_AT)? / RESULTANT_WIDTH;
             let whole = text.len() == RESULTANT_AT + numbers * RESULTANT_WIDTH;
-            (whole && (6..=7).contains(&numbers)).then_some(())?;
+            if !(whole && (6..=7).contains(&numbers)) {
+                return None;
+            }
             let names = &RESULTANTS[..numbers];
             let key = Key { quantity, point: 0, surface: "", location: None, names };
             let table = self.table(key, states, || {
@@ -242,7 +248,9 @@ impl Elout {
         }
         let point = integer(text.get(..BEAM_STRESS_AT)?)?;
         let width = BEAM_STRESS_AT + BEAM_STRESSES.len() * BEAM_STRESS_WIDTH;
-        (text.len() == width).then_some(())?;
+        if text.len() != width {
+            return None;
+        }
         let key = Key { quantity, point, surface: "", location: None, names: &BEAM_STRESSES };
         let table = self.table(key, states, || {
             BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect()
@@ -261,7 +269,9 @@ impl Elout {
             // "id-part" of an element, "id-" of a node.
             let dash = memchr::memchr(b'-', text)?;
             let part = &text[dash + 1..];
-            (part.is_empty() || integer(part).is_some()).then_some(())?;
+            if !(part.is_empty() || integer(part).is_some()) {
+                return None;
+            }
             self.entity = Some(EntityId::new(integer(&text[..dash])?));
             return Some(());
         }
@@ -285,7 +295,9 @@ impl Elout {
             (all, more) if all.len() == more => all,
             _ => return None,
         };
-        (numbers.len() == tensor_end + further.len() * wide).then_some(())?;
+        if numbers.len() != tensor_end + further.len() * wide {
+            return None;
+        }
         let key = Key { quantity, point, surface, location, names: further };
         let table = self.table(key, states, || {
             let kind = match quantity {

@@ -22,7 +22,9 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
         let mut found = memchr::memmem::find_iter(text, labelled.label);
         let Some(at) = found.next() else { continue };
         // A label that is there twice: two rows were joined.
-        found.next().is_none().then_some(())?;
+        if found.next().is_some() {
+            return None;
+        }
         marks.push((at, at + labelled.label.len(), Some(k)));
     }
     if marks.is_empty() {
@@ -42,7 +44,9 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
         let value = text.get(from..to)?.trim_ascii_end();
         if let Some(k) = known {
             let to = from + value.len();
-            is_number(value, labels[k].width).then_some(())?;
+            if !is_number(value, labels[k].width) {
+                return None;
+            }
             fields[k] = Some((from + 1, to));
         } else if value.is_empty() {
             return None;

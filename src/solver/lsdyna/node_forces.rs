@@ -112,7 +112,9 @@ impl NodeForces {
         let to = memchr::memmem::find(text, ID)?;
         let id = integer(text.get(from..to)?)?;
         let fields = fields(line, &ROW)?;
-        fields[..4].iter().all(Option::is_some).then_some(())?;
+        if fields[..4].iter().any(Option::is_none) {
+            return None;
+        }
         let [table, _] = self.tables(states)?;
         self.body = Some(id);
         states.row(table, EntityId::new(id), line, |k| fields[k]);
@@ -122,7 +124,9 @@ impl NodeForces {
     fn moments(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let fields = fields(line, &MOMENTS)?;
         let id = self.body?;
-        fields.iter().all(Option::is_some).then_some(())?;
+        if fields.iter().any(Option::is_none) {
+            return None;
+        }
         let [_, table] = self.tables(states)?;
         states.row(table, EntityId::new(id), line, |k| fields[k]);
         Some(())

@@ -106,7 +106,9 @@ impl Rbdout {
         let (label, global, local) = LINES[index];
         let components = if self.is_local { local } else { global };
         let width = if label.starts_with(b"row") { ROW_WIDTH } else { WIDTH };
-        (!components.is_empty()).then_some(())?;
+        if components.is_empty() {
+            return None;
+        }
         let from = text.len() - start.len() + label.len();
         let fields = numbers(line, from, text.len(), components.len(), width)?;
         let table = tables[index][usize::from(self.is_local)];

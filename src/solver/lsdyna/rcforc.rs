@@ -185,7 +185,9 @@ fn by_labels(text: &[u8], at: usize) -> Option<Row> {
     };
     let (from, to) = word()?;
     let Field::Real(time) = real(&text[from..to]) else { return None };
-    is_whole_real(&text[from..to]).then_some(())?;
+    if !is_whole_real(&text[from..to]) {
+        return None;
+    }
     let mut fields = [None; COLUMNS.len()];
     while let Some((from, mut to)) = word() {
         let mut value = word()?;
@@ -195,9 +197,13 @@ fn by_labels(text: &[u8], at: usize) -> Option<Row> {
         let label = &text[from..to];
         let number = &text[value.0..value.1];
         let is_label = label[0].is_ascii_alphabetic();
-        (is_label && (is_whole_real(number) || integer(number).is_some())).then_some(())?;
-        if let Some(k) = COLUMNS.iter().position(|c| c.label.trim_ascii() == label) {
-            fields[k].replace((value.0 + 1, value.1)).is_none().then_some(())?;
+        if !(is_label && (is_whole_real(number) || integer(number).is_some())) {
+            return None;
+        }
+        if let Some(k) = COLUMNS.iter().position(|c| c.label.trim_ascii() == label)
+            && fields[k].replace((value.0 + 1, value.1)).is_some()
+        {
+            return None;
         }
     }
     let whole = COLUMNS.iter().zip(&fields).all(|(c, field)| !c.always || field.is_some());

@@ -65,7 +65,9 @@ impl Sleout {
             Some((memchr::memmem::find(text, label)? + label.len(), name))
         });
         if let Some((from, name)) = sum {
-            memchr::memmem::find(&text[..from], b"**").is_none().then_some(())?;
+            if memchr::memmem::find(&text[..from], b"**").is_some() {
+                return None;
+            }
             let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
             states.scalar(name, line.columns(first, last), line, [first, last]);
             return Some(());
@@ -78,7 +80,9 @@ impl Sleout {
         let columns = FIELDS.iter().position(|(_, to)| *to == width)? + 1;
         let between = line.columns(FIELDS[1].1 + 1, FIELDS[2].0 - 1);
         let is_whole = width >= self.width || self.width < last;
-        (is_whole && between.trim_ascii().is_empty()).then_some(())?;
+        if !(is_whole && between.trim_ascii().is_empty()) {
+            return None;
+        }
         self.width = self.width.max(width);
         let table = *self.table.get_or_insert_with(|| states.table("interfaces", &COMPONENTS));
         states.row(table, EntityId::new(id), line, |k| (k < columns).then_some(FIELDS[k]));

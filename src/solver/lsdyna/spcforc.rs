@@ -73,7 +73,9 @@ impl Spcforc {
         let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
         let fields = numbers(line, from, end, 3, WIDTH)?;
         let Some(kind) = kind else {
-            (set_id.is_none() && text[..at].trim_ascii().is_empty()).then_some(())?;
+            if !(set_id.is_none() && text[..at].trim_ascii().is_empty()) {
+                return None;
+            }
             let names = ["x_resultant", "y_resultant", "z_resultant"];
             for (name, &(first, last)) in names.iter().zip(&fields) {
                 states.scalar(name, line.columns(first, last), line, [first, last]);

@@ -58,7 +58,9 @@ impl Swforc {
         let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
         let at = FAILURE.1 + memchr::memmem::find(text.get(FAILURE.1..)?, ID)?;
         let kind = text[FAILURE.1..at].trim_ascii().to_vec();
-        (!kind.is_empty() && !kind.contains(&b'*')).then_some(())?;
+        if !(!kind.is_empty() && !kind.contains(&b'*')) {
+            return None;
+        }
         let id_from = at + ID.len();
         let blanks = text[id_from..].iter().take_while(|b| b.is_ascii_whitespace()).count();
         let digits = text[id_from + blanks..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -71,14 +73,18 @@ impl Swforc {
                 let blanks = behind.iter().take_while(|b| b.is_ascii_whitespace()).count();
                 let word = behind[blanks..].iter().position(u8::is_ascii_whitespace);
                 let end = from + word.map_or(behind.len(), |length| blanks + length);
-                is_number(&text[from..end], FAILURE_TIME_WIDTH).then_some(())?;
+                if !is_number(&text[from..end], FAILURE_TIME_WIDTH) {
+                    return None;
+                }
                 vec![(from + 1, end)]
             }
             None => {
                 let words = text[rest..].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
                 let columns = (text.len() - rest).is_multiple_of(WIDTH);
                 let count = if columns { (text.len() - rest) / WIDTH } else { words.count() };
-                (count <= 3).then_some(())?;
+                if count > 3 {
+                    return None;
+                }
                 numbers(line, rest, text.len(), count, WIDTH)?
             }
         };
