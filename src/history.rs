@@ -126,7 +126,7 @@ const GAP_KNOWN: usize = 3;
 ///
 /// For a file of one rate that is its median. The median of the whole file would call every
 /// interval of a file's slower part a hole: a rate that changes and then stays is a choice of
-/// whoever ran the solver, and is none. A hole is told by both sides being denser, at the ends
+/// the user, and is none. A hole shows by both sides being denser, at the ends
 /// of the file by the one side there is. So a slower rate of which the file holds one or two
 /// intervals counts as a hole (it is drawn across with a straight line all the same), and
 /// three holes within four intervals count as a rate. A last state off the raster and small

@@ -1099,7 +1099,7 @@ fn every_acknowledged_case_is_there() {
 
 /// One writer at a time: the second is told, whatever it wants.
 #[test]
-fn a_second_writer_is_told() {
+fn a_second_writer_is_known() {
     let (folder, study) = to_be_changed();
     let here = folder.path();
     let before = fs::read(here.join("curves.h5")).unwrap();

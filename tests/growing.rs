@@ -48,7 +48,7 @@ fn is_beginning(read: &SolverFile, whole: &SolverFile) {
     let states = read.time.len();
     let name = &read.section;
     assert_eq!(bits(&read.time), bits(&whole.time[..states]), "{name}");
-    // A first state that ends between two rows cannot be told from a whole one.
+    // A first state that ends between two rows cannot be distinguished from a whole one.
     assert!(states < 2 || read.entities == whole.entities, "{name}: {:?}", read.entities);
     // T01's forces are differences of its impulses: at the end a one-sided one.
     let is_rate = read.format == "t01" && name.ends_with("forc");

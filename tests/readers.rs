@@ -329,7 +329,7 @@ fn cut_at_every_byte(format: &str, text: &str) {
     let first = (0..text.len())
         .find(|&at| text.as_bytes()[at] == b'\n' && read(format, &text[..=at]).time.len() == 1)
         .unwrap();
-    // A first state that ends between two lines cannot be told from a whole one.
+    // A first state that ends between two lines cannot be distinguished from a whole one.
     let one = (first..text.len()).rev().find(|&at| read(format, &text[..at]).time.len() == 1);
     for cut in one.unwrap().min(first + (text.len() - first) / 2)..text.len() {
         let file = read(format, &text[..cut]);

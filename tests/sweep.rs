@@ -683,7 +683,7 @@ fn full_disks_and_missing_folders() {
 }
 
 #[test]
-fn a_second_writer_is_told() {
+fn a_second_writer_is_known() {
     let folder = Folder::new(GRID);
     let sweep = folder.load();
     let out = folder.path().join("out.csv");

@@ -442,7 +442,7 @@ fn full_disk_and_unwritable_targets() {
 
 /// The old database survives a target that cannot be replaced.
 #[test]
-fn a_second_writer_is_told_and_changes_nothing() {
+fn a_second_writer_is_known_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), "lead-car-wall");
     let before = fs::read(&path).unwrap();

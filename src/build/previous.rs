@@ -100,7 +100,7 @@ impl Named<'_> {
     fn renamed<'a>(&self, built: &[&'a Case]) -> Vec<&'a Case> {
         let ours: HashSet<&String> =
             self.runs.iter().filter_map(|(_, source_hash)| source_hash.as_ref()).collect();
-        // Of one study and group, so that whoever has two under one path loses neither.
+        // Of one study and group, so that two under one path are both kept.
         let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
         for &case in built {
             if let Some(origin) = &case.provenance.origin {

@@ -18,7 +18,7 @@ pub(super) struct CurveFile {
     /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
     #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
     unloading: Option<f64>,
-    /// Format of the file, if its content shall not tell (crumple db add --list)
+    /// Format of the file, if not by its content (crumple db add --list)
     #[arg(long)]
     from: Option<String>,
     /// Number or name of the curve in a file of several

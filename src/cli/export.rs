@@ -85,7 +85,7 @@ struct Which {
 /// The target's format and what it leaves open.
 #[derive(clap::Args)]
 pub(super) struct Target {
-    /// Format, if not told by the file's extension (crumple export --list)
+    /// Format, if not by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)

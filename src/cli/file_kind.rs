@@ -1,4 +1,4 @@
-//! What a file is, told by its first bytes: for commands that take several kinds.
+//! What a file is by its first bytes: for commands that take several kinds.
 
 use std::io::Read;
 use std::path::Path;

@@ -35,7 +35,7 @@ pub(super) struct Args {
     /// Section of a binout to read, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
-    /// Kind of the file (nodout, rcforc, …), if its content does not tell
+    /// Kind of the file (nodout, rcforc, …), if not by its content
     #[arg(long)]
     format: Option<String>,
     /// Read through a memory map: faster, but only for files that nothing writes to

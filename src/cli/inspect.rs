@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Kind of the files (nodout, rcforc, …), if their content does not tell
+    /// Kind of the files (nodout, rcforc, …), if not by their content
     #[arg(long)]
     format: Option<String>,
     /// Read through a memory map: faster, but only for files that nothing writes to

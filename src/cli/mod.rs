@@ -136,7 +136,7 @@ fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
 /// Refuses to write over a scenario or a file that it names.
 fn keep_inputs(scenario: &Path, output: &Path) -> Result<(), Failure> {
     keep_input(scenario, output)?;
-    // A scenario that cannot be read is reported by whoever runs it.
+    // A scenario that cannot be read is reported when it is run.
     let Ok(read) = crate::scenario::read(scenario) else { return Ok(()) };
     for file in read.files(scenario) {
         keep_input(&file, output)?;
@@ -193,7 +193,7 @@ fn arguments() -> Result<Cli, ExitCode> {
             let said = said.trim().trim_start_matches("error: ");
             print_document(&ErrorDocument::usage(&shell::one_line(said)));
         } else {
-            // With standard error closed there is nobody to tell.
+            // With standard error closed nobody would read it.
             let _ = error.print();
         }
         ExitCode::from(if error.use_stderr() { USAGE } else { DONE })

@@ -74,7 +74,7 @@ impl Write for NamedStdout<'_> {
 
 /// Prints a line on standard error.
 pub(super) fn say(line: &str) {
-    // With standard error closed or full there is nobody to tell.
+    // With standard error closed or full nobody would read it.
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
 

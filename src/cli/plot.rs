@@ -69,7 +69,7 @@ pub(super) struct Args {
     /// Of a solver file: section of a binout
     #[arg(long)]
     section: Option<String>,
-    /// Of a solver file: its kind (nodout, rcforc, …), if its content does not tell
+    /// Of a solver file: its kind (nodout, rcforc, …), if not by its content
     #[arg(long)]
     format: Option<String>,
     /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units

@@ -48,7 +48,7 @@ pub(super) struct Args {
     /// Answer further outside the training speeds than a third of their range
     #[arg(long)]
     extrapolate: bool,
-    /// File to write, its format told by the extension or by --to; may be repeated
+    /// File to write, in the format of its extension or of --to; may be repeated
     #[arg(short, long)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
 }
 
-/// The curve, and what is to be said of its files.
+/// The curve, and notes on its files.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]

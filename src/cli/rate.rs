@@ -69,7 +69,7 @@ struct Both {
     /// Section of binouts, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
-    /// Kind of the solver's files (nodout, rcforc, …), if their content does not tell
+    /// Kind of the solver's files (nodout, rcforc, …), if not by their content
     #[arg(long)]
     format: Option<String>,
 }
@@ -78,7 +78,7 @@ struct Both {
 #[derive(Clone, Debug, PartialEq)]
 struct Address {
     path: PathBuf,
-    /// What stands behind the file's name: a column, or a history.
+    /// What follows the file's name: a column, or a history.
     within: Option<String>,
     /// Factor on the values.
     scale: f64,
@@ -211,7 +211,7 @@ struct Wanted<'a> {
     format: Option<&'a str>,
 }
 
-/// A signal as it was read, and what tells its kind.
+/// A signal as it was read, and what shows its kind.
 struct Read {
     signal: Signal,
     column: String,

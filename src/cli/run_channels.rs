@@ -71,5 +71,5 @@ pub(super) fn write(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), F
     Ok(write_all_whole(&files)?)
 }
 
-/// Test objects that ISO-MME's codes can tell apart.
+/// Test objects that ISO-MME's codes distinguish.
 const OBJECTS: usize = 35;

@@ -2,7 +2,7 @@
 //! written as tables.
 //!
 //! Every function that changes a database locks it, reads it, changes it in memory and puts the new
-//! file in the old one's place: whoever is killed leaves the one or the other, and a second writer
+//! file in the old one's place: a killed program leaves the one or the other, and a second writer
 //! is told.
 
 mod compare;

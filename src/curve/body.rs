@@ -92,7 +92,7 @@ fn separation_m_per_s(time_s: &[f64], closing_m_per_s: &[f64], from: usize) -> f
 }
 
 /// Near the largest deflection the force still swings in time while the deflection hardly
-/// moves: over the last share of it one mean force stands for all, lest the rebound depend on
+/// moves: over the last share of it one mean force stands for all, so that the rebound does not depend on
 /// where exactly a run stops.
 const LAST_SHARE: f64 = 0.005;
 

@@ -158,7 +158,7 @@ impl Moves {
             file.commit()?;
             root.delete(from)?;
         }
-        // By way of names of their own, lest two change places.
+        // By way of names of their own, so that two can change places.
         let between = |k: usize| format!("crumple moves case {k}");
         for (k, (from, _)) in self.cases.iter().enumerate() {
             file.copy(&from.to_string(), &between(k))?;

@@ -94,7 +94,7 @@ mod tests {
     use crate::error::ErrorCode;
 
     #[test]
-    fn a_second_writer_is_told() {
+    fn a_second_writer_is_known() {
         let folder = tempfile::tempdir().unwrap();
         let database = folder.path().join("a.h5");
         let held = WriterLock::take(&database).unwrap();

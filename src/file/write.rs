@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_writer_of_a_file_is_told() {
+    fn a_second_writer_of_a_file_is_known() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         write_whole(&path, b"old").unwrap();

@@ -1,7 +1,7 @@
 //! HDF5: the one room that names the crate hdf5-pure, and what is built on it for all others.
 //!
-//! The names below are all that the program uses of that crate: whoever replaces it finds here
-//! what the replacement has to offer.
+//! The names below are all that the program uses of that crate: a replacement has to offer
+//! these.
 
 pub(crate) mod skeleton;
 pub(crate) mod table;

@@ -44,7 +44,7 @@ impl Said {
 /// Two values this close are one.
 const SAME: f64 = 0.01;
 
-/// Both sides, and what is to be said of them.
+/// Both sides, and notes on them.
 struct StatedAndFound<'a> {
     item: &'a Item,
     settings: &'a Settings,

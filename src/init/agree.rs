@@ -85,7 +85,7 @@ impl Agreed {
     /// The recipe of most of the runs; `None` if there are no runs.
     pub(super) fn of(surveys: &[&Survey], given: &UserHints) -> Option<Self> {
         let single = given.half_model.then_some(StudyKind::Wall);
-        // Whoever names a node of the other body has two.
+        // A node of the other body means two.
         let two = given.minus_node.map(|_| StudyKind::Pair);
         let kind = single.or(given.kind).or(two);
         let views = RunView::all(surveys, given, kind);

@@ -204,7 +204,7 @@ fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
     (proposed, cut)
 }
 
-/// What whoever uses the proposal should look at.
+/// What the user should look at.
 fn doubts(measured: &Measured<'_>, warnings: &mut Vec<String>) {
     let agreed = measured.agreed;
     if agreed.force.is_some() && agreed.residual > FOLLOWS {
@@ -281,7 +281,7 @@ pub(super) fn stated_units(
     Some(first)
 }
 
-/// Commented entries of the runs that are left out, for whoever wants them all the same.
+/// Commented entries of the runs that are left out, so that the user can take them all the same.
 pub(super) fn entries_of_left_out(proposal: &mut Proposal, seen: Seen<'_>) {
     for out in &mut proposal.left_out {
         out.entry = match out.reason {

@@ -50,7 +50,7 @@ pub(crate) enum Proposed<T> {
         #[serde(flatten)]
         evidence: Evidence,
     },
-    /// It could not be found: whoever uses the proposal has to fill it in.
+    /// It could not be determined: the user has to fill it in.
     Missing {
         /// Why not, and what to do.
         missing: String,

@@ -43,7 +43,7 @@ pub struct Proposal {
     pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
     pub(crate) notes: Vec<String>,
-    /// What whoever uses the study should look at.
+    /// What the user should look at.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -68,7 +68,7 @@ pub(crate) struct ProposedRun {
     pub(crate) crush_m: Option<f64>,
     /// Whole states that motion and force both have.
     pub(crate) states: usize,
-    /// What is to be said of its speed.
+    /// Notes on its speed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) notes: Vec<String>,
 }

@@ -55,7 +55,7 @@ pub(crate) struct LimitsTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReferenceTable {
-    /// Solver file with the nodes, such as a nodout; a case.json beside it tells how long FE
+    /// Solver file with the nodes, such as a nodout; a case.json beside it says how long FE
     /// took.
     pub(crate) file: PathBuf,
     /// Units of the file, such as "mm-t-s".
@@ -320,12 +320,12 @@ pub(crate) struct CrushZone<'a> {
     pub(crate) end: &'static str,
     /// Curve between it and the body.
     pub(crate) curve: &'a str,
-    /// `None` if a model tells what is stopped.
+    /// `None` if a model knows what is stopped.
     pub(crate) mass_kg: Option<f64>,
 }
 
 impl CrushZone<'_> {
-    /// Whether a model tells its mass.
+    /// Whether a model knows its mass.
     pub(crate) fn is_of_model(&self) -> bool {
         self.mass_kg.is_none()
     }

@@ -1,4 +1,4 @@
-//! Extraction of a run's case: units, histories, curve, and what is to be said of them.
+//! Extraction of a run's case: units, histories, curve, notes and warnings.
 
 use super::files::Located;
 use super::files::shown_name;
@@ -93,7 +93,7 @@ impl LocatedRun<'_> {
         deck.problems.iter().map(|p| format!("deck {name}: {p}")).collect()
     }
 
-    /// What is to be said of the files: the side that was chosen, twins, notes and damage.
+    /// Notes on the files: the side that was chosen, twins and damage.
     fn of_files(&self, files: &RunFiles<'_>) -> Result<Notes, RunError> {
         let mut remarks = Notes::default();
         if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force

@@ -28,7 +28,7 @@ pub(crate) struct LocatedRun<'a> {
     pub(super) entry: &'a RunEntry,
     pub(super) files: Vec<Located>,
     pub(super) deck: Option<RunDeck>,
-    /// What is to be said of the search for the deck.
+    /// Notes on the search for the deck.
     pub(super) deck_notes: Vec<String>,
     /// Everything of the manifest that decides the case's numbers, as JSON.
     pub(super) recipe: String,

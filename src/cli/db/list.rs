@@ -26,7 +26,7 @@ pub(super) struct Args {
 #[derive(Serialize)]
 pub(super) struct Groups<T> {
     pub groups: BTreeMap<String, Vec<T>>,
-    /// The mass that the crush zone of a group stops, where its cases tell it.
+    /// The mass that the crush zone of a group stops, where its cases give one.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub stopped_mass: BTreeMap<String, StoppedMass>,
     /// What no command can use a group for.
