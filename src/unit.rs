@@ -73,8 +73,9 @@ pub(crate) struct Shown {
 }
 
 impl Shown {
-    fn fitting(largest: f64, scales: &[(f64, &'static str, usize)]) -> Self {
-        let fits = |(size, ..): &&(f64, &str, usize)| largest.abs() >= 0.1 * size;
+    /// In the first unit of which the largest value has at least this share.
+    fn fitting(largest: f64, share: f64, scales: &[(f64, &'static str, usize)]) -> Self {
+        let fits = |(size, ..): &&(f64, &str, usize)| largest.abs() >= share * size;
         let last = scales.len() - 1;
         let &(size, unit, decimals) = scales.iter().find(fits).unwrap_or(&scales[last]);
         Self { unit, size, decimals }
@@ -82,22 +83,22 @@ impl Shown {
 
     /// In MN, kN or N.
     pub(crate) fn force(largest_n: f64) -> Self {
-        Self::fitting(largest_n, &[(1e6, "MN", 3), (1e3, "kN", 3), (1.0, "N", 2)])
+        Self::fitting(largest_n, 0.1, &[(1e6, "MN", 3), (1e3, "kN", 3), (1.0, "N", 2)])
     }
 
     /// In t or kg.
     pub(crate) fn mass(largest_kg: f64) -> Self {
-        Self::fitting(largest_kg, &[(1e3, "t", 2), (1.0, "kg", 2)])
+        Self::fitting(largest_kg, 1.0, &[(1e3, "t", 2), (1.0, "kg", 2)])
     }
 
     /// In MJ, kJ or J.
     pub(crate) fn energy(largest_j: f64) -> Self {
-        Self::fitting(largest_j, &[(1e6, "MJ", 3), (1e3, "kJ", 3), (1.0, "J", 2)])
+        Self::fitting(largest_j, 0.1, &[(1e6, "MJ", 3), (1e3, "kJ", 3), (1.0, "J", 2)])
     }
 
     /// In MN/m or kN/m.
     pub(crate) fn stiffness(largest_n_per_m: f64) -> Self {
-        Self::fitting(largest_n_per_m, &[(1e6, "MN/m", 1), (1e3, "kN/m", 1)])
+        Self::fitting(largest_n_per_m, 1.0, &[(1e6, "MN/m", 1), (1e3, "kN/m", 1)])
     }
 
     pub(crate) fn text(self, value: f64) -> String {
@@ -517,6 +518,7 @@ mod tests {
         assert_eq!(Shown::mass(24e3).text(24e3), "24.00 t");
         assert_eq!(Shown::energy(1.2e6).text(1.2e6), "1.200 MJ");
         assert_eq!(Shown::stiffness(8e7).text(8e7), "80.0 MN/m");
+        assert_eq!(Shown::stiffness(5e5).text(5e5), "500.0 kN/m");
     }
 
     #[test]

@@ -232,7 +232,7 @@ pub enum ErrorCode {
     Io,
     /// Another process writes the file.
     Locked,
-    /// A TOML file is no TOML, or has an unknown key or a value that cannot be.
+    /// A file is not TOML, or has an unknown key or an impossible value.
     Toml,
     /// A study contradicts itself, or none of its runs can be used.
     Study,

@@ -22,7 +22,7 @@ impl PiecewiseLinear {
     /// Checks the invariant once.
     ///
     /// # Errors
-    /// the error, the error, naming the first bad node from 1.
+    /// It names the first node that breaks it, counted from 1.
     pub fn new(nodes: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if nodes.len() != values.len() || nodes.len() < 2 {
             return Err(error!(

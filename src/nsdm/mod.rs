@@ -224,8 +224,7 @@ pub struct Fit {
 /// gives the same bits for any number of them.
 ///
 /// # Errors
-/// For settings out of range, or if no law found has a finite motion
-/// (the error).
+/// For settings out of range, or if no law found has a finite motion.
 pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Error> {
     let FitSettings { population, generations, velocity_weight_per_s2: weight_per_s2, .. } =
         *settings;

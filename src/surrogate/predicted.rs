@@ -167,8 +167,7 @@ impl PredictedCurve {
         if !(stiffness > 0.0 && stiffness.is_finite()) {
             return Err(error!(
                 Prediction,
-                "{}",
-                format!("unloading_stiffness_N_per_m is {stiffness}: expected more than 0")
+                "unloading_stiffness_N_per_m is {stiffness}: expected more than 0"
             ));
         }
         for (name, value) in [
@@ -178,22 +177,14 @@ impl PredictedCurve {
             ("body_unloading_stiffness_N_per_m", self.body_unloading_stiffness_n_per_m),
         ] {
             if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-                return Err(error!(
-                    Prediction,
-                    "{}",
-                    format!("{name} is {value}: expected more than 0")
-                ));
+                return Err(error!(Prediction, "{name} is {value}: expected more than 0"));
             }
         }
         let end = self.deflection_m.last().copied().unwrap_or_default();
         if (end / self.max_deflection_m - 1.0).abs() > SAME_END {
             return Err(error!(
                 Prediction,
-                "{}",
-                format!(
-                    "max_deflection_m is {}, but the points end at {end} m",
-                    self.max_deflection_m
-                )
+                "max_deflection_m is {}, but the points end at {end} m", self.max_deflection_m
             ));
         }
         for (name, values) in [
@@ -208,8 +199,9 @@ impl PredictedCurve {
             {
                 return Err(error!(
                     Prediction,
-                    "{}",
-                    format!("{name} has {} values, force_N {}", values.len(), self.force_n.len())
+                    "{name} has {} values, force_N {}",
+                    values.len(),
+                    self.force_n.len()
                 ));
             }
         }
@@ -221,8 +213,7 @@ impl PredictedCurve {
     /// quantiles are of the declared force only.
     ///
     /// # Errors
-    /// the error or If it does not have that
-    /// force, else the error that its points are not an envelope.
+    /// If it does not have that force, or its points are not an envelope.
     pub fn of_force(&self, kind: ForceKind) -> Result<Self, Error> {
         match (kind, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => Err(
@@ -343,11 +334,7 @@ impl PredictedCurve {
         member: f64,
     ) -> Result<Envelope, Error> {
         if !(-1.0..=1.0).contains(&member) {
-            return Err(error!(
-                Prediction,
-                "{}",
-                format!("band = {member}: expected from -1 to 1")
-            ));
+            return Err(error!(Prediction, "band = {member}: expected from -1 to 1"));
         }
         let (low_n, high_n) = self.edges(force);
         let edge_n = if member < 0.0 { low_n } else { high_n };
@@ -386,11 +373,9 @@ const SAME_END: f64 = 1e-6;
 /// An envelope of the forces called `name`, none of which pulls.
 fn pushing(name: &str, envelope: Envelope) -> Result<Envelope, Error> {
     match envelope.first_pulling_point() {
-        Some(point) => Err(error!(
-            Prediction,
-            "{}",
-            format!("{name} of point {point} is below 0: an interface only pushes")
-        )),
+        Some(point) => {
+            Err(error!(Prediction, "{name} of point {point} is below 0: an interface only pushes"))
+        }
         None => Ok(envelope),
     }
 }

@@ -22,8 +22,7 @@ impl PredictedCurve {
     /// # Errors
     /// If the case's states contain no loading branch.
     pub fn of_case(case: &Case) -> Result<Self, Error> {
-        let no_curve =
-            |e: ForceCurveError| error!(Prediction, "{}", format!("{}: {e}", case.id.name));
+        let no_curve = |e: ForceCurveError| error!(Prediction, "{}: {e}", case.id.name);
         let of_case = |force: ForceKind| {
             let mut curve = ForceCurve::of_case(case, force)?;
             if case.moves_by_its_force() {
