@@ -7,10 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::{self, ErrorCode, Place};
-use crate::history_hdf5::ConvertError;
 use crate::multibody::SimulationError;
-use crate::solver::ReadError;
-use crate::study::RunError;
 
 /// Exit code of a command that did its work.
 pub const DONE: u8 = 0;
@@ -76,8 +73,6 @@ fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
     }
     codes! {
         io::Error => Io;
-        RunError => Run;
-        ReadError, ConvertError => SolverFile;
         SimulationError => Simulation;
     }
     None

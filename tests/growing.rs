@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::common::{fixture, is_thorough, shared};
-use crumple::solver::{ProblemCode, ReadError, Selection, SolverFile, read_from, read_sections};
+use crumple::solver::{ProblemCode, Selection, SolverFile, read_from, read_sections};
 
 /// Bytes appended at once: no divisor of any line's or record's length.
 const APPENDED: usize = 137;
@@ -93,7 +93,7 @@ fn grow(format: &str, name: &str, bytes: &[u8]) {
             let sections = match read_sections(&path, None, &Selection::all()) {
                 Ok(sections) => sections,
                 // The file has no line or record yet that tells its kind.
-                Err(ReadError::UnknownFormat { .. }) => continue,
+                Err(error) if error.to_string().contains(": the readers take ") => continue,
                 Err(error) => panic!("{error}"),
             };
             for section in &sections {

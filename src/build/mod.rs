@@ -12,7 +12,7 @@ use crate::curve::{Case, Origin};
 use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
 use crate::file::WriterLock;
-use crate::study::{self, LocatedRun, RunError, Study};
+use crate::study::{self, LocatedRun, Study};
 use previous::{Named, Previous};
 
 /// Problems that a message repeats.
@@ -99,7 +99,7 @@ pub fn build(
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
     let mut database = if path.is_file() { Database::read(path)? } else { Database::default() };
-    let located: Vec<Result<LocatedRun<'_>, RunError>> =
+    let located: Vec<Result<LocatedRun<'_>, Error>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
     let previous = previous(&study, &located, &database);
     // A case that somebody has changed since is made again.
@@ -114,7 +114,7 @@ pub fn build(
             let name = entry.case_name();
             let before = previous.of_run.get(&name);
             let before = before.and_then(|(path, _)| fingerprints.get(path).copied());
-            let result = case(&study, entry, located, before);
+            let result = case(&study, located, before);
             progress(&name);
             (name, result)
         })
@@ -153,7 +153,7 @@ pub fn build(
 /// The study's cases as the database has them.
 fn previous(
     study: &Study,
-    located: &[Result<LocatedRun<'_>, RunError>],
+    located: &[Result<LocatedRun<'_>, Error>],
     database: &Database,
 ) -> Previous {
     let source_hash = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.source_hash();
@@ -170,17 +170,11 @@ fn previous(
 /// The run's case, or `None` if its fingerprint is the one it had before.
 fn case(
     study: &Study,
-    entry: &study::RunEntry,
-    located: Result<LocatedRun<'_>, RunError>,
+    located: Result<LocatedRun<'_>, Error>,
     before: Option<&str>,
 ) -> Result<Option<Case>, Error> {
-    let failure = |reason: RunError, problems: Vec<String>| {
-        let (place, damage) = (study.place(entry, &reason), listed(&problems));
-        let error = Error::below(ErrorCode::Run, reason).followed_by(&damage);
-        match place {
-            Some(place) => error.placed(|_| place),
-            None => error,
-        }
+    let failure = |reason: Error, problems: Vec<String>| {
+        study.placed(reason.coded(ErrorCode::Run).followed_by(&listed(&problems)))
     };
     let located = located.map_err(|reason| failure(reason, Vec::new()))?;
     if before == Some(&*located.fingerprint) {

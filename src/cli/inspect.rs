@@ -3,9 +3,10 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::error::Error;
 use crate::solver::decks;
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Access, Entity, Problem, ReadError, Selection, SolverFile, WithoutData};
+use crate::solver::{self, Access, Entity, Problem, Selection, SolverFile, WithoutData};
 use serde::Serialize;
 
 use super::Failure;
@@ -87,7 +88,7 @@ struct Inspected {
     /// The run's folder, if it was found by its folder.
     run: Option<PathBuf>,
     read: Vec<(PathBuf, Read)>,
-    unread: Vec<ReadError>,
+    unread: Vec<Error>,
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
@@ -154,10 +155,10 @@ fn inspect(asked: Asked, args: &Args) -> Inspected {
 }
 
 /// The sections of a file, or the deck that it is.
-fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Read>, ReadError> {
+fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Read>, Error> {
     let sections = match solver::read_sections(path, format, selection) {
         Ok(sections) => sections,
-        Err(ReadError::Deck { .. }) => {
+        Err(error) if error.is_about("deck") => {
             return Ok(vec![Read::Deck(Box::new(decks::read_deck(path)?))]);
         }
         Err(error) => return Err(error),

@@ -3,12 +3,13 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::error::Error;
 use crate::file;
 use crate::rating::deceleration::Deceleration;
 use crate::rating::iso18571::Iso18571;
 use crate::rating::magnitude_phase::MagnitudePhase;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
-use crate::solver::{self, ReadError, Selection, WantedId};
+use crate::solver::{self, Selection, WantedId};
 use crate::unit::TIME;
 
 use super::arguments::one_of;
@@ -311,12 +312,12 @@ impl Wanted<'_> {
             // Any other name may hold a table as well, if its columns are asked for.
             Err(Failure::Failed(error))
                 if self.column.is_some()
-                    && matches!(error.downcast_ref(), Some(ReadError::UnknownFormat { .. })) =>
+                    && error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) =>
             {
                 self.read_table()
             }
             Err(Failure::Failed(error))
-                if matches!(error.downcast_ref(), Some(ReadError::UnknownFormat { .. })) =>
+                if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) =>
             {
                 Err(failed(format!(
                     "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",

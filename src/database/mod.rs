@@ -17,7 +17,7 @@
 //! let database = Database::read(&path)?;
 //! for case in database.cases("lead-car-wall") {
 //!     // The curve takes up the impact's energy.
-//!     assert!((case.audit.ratio() - 1.0).abs() < 0.06, "{}", case.name);
+//!     assert!((case.quality.audit.ratio() - 1.0).abs() < 0.06, "{}", case.id.name);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -83,6 +83,11 @@ impl Error {
         self.0.key == KeyPath::of(keys)
     }
 
+    /// The key or item that it is about.
+    pub(crate) fn key(&self) -> &KeyPath {
+        &self.0.key
+    }
+
     /// What is wrong, without the place.
     pub(crate) fn message(&self) -> &str {
         &self.0.message

@@ -2,11 +2,11 @@
 
 mod units;
 
-use crate::error::Error;
+use crate::error::{Error, error};
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,26 +17,9 @@ use crate::hdf5::skeleton::{Skeleton, write_all_at};
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
 use crate::history::{EntityId, History, Side};
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Blocks, ReadError, Selection, SolverFile, decks};
+use crate::solver::{self, Blocks, Selection, SolverFile, decks};
 use crate::unit::UnitSystem;
 use units::unit_of;
-
-/// Why a solver's file could not be converted.
-#[derive(Debug, thiserror::Error)]
-pub enum ConvertError {
-    /// The solver's file cannot be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// HDF5 cannot hold the histories.
-    #[error("cannot encode the histories: {detail}")]
-    Encode {
-        /// Why not, in the words of the library.
-        detail: String,
-    },
-    /// A room below says why.
-    #[error(transparent)]
-    Below(#[from] Error),
-}
 
 /// What is known of a file's histories beside the file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,7 +41,7 @@ pub(crate) fn convert(
     selection: &Selection,
     beside: &Beside<'_>,
     output: &Path,
-) -> Result<SolverFile, ConvertError> {
+) -> Result<SolverFile, Error> {
     // Neither can be opened twice, nor be written at any place.
     let is_file = |path: &Path| path.metadata().is_ok_and(|meta| meta.is_file());
     let is_device = output.exists() && !is_file(output);
@@ -102,12 +85,12 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
 /// has the attribute `units`.
 ///
 /// # Errors
-/// [`ConvertError::Encode`] if HDF5 cannot hold them.
+/// If HDF5 cannot hold them.
 pub fn encode(
     file: &SolverFile,
     beside: &Beside<'_>,
     source: Option<&Path>,
-) -> Result<Vec<u8>, ConvertError> {
+) -> Result<Vec<u8>, Error> {
     let mut layout = Layout::of(file, beside, source);
     let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
     let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
@@ -134,8 +117,8 @@ pub fn encode(
     layout.finish()?.finish().map_err(not_encoded)
 }
 
-fn not_encoded(error: impl std::fmt::Display) -> ConvertError {
-    ConvertError::Encode { detail: error.to_string() }
+fn not_encoded(error: impl std::fmt::Display) -> Error {
+    error!(SolverFile, "cannot encode the histories: {error}")
 }
 
 /// A file of histories under work: everything but the values of components.
@@ -237,7 +220,7 @@ impl Layout {
     }
 
     /// Adds what no attribute holds.
-    fn finish(mut self) -> Result<FileBuilder, ConvertError> {
+    fn finish(mut self) -> Result<FileBuilder, Error> {
         let many = |most: usize| self.long.iter().filter(move |(_, e)| e.len() > most);
         let with_ids: Vec<_> = many(MAX_IDS).collect();
         if !with_ids.is_empty() {
@@ -334,7 +317,7 @@ fn stream(
     blocks: Blocks,
     beside: &Beside<'_>,
     output: &Path,
-) -> Result<Option<SolverFile>, ConvertError> {
+) -> Result<Option<SolverFile>, Error> {
     let states = blocks.file.time.len();
     let mut layout = Layout::of(&blocks.file, beside, Some(input));
     let mut skeleton = Skeleton::default();
@@ -343,7 +326,6 @@ fn stream(
         skeleton.reserve(dataset, states, column.entities.len());
     }
     let out = layout.finish()?;
-    let failed_read = |source| ReadError::Io { path: PathBuf::from(input), source };
     let mut read_error = None;
     let written = write_at(output, |file| {
         let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
@@ -357,7 +339,7 @@ fn stream(
         }
     })?;
     if let Some(error) = read_error {
-        return Err(failed_read(error).into());
+        return Err(Error::io(input, error));
     }
     Ok(written.map(|()| blocks.file))
 }

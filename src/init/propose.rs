@@ -23,9 +23,9 @@ use super::sources::Sources;
 use super::survey::Survey;
 use super::units;
 use crate::curve::contact::milliseconds;
+use crate::study;
 use crate::study::StudyKind;
 use crate::study::extract::is_alike;
-use crate::study::{self, RunError};
 use crate::unit::UnitSystem;
 use std::path::Path;
 
@@ -311,7 +311,7 @@ pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<
         return Ok(());
     }
     let study = study::parse(path, &proposal.to_toml())?;
-    let refused: Vec<Option<RunError>> = study
+    let refused: Vec<Option<Error>> = study
         .runs()
         .par_iter()
         .map(|entry| study.locate(entry).and_then(|run| run.extract()).err())

@@ -21,7 +21,7 @@
 //! let settings = FitSettings { population: 30, generations: 20, ..FitSettings::default() };
 //! let fit = fit(&target, &settings, 1)?;
 //! assert!(fit.velocity_l1 < 0.05);
-//! # Ok::<(), crumple::nsdm::Error>(())
+//! # Ok::<(), crumple::Error>(())
 //! ```
 
 mod genes;

@@ -20,22 +20,22 @@ const WEIGHTS: [f64; 3] = [0.5, 0.25, 0.25];
 
 /// Ratings of CORA, each from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Cora {
+pub struct Cora {
     /// Corridor of 5 % and 50 % of the reference's largest magnitude, exponent 2.
-    pub(crate) corridor: f64,
+    pub corridor: f64,
     /// `(½ (K + 1))¹⁰` of the largest correlation K.
-    pub(crate) progression: f64,
+    pub progression: f64,
     /// The smaller over the larger sum of squares after the shift.
-    pub(crate) size: f64,
+    pub size: f64,
     /// 1 for a shift up to 1 % of the interval, falling to 0 at 12 %.
-    pub(crate) phase: f64,
+    pub phase: f64,
     /// Half the progression, a quarter of size and of phase each.
-    pub(crate) cross_correlation: f64,
+    pub cross_correlation: f64,
     /// Mean of corridor and cross-correlation.
-    pub(crate) rating: f64,
+    pub rating: f64,
     /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
     /// the interval.
-    pub(crate) late_s: f64,
+    pub late_s: f64,
 }
 
 /// Rates a prediction by CORA over the whole interval that is given: the program's automatic

@@ -11,20 +11,20 @@ const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Deceleration {
+pub struct Deceleration {
     /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
     /// next returns to zero or the interval ends; null if it is never above zero. Where only the
     /// contact decelerates, that is the time in which the net contact force is above zero.
-    pub(crate) mean: Option<f64>,
+    pub mean: Option<f64>,
     /// Time at which that mean begins, in s.
-    pub(crate) from_s: Option<f64>,
+    pub from_s: Option<f64>,
     /// Time at which it ends, in s.
-    pub(crate) to_s: Option<f64>,
+    pub to_s: Option<f64>,
     /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean is then
     /// of a part of the deceleration.
-    pub(crate) is_cut: bool,
+    pub is_cut: bool,
     /// Largest mean of −a over 120 ms; null if the interval is shorter.
-    pub(crate) largest_120ms_mean: Option<f64>,
+    pub largest_120ms_mean: Option<f64>,
 }
 
 impl Deceleration {

@@ -10,20 +10,20 @@ const CANCELS: f64 = 0.05;
 
 /// Mean of `|p − r|/|r|` over the samples where `|r|` is at least 5 % of its maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Pointwise {
+pub struct Pointwise {
     /// The mean; 0 where the signals agree.
-    pub(crate) mean: f64,
+    pub mean: f64,
     /// Share of the samples that are left out.
-    pub(crate) left_out: f64,
+    pub left_out: f64,
 }
 
 /// The largest difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct MaxAbs {
+pub struct MaxAbs {
     /// `|p − r|`, in the unit of the signals.
-    pub(crate) value: f64,
+    pub value: f64,
     /// Where it is, in s.
-    pub(crate) time_s: f64,
+    pub time_s: f64,
 }
 
 /// Largest magnitude.

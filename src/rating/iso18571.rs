@@ -27,28 +27,28 @@ pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Iso18571 {
+pub struct Iso18571 {
     /// Corridor score Z.
-    pub(crate) corridor: f64,
+    pub corridor: f64,
     /// Phase score E_P.
-    pub(crate) phase: f64,
+    pub phase: f64,
     /// Magnitude score E_M.
-    pub(crate) magnitude: f64,
+    pub magnitude: f64,
     /// Slope score E_S.
-    pub(crate) slope: f64,
+    pub slope: f64,
     /// `R = 0.4 Z + 0.2 (E_P + E_M + E_S)`.
-    pub(crate) rating: f64,
+    pub rating: f64,
     /// The standard's word for this rating.
-    pub(crate) grade: Grade,
+    pub grade: Grade,
     /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
     /// the interval; 0 if one of the signals is constant.
-    pub(crate) late_s: f64,
+    pub late_s: f64,
 }
 
 /// Grades of ISO/TS 18571, table 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Grade {
+pub enum Grade {
     /// R above 0.94.
     Excellent,
     /// Above 0.80.

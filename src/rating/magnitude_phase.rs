@@ -7,13 +7,13 @@ use serde::Serialize;
 
 /// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct MagnitudePhase {
+pub struct MagnitudePhase {
     /// Above 0 if the prediction is larger.
-    pub(crate) magnitude: f64,
+    pub magnitude: f64,
     /// 0 to 1.
-    pub(crate) phase: f64,
+    pub phase: f64,
     /// Of Sprague and Geers the root of the sum of the two squares; of Russell that, times √(π/4).
-    pub(crate) combined: f64,
+    pub combined: f64,
 }
 
 /// `√Σr²`, `√Σp²` and `acos(Σrp / √(Σr² Σp²)) / π`; `None` if one of the signals is zero

@@ -42,15 +42,15 @@ use serde::Serialize;
 
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub(crate) use cora::Cora;
+pub use cora::Cora;
 use cora::cora;
-pub(crate) use deceleration::Deceleration;
-pub(crate) use differences::MaxAbs;
-pub(crate) use differences::Pointwise;
+pub use deceleration::Deceleration;
+pub use differences::MaxAbs;
+pub use differences::Pointwise;
 use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
-pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
-pub(crate) use magnitude_phase::MagnitudePhase;
+pub use iso18571::{Grade, Iso18571};
+pub use magnitude_phase::MagnitudePhase;
 use magnitude_phase::{russell, sprague_geers};
 pub use signal::Signal;
 pub(crate) use signal::{INTERVAL_S, Pair};
@@ -117,25 +117,25 @@ pub struct Rating {
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
     /// Relative differences sample by sample.
-    pub(crate) pointwise: Option<Pointwise>,
+    pub pointwise: Option<Pointwise>,
     /// The largest difference and its time.
-    pub(crate) max_abs: MaxAbs,
+    pub max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
-    pub(crate) peaks: Vec<Peak>,
+    pub peaks: Vec<Peak>,
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
     /// Measure of Sprague and Geers.
-    pub(crate) sprague_geers: Option<MagnitudePhase>,
+    pub sprague_geers: Option<MagnitudePhase>,
     /// Measure of Russell.
-    pub(crate) russell: Option<MagnitudePhase>,
+    pub russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
-    pub(crate) iso18571: Option<Iso18571>,
+    pub iso18571: Option<Iso18571>,
     /// Null over more than 2 s.
-    pub(crate) cora: Option<Cora>,
+    pub cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
-    pub(crate) deceleration: Option<Decelerations>,
+    pub deceleration: Option<Decelerations>,
     /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
@@ -162,25 +162,25 @@ impl Rated {
 
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Peak {
+pub struct Peak {
     /// Time of the reference's peak, in s.
-    pub(crate) time_s: f64,
+    pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
-    pub(crate) value: f64,
+    pub value: f64,
     /// Prediction over reference, less 1; null if the prediction has no peak within a tenth of the
     /// common times: it is missing.
-    pub(crate) error: Option<f64>,
+    pub error: Option<f64>,
     /// By how much the prediction's peak is later, in s.
-    pub(crate) shift_s: Option<f64>,
+    pub shift_s: Option<f64>,
 }
 
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Decelerations {
+pub struct Decelerations {
     /// Of the reference.
-    pub(crate) reference: Deceleration,
+    pub reference: Deceleration,
     /// Of the prediction.
-    pub(crate) prediction: Deceleration,
+    pub prediction: Deceleration,
 }
 
 /// Rates `prediction` against `reference`.

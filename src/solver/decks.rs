@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::lsdyna::deck::{self, Deck, DeckInterface, TitledEntity};
 use super::lsdyna::line::Lines;
-use super::{Entity, ReadError, SolverFile, source};
+use super::{Entity, SolverFile, source};
+use crate::error::Error;
 use crate::file;
 
 /// Endings of keyword decks.
@@ -31,14 +32,14 @@ pub(crate) enum Search {
 /// Reads a deck; included files are looked for beside it.
 ///
 /// # Errors
-/// [`ReadError::Io`] if the deck itself cannot be read.
-pub fn read_deck(path: &Path) -> Result<Deck, ReadError> {
+/// If the deck itself cannot be read.
+pub fn read_deck(path: &Path) -> Result<Deck, Error> {
     Ok(read_with_includes(path)?.0)
 }
 
 /// The same, with the included files that were read.
-pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), ReadError> {
-    let io = |source| ReadError::Io { path: path.into(), source };
+pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Error> {
+    let io = |source| Error::io(path, source);
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut included = Vec::new();
     let mut open = |name: &str| -> Option<Box<dyn BufRead>> {

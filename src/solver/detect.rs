@@ -3,16 +3,17 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::format::{FORMATS, Format, format_names};
+use super::format::{FORMATS, Format};
 use super::source::{self, Source, Stream};
-use super::{ReadError, SolverFile, lsdyna};
+use super::{SolverFile, lsdyna, unknown_format};
+use crate::error::{Error, error};
 
 /// Lines looked at before a file counts as unknown: more than the longest legend seen,
 /// few enough that a large foreign file is refused at once.
 const DETECT_LINES: u64 = 100_000;
 
 /// The format of a file.
-pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, ReadError> {
+pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, Error> {
     let (by_content, is_lsdyna) = look_at(path, source)?;
     if let Some(format) = by_content {
         return Ok(format);
@@ -27,25 +28,20 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
     });
     match by_name {
         Some(format) if is_lsdyna => Ok(format),
-        _ => Err(ReadError::UnknownFormat {
-            path: path.into(),
-            looks_like: if is_lsdyna { "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header" } else { NOT_RECOGNISED }
-            .into(),
-            known: format_names(),
-        }),
+        _ if is_lsdyna => Err(unknown_format(
+            path,
+            "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
+        )),
+        _ => Err(unknown_format(path, NOT_RECOGNISED)),
     }
 }
 
 const NOT_RECOGNISED: &str = "no solver output is recognised in it";
 
 /// The format that the content tells, and whether it has the header of LS-DYNA's text files.
-fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>, bool), ReadError> {
-    let io = |source| ReadError::Io { path: path.into(), source };
-    let unknown = |looks_like: &str| ReadError::UnknownFormat {
-        path: path.into(),
-        looks_like: looks_like.into(),
-        known: format_names(),
-    };
+fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>, bool), Error> {
+    let io = |source| Error::io(path, source);
+    let unknown = |looks_like: &str| unknown_format(path, looks_like);
     let mut head = Vec::new();
     Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
@@ -68,7 +64,10 @@ fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>,
             return Err(unknown(NOT_RECOGNISED));
         }
         if lsdyna::deck::signature(line.text) {
-            return Err(ReadError::Deck { path: path.into() });
+            let path = path.display();
+            return Err(
+                error!(SolverFile at "deck", "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"),
+            );
         }
         is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
         if line.number <= 2 {
@@ -89,23 +88,21 @@ pub(super) fn check_format(
     format: &Format,
     source: &dyn Source,
     sections: &[SolverFile],
-) -> Result<(), ReadError> {
+) -> Result<(), Error> {
     if sections.iter().any(|s| !s.time.is_empty()) {
         return Ok(());
     }
     match look_at(path, source)? {
-        (Some(found), _) if found.name != format.name => Err(ReadError::OtherFormat {
-            path: path.into(),
-            format: format.name.into(),
-            looks_like: found.name,
-        }),
+        (Some(found), _) if found.name != format.name => Err(error!(
+            SolverFile,
+            "{}: this is not a {}: it looks like a {}, read it as that",
+            path.display(),
+            format.name,
+            found.name
+        )),
         // A file that ends after its header tells no format, nor does one that has just begun.
         (None, false) if source.size().is_ok_and(|size| size > 0) => {
-            Err(ReadError::UnknownFormat {
-                path: path.into(),
-                looks_like: NOT_RECOGNISED.into(),
-                known: format_names(),
-            })
+            Err(unknown_format(path, NOT_RECOGNISED))
         }
         _ => Ok(()),
     }

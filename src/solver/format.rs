@@ -4,7 +4,9 @@ use std::io;
 
 use super::problem;
 use super::source::Source;
-use super::{ReadError, Selection, SolverFile, lsdyna, openradioss};
+use super::{Selection, SolverFile, lsdyna, openradioss};
+use crate::error::{Error, error};
+use crate::guess;
 
 /// One kind of file: its name, how to recognise it, how to read it.
 pub struct Format {
@@ -117,9 +119,10 @@ pub(crate) fn format_names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
-pub(super) fn named(name: &str) -> Result<&'static Format, ReadError> {
-    FORMATS
-        .iter()
-        .find(|f| f.name == name)
-        .ok_or_else(|| ReadError::NoSuchFormat { name: name.into(), known: format_names() })
+pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
+    FORMATS.iter().find(|f| f.name == name).ok_or_else(|| {
+        let known = format_names();
+        let hint = guess::hint(name, &known);
+        error!(SolverFile, "there is no format \"{name}\": the readers take {known}{hint}")
+    })
 }

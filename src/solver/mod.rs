@@ -38,12 +38,15 @@ pub(crate) mod source;
 mod states;
 mod zeros;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use crate::error::{Error, error};
+use crate::guess;
 
 pub use decks::read_deck;
 use detect::{check_format, detect, files_in};
-pub use error::ReadError;
 use error::check_selection;
+pub(crate) use error::no_component;
 pub(crate) use family::family;
 use family::missing_continuation;
 pub use format::FORMATS;
@@ -79,34 +82,40 @@ pub use source::{Source, Window};
 /// for a file that ends after its header, by the name of the file or of its folder.
 ///
 /// # Errors
-/// [`ReadError`] if the file cannot be opened, its kind is not known, it has several
+/// If the file cannot be opened, its kind is not known, it has several
 /// sections and none is selected, or a selected section, id or component is not in it.
 /// Damage within the file is not error: see [`SolverFile::problems`].
-pub fn read(
-    path: &Path,
-    format: Option<&str>,
-    selection: &Selection,
-) -> Result<SolverFile, ReadError> {
+pub fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<SolverFile, Error> {
     let mut sections = read_sections(path, format, selection)?;
     if sections.len() > 1 {
-        return Err(ReadError::SeveralSections { path: path.into(), known: listed(&sections) });
+        return Err(error!(
+            SolverFile,
+            "{}: it has several sections: select one of {} (with --section; in a recipe the section's name is the file's)",
+            path.display(),
+            listed(&sections)
+        ));
     }
     match sections.pop() {
         Some(file) => {
             check_selection(path, &file, selection)?;
             Ok(file)
         }
-        None => Err(ReadError::NoSuchSection {
-            path: path.into(),
-            section: selection.section.clone().unwrap_or_default(),
-            known: if path.is_file() {
+        None => {
+            let section = selection.section.as_deref().unwrap_or_default();
+            let known = if path.is_file() {
                 let names =
                     Selection { audit: false, access: selection.access, ..Selection::nothing() };
                 listed(&read_sections(path, format, &names)?)
             } else {
                 "others".into()
-            },
-        }),
+            };
+            let hint = guess::hint(section, &known);
+            Err(error!(
+                SolverFile,
+                "{}: it has no section \"{section}\": it has {known}{hint}",
+                path.display()
+            ))
+        }
     }
 }
 
@@ -118,13 +127,13 @@ fn listed(sections: &[SolverFile]) -> String {
 /// selected. Ids and components are not held against what a section has.
 ///
 /// # Errors
-/// [`ReadError`] if the file cannot be opened or its kind is not known.
+/// If the file cannot be opened or its kind is not known.
 pub fn read_sections(
     path: &Path,
     format: Option<&str>,
     selection: &Selection,
-) -> Result<Vec<SolverFile>, ReadError> {
-    let io = |source| ReadError::Io { path: path.into(), source };
+) -> Result<Vec<SolverFile>, Error> {
+    let io = |source| Error::io(path, source);
     let is_forced = format.is_some();
     let (format, parts) = open(path, format, selection)?;
     let mut sections = format.read(&parts, selection).map_err(io)?;
@@ -143,18 +152,18 @@ pub fn read_sections(
     if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
         return Ok(sections);
     }
-    Err(ReadError::UnknownFormat {
-        path: path.into(),
-        looks_like: match format.name {
-            "binout" if is_container => {
-                "this is an LSDA container, but it has no section of a binout"
-            }
-            "binout" => "this is not an LSDA container",
-            _ => "it has no history that is read",
-        }
-        .into(),
-        known: format_names(),
-    })
+    let looks_like = match format.name {
+        "binout" if is_container => "this is an LSDA container, but it has no section of a binout",
+        "binout" => "this is not an LSDA container",
+        _ => "it has no history that is read",
+    };
+    Err(unknown_format(path, looks_like))
+}
+
+/// The error of a file that no reader knows.
+fn unknown_format(path: &Path, looks_like: impl std::fmt::Display) -> Error {
+    let (path, known) = (path.display(), format_names());
+    error!(SolverFile at "format", "{path}: {looks_like}: the readers take {known}")
 }
 
 /// A file and what continues it.
@@ -165,10 +174,15 @@ fn open(
     path: &Path,
     format: Option<&str>,
     selection: &Selection,
-) -> Result<(&'static Format, Parts), ReadError> {
-    let io = |source| ReadError::Io { path: path.into(), source };
+) -> Result<(&'static Format, Parts), Error> {
+    let io = |source| Error::io(path, source);
     if path.is_dir() {
-        return Err(ReadError::Folder { path: path.into(), files: files_in(path) });
+        return Err(error!(
+            SolverFile,
+            "{}: this is a folder: name a file in it{}",
+            path.display(),
+            files_in(path)
+        ));
     }
     // Before the first is opened: its size is then fixed, and what a run wrote into a
     // continuation that began later would stand behind a hole.
@@ -196,10 +210,10 @@ pub fn blocks(
     path: &Path,
     format: Option<&str>,
     selection: &Selection,
-) -> Result<Option<Blocks>, ReadError> {
+) -> Result<Option<Blocks>, Error> {
     let (format, mut parts) = open(path, format, selection)?;
     let Some(source) = parts.pop().filter(|_| format.name == "nodout") else { return Ok(None) };
-    let io = |source| ReadError::Io { path: path.into(), source };
+    let io = |source| Error::io(path, source);
     let blocks = Blocks::open(source, selection).map_err(io)?;
     if let Some(blocks) = &blocks {
         check_selection(path, &blocks.file, selection)?;
@@ -213,13 +227,12 @@ pub fn blocks(
 /// Unlike [`read`], it does not hold the selection against what the file has.
 ///
 /// # Errors
-/// [`ReadError::NoSuchFormat`] if there is no such format, or [`ReadError::Io`] (without a
-/// path) from a source.
+/// If there is no such format, or a source cannot be read (without a path).
 pub fn read_from(
     format: &str,
     parts: &[Box<dyn Source>],
     selection: &Selection,
-) -> Result<Vec<SolverFile>, ReadError> {
-    let io = |source| ReadError::Io { path: PathBuf::new(), source };
+) -> Result<Vec<SolverFile>, Error> {
+    let io = |source| Error::io(Path::new(""), source);
     named(format)?.read(parts, selection).map_err(io)
 }

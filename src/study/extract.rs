@@ -1,21 +1,22 @@
 //! Extraction of a run's case: units, histories, curve, notes and warnings.
 
+use super::absolute;
 use super::files::Located;
 use super::files::shown_name;
 use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
-use super::{RunError, absolute};
 use crate::curve::extract::Notes;
 use crate::curve::extract::{DeckSpeed, Extracted, Setup, extract};
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
 use crate::unit::UnitSystem;
 
 impl LocatedRun<'_> {
     /// Reads the selected histories and extracts the case.
-    pub(crate) fn extract(&self) -> Result<Case, RunError> {
+    pub(crate) fn extract(&self) -> Result<Case, Error> {
         let mut remarks = Notes { notes: self.deck_notes.clone(), ..Notes::default() };
         let units = remarks.take(self.units()?);
         let files = RunFiles::read(self, &self.study.manifest.recipe)?;
@@ -31,7 +32,7 @@ impl LocatedRun<'_> {
     }
 
     /// The manifest's units, or those that the deck states.
-    fn units(&self) -> Result<(UnitSystem, Notes), RunError> {
+    fn units(&self) -> Result<(UnitSystem, Notes), Error> {
         let mut remarks = Notes::default();
         let stated = self.deck.as_ref().and_then(|deck| {
             let units = deck.deck.units.as_ref()?;
@@ -55,15 +56,22 @@ impl LocatedRun<'_> {
                 system
             }
             (None, None) => {
-                let deck = self.deck.as_ref().map(|deck| deck.file.path.clone());
-                return Err(RunError::NoUnits { deck });
+                let deck = match &self.deck {
+                    Some(deck) => format!("the deck {} states none", deck.file.path.display()),
+                    None => "the run has no deck that could".into(),
+                };
+                return Err(error!(
+                    Run,
+                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or what they are) to [study]"
+                )
+                .at(KeyPath::of("study")));
             }
         };
         Ok((units, remarks))
     }
 
     /// The curve from the histories that were read.
-    fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, RunError> {
+    fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, Error> {
         let (study, entry) = (self.study, self.entry);
         let others: Vec<(String, f64)> = study
             .runs()
@@ -83,7 +91,9 @@ impl LocatedRun<'_> {
         };
         extract(&files.measured(units)?, &setup).map_err(|source| {
             let read = if source.is_of_force() { &files.force } else { &files.motion };
-            RunError::Extract { path: read.located.path.clone(), source }
+            Error::below(ErrorCode::Run, source)
+                .of(read.located.path.display())
+                .at(study.run_key(entry).key("path"))
         })
     }
 
@@ -94,7 +104,7 @@ impl LocatedRun<'_> {
     }
 
     /// Notes on the files: the side that was chosen, twins and damage.
-    fn of_files(&self, files: &RunFiles<'_>) -> Result<Notes, RunError> {
+    fn of_files(&self, files: &RunFiles<'_>) -> Result<Notes, Error> {
         let mut remarks = Notes::default();
         if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force
             && let Some(side) = files.force_history()?.entity.and_then(|e| e.side)

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::RunError;
 use crate::curve::recipe::ForceSource;
+use crate::error::{Error, KeyPath, error};
 use crate::file;
-use crate::solver::{self, ReadError, Selection};
+use crate::guess;
+use crate::solver::{self, Selection};
 
 /// A source file of a run before it is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +31,7 @@ pub(super) fn force_file(force: &ForceSource) -> &str {
 
 /// Finds the file a recipe names: the text file of that name, or the section of a binout
 /// or of an OpenRadioss T01.
-pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError> {
+pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
     let text = folder.join(name);
     let names = file_names(folder)?;
     let names_only = Selection { audit: false, ..Selection::nothing() };
@@ -45,9 +46,9 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError
         let sections = match solver::read_sections(&path, None, &names_only) {
             Ok(sections) => sections,
             // Only named like one; or broken, which matters where the text is not there.
-            Err(ReadError::UnknownFormat { .. }) => continue,
+            Err(error) if error.is_about("format") => continue,
             Err(_) if text.is_file() => continue,
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(error.at(KeyPath::default())),
         };
         let states: usize = sections.iter().map(|s| s.time.len()).sum();
         if let Some(problem) = sections.iter().find_map(|s| s.problems.first())
@@ -71,7 +72,13 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, RunError
             if let Some(damaged) = damaged {
                 found = format!("{found}; {damaged}");
             }
-            return Err(RunError::NoFile { folder: folder.into(), file: name.into(), found });
+            let hint = guess::hint(name, &found);
+            return Err(error!(
+                Run,
+                "the run's folder {} has no file \"{name}\": it has {found}{hint}",
+                folder.display()
+            )
+            .at_key("file"));
         }
     };
     let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
@@ -95,16 +102,16 @@ pub(super) fn hashed_family(
     name: &str,
     path: PathBuf,
     parts: &[PathBuf],
-) -> Result<Located, RunError> {
+) -> Result<Located, Error> {
     let (size_bytes, blake3) = content_hash(parts)?;
     Ok(Located { file: name.into(), size_bytes, blake3, path, section: None, twin: None })
 }
 
 /// Size and BLAKE3 of files one behind the other.
-pub(crate) fn content_hash(parts: &[PathBuf]) -> Result<(u64, String), RunError> {
+pub(crate) fn content_hash(parts: &[PathBuf]) -> Result<(u64, String), Error> {
     let mut hasher = blake3::Hasher::new();
     for part in parts {
-        let io = |source| RunError::Io { path: part.clone(), source };
+        let io = |source| Error::io(part, source);
         let file = file::open(part).map_err(io)?;
         hasher.update_reader(file).map_err(io)?;
     }
@@ -121,9 +128,8 @@ pub(crate) fn is_section_of(section: &str, name: &str) -> bool {
 }
 
 /// Names in a run's folder, in order.
-fn file_names(folder: &Path) -> Result<Vec<String>, RunError> {
-    let entries =
-        folder.read_dir().map_err(|source| RunError::Io { path: folder.into(), source })?;
+fn file_names(folder: &Path) -> Result<Vec<String>, Error> {
+    let entries = folder.read_dir().map_err(|source| Error::io(folder, source))?;
     let mut names: Vec<String> = entries
         .filter_map(Result::ok)
         .map(|e| e.file_name().to_string_lossy().into_owned())

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::files::{Located, force_file, hashed_family, locate_file, shown_name};
-use super::{RunEntry, RunError, Study};
+use super::{RunEntry, Study};
 use crate::curve::source_hash;
+use crate::error::{Error, KeyPath, error};
 use crate::file;
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
@@ -38,21 +39,35 @@ pub(crate) struct LocatedRun<'a> {
 
 impl Study {
     /// Finds and hashes the files of a run.
-    pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, RunError> {
+    pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, Error> {
         let folder = self.folder.join(&entry.path);
         if !folder.is_dir() {
-            return Err(RunError::NoFolder { path: folder });
+            let path = folder.display();
+            return Err(error!(
+                Run,
+                "the run's folder {path} does not exist: check path in the manifest"
+            )
+            .at(self.run_key(entry).key("path")));
         }
         let recipe = &self.manifest.recipe;
-        let mut names = vec![recipe.deflection.file.as_str()];
-        for force in [Some(&recipe.force), recipe.contact.as_ref()].into_iter().flatten() {
-            if !names.contains(&force_file(force)) {
-                names.push(force_file(force));
+        let forces = [("force", Some(&recipe.force)), ("contact", recipe.contact.as_ref())];
+        let forces = forces.into_iter().filter_map(|(table, f)| Some((table, force_file(f?))));
+        let mut names = vec![("deflection", recipe.deflection.file.as_str())];
+        for (table, name) in forces {
+            if names.iter().all(|(_, known)| *known != name) {
+                names.push((table, name));
             }
         }
+        let at = |error: Error, table: &str| {
+            if error.is_about("file") {
+                error.at(KeyPath::of("recipe").key(table).key("file"))
+            } else {
+                error
+            }
+        };
         let files = names
             .into_iter()
-            .map(|name| locate_file(&folder, name))
+            .map(|(table, name)| locate_file(&folder, name).map_err(|error| at(error, table)))
             .collect::<Result<Vec<_>, _>>()?;
         let (deck, deck_notes) = self.locate_deck(entry, &folder)?;
         let recipe = self.recipe_json(entry);
@@ -72,7 +87,7 @@ impl Study {
         &self,
         entry: &RunEntry,
         folder: &Path,
-    ) -> Result<(Option<RunDeck>, Vec<String>), RunError> {
+    ) -> Result<(Option<RunDeck>, Vec<String>), Error> {
         let mut notes = Vec::new();
         let path = match &entry.deck {
             Some(name) => Some(self.folder.join(name)),
@@ -89,10 +104,14 @@ impl Study {
             },
         };
         let Some(path) = path else { return Ok((None, notes)) };
-        let (deck, included) = decks::read_with_includes(&path)?;
+        let at = |error: Error| match entry.deck {
+            Some(_) => error.at(self.run_key(entry).key("deck")),
+            None => error.at(KeyPath::default()),
+        };
+        let (deck, included) = decks::read_with_includes(&path).map_err(at)?;
         // Size and hash are those of the deck with all that it includes.
         let parts: Vec<PathBuf> = [path.clone()].into_iter().chain(included).collect();
-        let file = hashed_family("deck", path, &parts)?;
+        let file = hashed_family("deck", path, &parts).map_err(at)?;
         Ok((Some(RunDeck { file, deck }), notes))
     }
 

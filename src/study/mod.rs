@@ -4,22 +4,19 @@
 //! and hashed (`LocatedRun`); only where they changed are they read and the case extracted.
 
 mod check;
-mod error;
 pub(crate) mod extract;
 pub(crate) mod files;
 mod locate;
 mod manifest;
-mod place;
 mod read;
 
 use std::path::{Path, PathBuf};
 
 use crate::curve::Masses;
 use crate::curve::extract::{Stated, StatedContact};
-use crate::error::{Document, Error};
+use crate::error::{Document, Error, KeyPath};
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
-pub use error::RunError;
 pub(crate) use locate::LocatedRun;
 pub use manifest::Manifest;
 pub use manifest::RunEntry;
@@ -56,6 +53,17 @@ pub fn parse(path: &Path, text: &str) -> Result<Study, Error> {
 }
 
 impl Study {
+    /// The key of a run's entry.
+    fn run_key(&self, entry: &RunEntry) -> KeyPath {
+        let at = self.runs().iter().position(|run| std::ptr::eq(run, entry));
+        KeyPath::of("run").item(at.unwrap_or_default())
+    }
+
+    /// An error of a run, with the place in the manifest of the key that it is about.
+    pub(crate) fn placed(&self, error: Error) -> Error {
+        error.placed_if_keyed(|key| self.document.place(key))
+    }
+
     pub(crate) fn name(&self) -> &str {
         &self.manifest.study.name
     }

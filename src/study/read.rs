@@ -4,8 +4,9 @@ use super::files::{Located, force_file};
 use super::locate::LocatedRun;
 use crate::curve::extract::{Measured, MeasuredForce};
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
+use crate::error::{Error, KeyPath};
 use crate::history::{EntityId, History, Side};
-use crate::solver::{self, ReadError, Selection, SolverFile, WantedId};
+use crate::solver::{self, Selection, SolverFile, WantedId};
 use crate::unit::UnitSystem;
 
 /// A located file with the histories that were selected of it.
@@ -24,27 +25,34 @@ pub(super) struct RunFiles<'a> {
 }
 
 impl<'a> RunFiles<'a> {
-    pub(crate) fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, ReadError> {
-        let read_force = |source: &ForceSource| {
+    pub(crate) fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, Error> {
+        let read_force = |table: &str, source: &ForceSource| {
             let located = run.file(force_file(source));
-            Ok::<_, ReadError>(ReadFile { located, file: read_force(located, source)? })
+            let id = match source {
+                ForceSource::Contact { .. } => "id",
+                ForceSource::Body { .. } => "node",
+            };
+            let file = read_force(located, source).map_err(|e| in_recipe(e, table, &[id]))?;
+            Ok::<_, Error>(ReadFile { located, file })
         };
         let located = run.file(&recipe.deflection.file);
+        let file = read_motion(located, &recipe.deflection)
+            .map_err(|e| in_recipe(e, "deflection", &["node", "minus_node"]))?;
         Ok(Self {
             recipe,
-            motion: ReadFile { located, file: read_motion(located, &recipe.deflection)? },
-            force: read_force(&recipe.force)?,
-            contact: recipe.contact.as_ref().map(read_force).transpose()?,
+            motion: ReadFile { located, file },
+            force: read_force("force", &recipe.force)?,
+            contact: recipe.contact.as_ref().map(|c| read_force("contact", c)).transpose()?,
         })
     }
 
     /// The histories for an extraction.
-    pub(crate) fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, ReadError> {
+    pub(crate) fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, Error> {
         let DeflectionSource { node, minus_node, component, .. } = self.recipe.deflection;
         let motion =
             |node: i64, name: &str| self.motion.file.history(Some(EntityId::new(node)), name);
-        let displacement =
-            motion(node, component.name()).ok_or_else(|| self.motion.lacks(component.name()))?;
+        let displacement = motion(node, component.name())
+            .ok_or_else(|| in_recipe(self.motion.lacks(component.name()), "deflection", &[]))?;
         let force = self.force_history()?;
         Ok(Measured {
             units,
@@ -57,15 +65,17 @@ impl<'a> RunFiles<'a> {
                 ForceSource::Body { motion, .. } => MeasuredForce::Body(force, motion),
             },
             contact: match self.recipe.contact.as_ref().zip(self.contact.as_ref()) {
-                Some((source, read)) => Some(read.force_history(source)?),
+                Some((source, read)) => {
+                    Some(read.force_history(source).map_err(|e| in_recipe(e, "contact", &[]))?)
+                }
                 None => None,
             },
         })
     }
 
     /// The history that the force is, or is made of.
-    pub(crate) fn force_history(&self) -> Result<&History, ReadError> {
-        self.force.force_history(&self.recipe.force)
+    pub(crate) fn force_history(&self) -> Result<&History, Error> {
+        self.force.force_history(&self.recipe.force).map_err(|e| in_recipe(e, "force", &[]))
     }
 
     /// Each file once.
@@ -81,7 +91,7 @@ impl<'a> RunFiles<'a> {
 }
 
 impl ReadFile<'_> {
-    fn force_history(&self, source: &ForceSource) -> Result<&History, ReadError> {
+    fn force_history(&self, source: &ForceSource) -> Result<&History, Error> {
         let history = match source {
             ForceSource::Contact { id, side, component, .. } => {
                 contact_history(&self.file, *id, *side, component)
@@ -93,14 +103,24 @@ impl ReadFile<'_> {
         history.ok_or_else(|| self.lacks(force_component(source)))
     }
 
-    fn lacks(&self, component: &str) -> ReadError {
-        ReadError::NoSuchComponent {
-            path: self.located.path.clone(),
-            format: self.file.section.clone(),
-            component: component.into(),
-            known: self.file.components.join(", "),
-        }
+    fn lacks(&self, component: &str) -> Error {
+        let (path, known) = (self.located.path.display(), self.file.components.join(", "));
+        solver::no_component(path, &self.file.section, component, &known)
     }
+}
+
+/// An error of a file's selection at the key of the recipe's table that selects it; `ids` are the keys of
+/// the ids, in their order.
+fn in_recipe(error: Error, table: &str, ids: &[&str]) -> Error {
+    let table = KeyPath::of("recipe").key(table);
+    let mut ids = ids.iter().enumerate();
+    let id = ids.find(|(k, _)| *error.key() == KeyPath::of("ids").item(*k));
+    let key = match id {
+        Some((_, id)) => table.key(id),
+        None if error.is_about("component") => table.key("component"),
+        None => KeyPath::default(),
+    };
+    error.at(key)
 }
 
 fn force_component(force: &ForceSource) -> &str {
@@ -110,7 +130,7 @@ fn force_component(force: &ForceSource) -> &str {
 }
 
 /// Displacements and, where the file has them, velocities of the recipe's nodes.
-fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, ReadError> {
+fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, Error> {
     let wanted = |id| WantedId { id, side: None };
     let ids: Vec<WantedId> =
         [Some(source.node), source.minus_node].into_iter().flatten().map(wanted).collect();
@@ -123,14 +143,15 @@ fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, 
     };
     let both = select(vec![component.name().into(), component.velocity().into()]);
     match solver::read(&file.path, None, &both) {
-        Err(ReadError::NoSuchComponent { component: c, .. }) if c == component.velocity() => {
+        // Without velocities, displacements alone; if these are missing, the error is about them.
+        Err(error) if error.is_about("component") => {
             solver::read(&file.path, None, &select(vec![component.name().into()]))
         }
         result => result,
     }
 }
 
-fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, ReadError> {
+fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, Error> {
     let id = match *source {
         ForceSource::Contact { id, side, .. } => WantedId { id, side },
         ForceSource::Body { node, .. } => WantedId { id: node, side: None },

@@ -4,7 +4,7 @@ use crate::error::{Error, KeyPath, error};
 use crate::file;
 use crate::history::EntityId;
 use crate::scenario::ReferenceTable;
-use crate::solver::{self, ReadError, Selection, WantedId};
+use crate::solver::{self, Selection, WantedId};
 use std::path::Path;
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction
@@ -35,16 +35,15 @@ impl FeTrain {
             ..Selection::all()
         };
         let read = solver::read(&file, None, &selection).map_err(|error| {
-            let node = |id: i64| reference.nodes.iter().find(|(_, node)| **node == id);
-            let key = match &error {
-                ReadError::NoSuchEntity { id, .. } => match node(id.id) {
-                    Some((name, _)) => KeyPath::of("nodes").key(name),
-                    None => KeyPath::default(),
-                },
-                ReadError::NoSuchComponent { .. } => KeyPath::of("component"),
-                _ => KeyPath::of("file"),
+            // Ids were selected in the order of the nodes.
+            let mut nodes = reference.nodes.keys().enumerate();
+            let node = nodes.find(|(k, _)| *error.key() == KeyPath::of("ids").item(*k));
+            let key = match node {
+                Some((_, name)) => KeyPath::of("nodes").key(name),
+                None if error.is_about("component") => KeyPath::of("component"),
+                None => KeyPath::of("file"),
             };
-            Error::from(error).at(KeyPath::of("reference").then(key))
+            error.at(KeyPath::of("reference").then(key))
         })?;
         let units = reference.units;
         let contact_s = reference.contact.map_or(0.0, |t| t.0);
