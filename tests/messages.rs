@@ -1,4 +1,10 @@
-//! Messages: places with carets, guesses, errors as JSON, help, man pages, narrow terminals.
+//! Messages: pages of `tests/messages`, errors as JSON, help, man pages, narrow terminals.
+//!
+//! A page of messages is a test: what stands before its first case is done at the beginning of each.
+//! A heading `##` is a case; a block with a file's name is that file, `diff` changes it, `sh` prepares,
+//! and `console` shows what each command prints, on standard error too, and its exit code. A command
+//! that fails leaves no file behind. To write the pages again (and look at the difference):
+//! CRUMPLE_WRITE_DOCS=1 cargo test --locked --release --test all messages
 
 use std::fs;
 use std::path::Path;
@@ -6,274 +12,144 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, root};
 
-const STUDY: &str = "[study]
-name  = \"s\"
+macro_rules! pages {
+    ($($name:ident: $page:literal;)*) => {
+        const PAGES: &[&str] = &[$($page),*];
+        $(#[test] fn $name() { holds($page); })*
+    };
+}
+
+pages! {
+    command_lines: "command-lines.md";
+    files: "files.md";
+    scenarios: "scenarios.md";
+    studies: "studies.md";
+    sweeps: "sweeps.md";
+}
+
+/// A line of `bash` in `here`: what it prints, and its exit code.
+fn bash(line: &str, here: &Path, database: &Path) -> (String, i32) {
+    let program = Path::new(env!("CARGO_BIN_EXE_crumple")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    let output = Command::new("bash")
+        .args(["-c", &format!("{line}\n")])
+        .envs([("PATH", path), ("FIXTURES", fixture("").display().to_string())])
+        .env("DATABASE", database)
+        .current_dir(here)
+        .output()
+        .unwrap();
+    let printed = [output.stdout, output.stderr].concat();
+    let printed = String::from_utf8(printed).unwrap();
+    let fixtures = fixture("").display().to_string();
+    (printed.replace(&fixtures, "$FIXTURES/"), output.status.code().unwrap())
+}
+
+/// Does what a block of a page says; returns the block with what its commands print.
+fn act(info: &str, body: &str, here: &Path, database: &Path) -> String {
+    match info.split_once(' ') {
+        Some(("diff", file)) => {
+            let side = |other: char| -> String {
+                let lines = body.lines().filter(|line| !line.starts_with(other));
+                lines.map(|line| format!("{}\n", &line[1..])).collect()
+            };
+            let text = fs::read_to_string(here.join(file)).unwrap();
+            assert_eq!(text.matches(&side('+')).count(), 1, "{file} has not once:\n{body}");
+            fs::write(here.join(file), text.replacen(&side('+'), &side('-'), 1)).unwrap();
+        }
+        Some((_, file)) => fs::write(here.join(file), body).unwrap(),
+        None if info == "sh" => {
+            let (printed, code) = bash(body, here, database);
+            assert_eq!(code, 0, "{body}{printed}");
+        }
+        None => {
+            assert_eq!(info, "console");
+            let commands = body.lines().filter_map(|line| line.strip_prefix("$ "));
+            return commands
+                .map(|command| {
+                    let before = entries(here);
+                    let (printed, code) = bash(command, here, database);
+                    assert!(!printed.contains("panicked"), "{command}\n{printed}");
+                    assert!(code == 0 || entries(here) == before, "{command} leaves a file behind");
+                    let code =
+                        if code == 0 { String::new() } else { format!("(exit code {code})\n") };
+                    format!("$ {command}\n{}\n{code}", printed.trim_end())
+                })
+                .collect();
+        }
+    }
+    body.into()
+}
+
+/// Each case of a page prints what the page says.
+fn holds(page: &str) {
+    let path = root().join("tests/messages").join(page);
+    let text = fs::read_to_string(&path).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let database = build_fixture(elsewhere.path(), "lead-car-wall");
+    let mut cases = text.split_inclusive("\n\n## ");
+    let before = cases.next().unwrap();
+    let mut made = before.to_string();
+    let play = |text: &str, here: &Path| -> String {
+        let mut parts = text.split("```");
+        let mut out = parts.next().unwrap().to_string();
+        while let (Some(block), Some(after)) = (parts.next(), parts.next()) {
+            let (info, body) = block.split_once('\n').unwrap();
+            out += &format!("```{info}\n{}```{after}", act(info, body, here, &database));
+        }
+        out
+    };
+    for case in cases {
+        let folder = tempfile::tempdir().unwrap();
+        play(before, folder.path());
+        made += &play(case, folder.path());
+    }
+    if std::env::var_os("CRUMPLE_WRITE_DOCS").is_some() {
+        fs::write(&path, &made).unwrap();
+    }
+    for (number, (expected, found)) in text.lines().zip(made.lines()).enumerate() {
+        assert_eq!(expected, found, "tests/messages/{page}, line {}", number + 1);
+    }
+    assert_eq!(text.len(), made.len(), "tests/messages/{page} is longer or shorter");
+}
+
+#[test]
+fn every_page_is_held() {
+    assert_eq!(entries(&root().join("tests/messages")), PAGES);
+}
+
+/// A pair whose recipe names no other body.
+const STUDY_OF_A_PAIR: &str = "[study]
+name = \"s\"
 units = \"mm-t-s\"
 group = \"g\"
-kind  = \"wall\"
+kind  = \"pair\"
 
 [recipe]
 deflection = { file = \"nodout\", node = 900001, component = \"x_displacement\" }
-force      = { file = \"rwforc\", id = 1, component = \"normal_force\" }
-filter     = \"none\"
-sampling   = { states = 400, interval_ms = 0.75 }
+force = { file = \"rwforc\", id = 1, component = \"normal_force\" }
+sampling = { states = 400, interval_ms = 0.75 }
 
 [[run]]
 path  = \"25kmh\"
 speed = \"25km/h\"
-mass  = \"24t\"
-
-[[run]]
-path  = \"other\"
-speed = \"36km/h\"
-mass  = \"24t\"
+mass = \"24t\"
 ";
 
+/// A scenario whose curve does not exist.
 const SCENARIO: &str = "[run]
 duration = \"100ms\"
-
 [curves]
-c = { file = \"c.csv\" }
-k = { stages = [ { stroke = \"0.5m\", to = \"1MN\" } ], unloading = \"9MN/m\" }
-
+c = { file = \"none.csv\" }
 [[train]]
 name = \"A\"
 speed = \"10m/s\"
-inner = \"c\"
-vehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"20t\" } ]
-
+vehicles = [ { name = \"A1\", mass = \"24t\" } ]
 [wall]
-
 [contact]
 curve = \"c\"
 ";
-
-/// What the text between the carets is, and the message.
-struct Shown {
-    message: String,
-    place: String,
-    marked: String,
-}
-
-/// Reads a message of the form `error: FILE:LINE:COLUMN: …`, the line and the carets, and holds
-/// each against the file.
-fn shown(error: &str, file: &str, text: &str) -> Shown {
-    let lines: Vec<&str> = error.lines().collect();
-    let at = lines.iter().position(|line| {
-        line.trim_start().starts_with("| ^")
-            || line.contains("| ")
-                && line.split("| ").nth(1).is_some_and(|rest| rest.trim_start().starts_with('^'))
-    });
-    let at = at.unwrap_or_else(|| panic!("no carets in:\n{error}"));
-    let (number, line) = lines[at - 1].split_once(" | ").unwrap();
-    let carets = lines[at].split_once("| ").unwrap().1;
-    let column = carets.find('^').unwrap();
-    let number: usize = number.trim().parse().unwrap();
-    assert_eq!(text.lines().nth(number - 1).unwrap(), line, "{error}");
-    let place = format!("{number}:{}", column + 1);
-    assert!(error.contains(&format!("{file}:{place}: ")), "{file}:{place} is not in\n{error}");
-    let marked = line.chars().skip(column).take(carets.trim().len()).collect();
-    Shown { message: error.into(), place, marked }
-}
-
-/// A study with one replacement, built: place, marked text and a part of the message.
-fn study(from: &str, to: &str, place: &str, marked: &str, expected: &str) {
-    assert!(STUDY.contains(from), "{from}");
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    let text = STUDY.replacen(from, to, 1);
-    fs::write(here.join("study.toml"), &text).unwrap();
-    for run in ["25kmh", "other"] {
-        fs::create_dir(here.join(run)).unwrap();
-        for file in ["nodout", "rwforc"] {
-            let source = fixture(&format!("fe/lead-car-wall/25kmh/{file}"));
-            fs::copy(source, here.join(run).join(file)).unwrap();
-        }
-    }
-    let error = crumple_fails(here, 1, &["build", "study.toml", "-o", "c.h5"]);
-    let found = shown(&error, "study.toml", &text);
-    assert_eq!((found.place.as_str(), found.marked.as_str()), (place, marked), "{error}");
-    assert!(found.message.contains(expected), "{expected} is not in\n{error}");
-}
-
-/// What the values of a study say together, and what its runs do not have.
-#[test]
-fn errors_of_a_study_show_their_place() {
-    let wall = "kind  = \"wall\"";
-    let speed = "speed = \"25km/h\"";
-    study("name  = \"s\"", "nam   = \"s\"", "2:1", "nam", "did you mean \"name\"?");
-    study("\"mm-t-s\"", "\"mm-t-sec\"", "3:9", "\"mm-t-sec\"", "did you mean \"mm-t-s\"?");
-    study("name  = \"s\"", "name  = \" \"", "2:9", "\" \"", "is not a name");
-    study("group = \"g\"", "group = \"a/b\"", "4:9", "\"a/b\"", "may not contain");
-    study("name  = \"s\"", "name  = \"imported\"", "2:9", "\"imported\"", "the name of the curves");
-    study(wall, "kind  = \"pair\"", "5:9", "\"pair\"", "a pair needs the other body");
-    study(wall, "kind  = \"wal\"", "5:9", "\"wal\"", "did you mean \"wall\"?");
-    let half = "kind  = \"wall\"\nhalf_model = true";
-    study(wall, half, "6:14", "true", "half_model = true needs kind");
-    let two = "speed = \"25km/h\"\ncontact_time = \"1ms\"\ngap = \"1mm\"";
-    study(speed, two, "17:1", "gap", "contact_time and gap");
-    let other = "speed = \"25km/h\"\nother_mass = \"2t\"";
-    study(speed, other, "16:1", "other_mass", "needs kind = \"pair\"");
-    let parameter = |text: &str| format!("speed = \"25km/h\"\nparameters = {{ {text} }}");
-    study(speed, &parameter("\" \" = 1"), "16:16", "\" \"", "is not a name");
-    study(speed, &parameter("mass_kg = 1"), "16:16", "mass_kg", "has a key of its own");
-    study(speed, &parameter("a = inf"), "16:20", "inf", "is not finite");
-    study("path  = \"25kmh\"", "path  = \"\"", "14:9", "\"\"", "an empty path");
-    study("path  = \"25kmh\"", "path  = \".\"", "14:9", "\".\"", "gives no name for its case");
-    study("path  = \"other\"", "path  = \"./25kmh\"", "19:9", "\"./25kmh\"", "two runs are named");
-    let contact = "filter     = \"none\"\ncontact = { file = \"rwforc\", id = 1, component = \"normal_force\" }";
-    study(
-        "filter     = \"none\"",
-        contact,
-        "11:11",
-        contact.split_once("contact = ").unwrap().1,
-        "found in recipe.force itself",
-    );
-    let mut lines = STUDY.split("\n[[run]]");
-    let no_run = format!("run = []\n{}", lines.next().unwrap());
-    let error = study_text(&no_run);
-    assert_eq!(shown(&error, "study.toml", &no_run).marked, "[]", "{error}");
-}
-
-fn study_text(text: &str) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("study.toml"), text).unwrap();
-    crumple_fails(folder.path(), 1, &["build", "study.toml", "-o", "c.h5"])
-}
-
-#[test]
-fn errors_of_runs_show_their_place_in_the_study() {
-    study("path  = \"other\"", "path  = \"othre\"", "19:9", "\"othre\"", "does not exist");
-    study("\"rwforc\"", "\"rwforce\"", "9:23", "\"rwforce\"", "did you mean \"rwforc\"?");
-    study("900001", "900011", "8:40", "900011", "did you mean 900001?");
-    study("id = 1", "id = 2", "9:38", "2", "has no rigid wall 2");
-    study("normal_force", "norm_force", "9:53", "\"norm_force\"", "did you mean \"normal_force\"?");
-    study("units = \"mm-t-s\"\n", "", "1:1", "[study]", "gives no units");
-    study("\"25km/h\"", "\"90km/h\"", "14:9", "\"25kmh\"", "speed");
-}
-
-/// A scenario with one replacement, run: place, marked text and a part of the message.
-fn scenario(from: &str, to: &str, place: &str, marked: &str, expected: &str) {
-    assert!(SCENARIO.contains(from), "{from}");
-    let folder = tempfile::tempdir().unwrap();
-    let text = SCENARIO.replacen(from, to, 1);
-    fs::write(folder.path().join("s.toml"), &text).unwrap();
-    fs::write(folder.path().join("c.csv"), "d_m,force_N\n0,0\n0.5,2e6\n1,3e6\n").unwrap();
-    let command = if to.contains("[sweep]") { "sweep" } else { "simulate" };
-    let mut arguments = vec![command, "s.toml"];
-    arguments.extend((command == "sweep").then_some(["-o", "r.csv"]).into_iter().flatten());
-    let error = crumple_fails(folder.path(), 1, &arguments);
-    let found = shown(&error, "s.toml", &text);
-    assert_eq!((found.place.as_str(), found.marked.as_str()), (place, marked), "{error}");
-    assert!(found.message.contains(expected), "{expected} is not in\n{error}");
-}
-
-#[test]
-fn errors_of_a_scenario_show_their_place() {
-    let wall = "[wall]\n";
-    let second =
-        |text: &str| format!("[[train]]\nname = \"B\"\nspeed = \"0m/s\"\nvehicles = [ {text} ]\n");
-    let b1 = "{ name = \"B1\", mass = \"9t\" }";
-    let vehicle = "{ name = \"A2\", mass = \"20t\" }";
-    let c = "{ file = \"c.csv\" }";
-    scenario(wall, &format!("{}{wall}", second(b1)), "14:1", "[[train]]", "exactly one [[train]]");
-    scenario(wall, "", "8:1", "[[train]]", "expected two [[train]]");
-    let limits = |text: &str| {
-        format!(
-            "{wall}[limits]\nstandard = \"EN\"\nedition = \"1\"\nmean_deceleration_g = {text}\n"
-        )
-    };
-    scenario(wall, &limits("0.0"), "18:23", "0.0", "expected more than 0");
-    scenario(wall, &limits("5.0\ntrains = []"), "19:10", "[]", "trains is empty");
-    scenario(wall, &limits("5.0\ntrains = [ \"A\", \"C\" ]"), "19:17", "\"C\"", "no train \"C\"");
-    let same = second(b1).replace("\"B\"", "\"A\"");
-    scenario(wall, &same, "15:8", "\"A\"", "two trains are named");
-    scenario("\"A2\"", "\"A1\"", "12:54", "\"A1\"", "two bodies are named");
-    scenario("\"A2\"", "\"A|2\"", "12:54", "\"A|2\"", "may not be empty or contain");
-    scenario(wall, "[wall]\nname = \"\"\n", "15:8", "\"\"", "may not be empty");
-    let empty = "vehicles = []";
-    let vehicles =
-        "vehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"20t\" } ]";
-    scenario(vehicles, empty, "12:12", "[]", "has no vehicles");
-    scenario("inner = \"c\"\n", "", "8:1", "[[train]]", "no inner");
-    let behind = "{ name = \"A2\", mass = \"20t\", behind = \"c\" }";
-    scenario(vehicle, behind, "12:74", "behind", "nothing behind the last");
-    let zone = "{ name = \"A2\", mass = \"20t\", front = { mass = \"20t\", curve = \"k\" } }";
-    scenario(vehicle, zone, "12:67", "\"20t\"", "have all of its mass");
-    scenario("curve = \"c\"", "curve = \"d\"", "17:9", "\"d\"", "no curve \"d\" in [curves]");
-    scenario("inner = \"c\"", "inner = \"cc\"", "11:9", "\"cc\"", "did you mean \"c\"?");
-    let c_is = |text: &str| format!("{{ file = \"c.csv\", {text} }}");
-    scenario(c, "{ stages = [] }", "5:16", "[]", "stages is empty");
-    scenario(c, &c_is("case = \"a/b\""), "5:23", "case", "case belongs to a database");
-    scenario(c, &c_is("tension = \"kk\""), "5:33", "\"kk\"", "did you mean \"k\"?");
-    scenario(c, &c_is("tension = \"c\""), "5:33", "\"c\"", "no tension or damping of its own");
-    scenario("\"10m/s\"", "\"-10m/s\"", "10:9", "\"-10m/s\"", "never meets");
-    scenario(c, "{ law = \"elastic\" }", "5:5", "{ law = \"elastic\" }", "needs exactly one of");
-    scenario(c, "{ database = \"d.h5\" }", "5:18", "\"d.h5\"", "write case =");
-    scenario(c, "{ database = \"d.h5\", case = \"x\" }", "5:33", "\"x\"", "write case =");
-    let short = "{ stroke = \"0.5m\", to = \"1MN\" }, { stroke = \"0.1mm\" }";
-    scenario("{ stroke = \"0.5m\", to = \"1MN\" }", short, "6:62", "\"0.1mm\"", "stroke of");
-    scenario(c, "{ file = \"d.csv\" }", "5:14", "\"d.csv\"", "No such file");
-    scenario(c, "{ model = \"d.model\" }", "5:15", "\"d.model\"", "No such file");
-    scenario(c, &c_is("band = 0.5"), "5:30", "0.5", "band needs a model");
-    scenario(c, &c_is("scale = -1.0"), "5:31", "-1.0", "expected more than 0");
-    scenario(
-        c,
-        &c_is("damping = { coefficient_N_s_per_m = [ -1.0 ] }"),
-        "5:33",
-        "{ coefficient_N_s_per_m = [ -1.0 ] }",
-        "coefficient",
-    );
-    scenario("\"100ms\"", "\"1000000000s\"", "2:12", "\"1000000000s\"", "shorten the duration");
-    let interval = "\"100ms\"\noutput_interval = \"1s\"";
-    scenario("\"100ms\"", interval, "3:19", "\"1s\"", "longer than the duration");
-    let short = "\"100ms\"\n\n[curves]\nc = { file = \"c.csv\" }";
-    let long = "\"300ms\"\n\n[curves]\nc = { file = \"c.csv\", end = \"error\", scale = 0.3 }";
-    scenario(short, long, "5:29", "\"error\"", "beyond the end of its curve");
-    let resisting = "inner = \"c\"\nresistance = { braking = -1.0 }";
-    scenario("inner = \"c\"", resisting, "12:14", "{ braking = -1.0 }", "expected 0 or more");
-    scenario("duration", "duratoin", "2:1", "duratoin", "did you mean \"duration\"?");
-    scenario(
-        "speed = \"10m/s\"",
-        "speed = \"10m/sec\"",
-        "10:9",
-        "\"10m/sec\"",
-        "did you mean \"m/s\"?",
-    );
-}
-
-#[test]
-fn errors_of_a_plan_show_their_place() {
-    let plan = |text: &str| format!("[contact]\ncurve = \"c\"\n\n[sweep]\n{text}");
-    let t = |text: &str, place: &str, marked: &str, expected: &str| {
-        scenario("[contact]\ncurve = \"c\"\n", &plan(text), place, marked, expected);
-    };
-    let speed = "[[sweep.vary]]\nwhat = \"speed\"\ntrain = \"A\"\n";
-    let even = "from = \"5m/s\"\nto = \"9m/s\"\nsteps = 3\n";
-    t("vary = []\n", "19:1", "[sweep]", "varies nothing");
-    t(&format!("samples = 3\n{speed}{even}"), "20:11", "3", "no variable has a distribution");
-    t(
-        &format!("sampling = \"latin_hypercube\"\n{speed}{even}"),
-        "20:12",
-        "\"latin_hypercube\"",
-        "no variable",
-    );
-    t(&format!("results = []\n{speed}{even}"), "20:11", "[]", "name each result once");
-    t(&format!("{speed}values = []\n"), "23:10", "[]", "values is empty");
-    t(&format!("{speed}from = \"5m/s\"\nto = \"9m/s\"\nsteps = 1\n"), "25:9", "1", "steps is 1");
-    t(&format!("{speed}values = [\"5\"]\n"), "23:10", "[\"5\"]", "has no unit");
-    t(speed, "20:1", "[[sweep.vary]]", "give values");
-    let other = speed.replace("\"A\"", "\"C\"");
-    t(&format!("{other}{even}"), "22:9", "\"C\"", "there is no train \"C\"");
-    let mass =
-        "[[sweep.vary]]\nwhat = \"mass\"\nvehicle = \"A11\"\nfactor = true\nvalues = [1.0]\n";
-    t(mass, "22:11", "\"A11\"", "did you mean \"A1\"?");
-    let band = "[[sweep.vary]]\nwhat = \"band\"\ncurve = \"c\"\nvalues = [0.0]\n";
-    t(band, "22:9", "\"c\"", "has no band");
-    t(&format!("{speed}interface = \"contact\"\n{even}"), "23:1", "interface", "does not go with");
-}
 
 /// With `--json` an error is one document on standard output, and nothing else is said.
 #[test]
@@ -281,8 +157,8 @@ fn errors_as_json() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     build_fixture(here, "lead-car-wall");
-    fs::write(here.join("study.toml"), STUDY.replace("\"wall\"", "\"pair\"")).unwrap();
-    fs::write(here.join("s.toml"), SCENARIO.replace("\"c.csv\"", "\"none.csv\"")).unwrap();
+    fs::write(here.join("study.toml"), STUDY_OF_A_PAIR).unwrap();
+    fs::write(here.join("s.toml"), SCENARIO).unwrap();
     fs::write(here.join("text.h5"), "hello\n").unwrap();
     let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
     let nodout = nodout.to_str().unwrap();
@@ -302,7 +178,7 @@ fn errors_as_json() {
         (&"study.toml".into(), &5.into(), &9.into())
     );
     let scenario = t(&["simulate", "s.toml"], 1, "io");
-    assert_eq!((&scenario["line"], &scenario["column"]), (&5.into(), &14.into()));
+    assert_eq!((&scenario["line"], &scenario["column"]), (&4.into(), &14.into()));
     t(&["build", "none.toml", "-o", "c.h5"], 1, "io");
     t(&["db", "ls", "text.h5"], 1, "database");
     t(&["inspect", "text.h5"], 1, "solver_file");
@@ -437,7 +313,7 @@ fn sixty_columns_are_enough() {
     let help = on_a_terminal(here, 60, "");
     assert!(help.contains("The usual order of work"), "{help}");
     assert!(help.lines().all(|line| line.chars().count() <= 60), "{help}");
-    fs::write(here.join("study.toml"), STUDY.replace("\"wall\"", "\"pair\"")).unwrap();
+    fs::write(here.join("study.toml"), STUDY_OF_A_PAIR).unwrap();
     let error = on_a_terminal(here, 60, "build study.toml -o c.h5");
     assert!(error.contains("5 | kind  = \"pair\"\n  |         ^^^^^^\n"), "{error}");
     assert!(!has_colour(&error), "{error:?}");
