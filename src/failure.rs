@@ -7,7 +7,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::{self, ErrorCode, Place};
-use crate::multibody::SimulationError;
 
 /// Exit code of a command that did its work.
 pub const DONE: u8 = 0;
@@ -63,19 +62,8 @@ fn of<'e, T: Error + 'static>(error: &'e (dyn Error + 'static)) -> Option<&'e T>
 
 /// The codes of error types, those that stand in others behind these.
 fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
-    macro_rules! codes {
-        ($($($kind:ty),+ => $code:ident;)*) => {
-            $($(if of::<$kind>(error).is_some() { return Some(ErrorCode::$code); })+)*
-        };
-    }
-    if let Some(error) = of::<error::Error>(error) {
-        return Some(error.code());
-    }
-    codes! {
-        io::Error => Io;
-        SimulationError => Simulation;
-    }
-    None
+    let io = || of::<io::Error>(error).map(|_| ErrorCode::Io);
+    of::<error::Error>(error).map(error::Error::code).or_else(io)
 }
 
 /// The error and its causes, the outermost first.

@@ -4,8 +4,7 @@
 use crumple::curve::Envelope;
 use crumple::multibody::{
     Body, Chain, Damping, EnvelopeEnd, ForceLaw, Interface, Method, Record, Resistance, Run,
-    RunSettings, RunWarning, STANDARD_GRAVITY_M_PER_S2, SimulationError, Unloading, UnloadingShape,
-    simulate,
+    RunSettings, STANDARD_GRAVITY_M_PER_S2, Unloading, UnloadingShape, simulate,
 };
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -436,7 +435,7 @@ fn the_fourth_order_refuses_what_depends_on_speeds() {
     let body = Body { resistance, ..Body::new("car", 20.0 * TONNES, 15.0) };
     let braked = Chain::new(vec![body], Vec::new()).unwrap();
     let error = simulate(&braked, &fourth).unwrap_err();
-    assert!(matches!(error, SimulationError::Rates { .. }), "{error}");
+    assert!(error.to_string().starts_with("running or braking resistance depends"), "{error}");
 }
 
 fn constant(force_n: f64) -> Envelope {
@@ -477,7 +476,7 @@ fn the_summary_says_what_happened() {
         // All of it happens within 120 ms of the start.
         let moving = a.moving_mean_deceleration_m_per_s2.unwrap();
         close(moving, (5.0 + 5.0 * e) / 0.12, "moving mean");
-        assert_eq!(run.warnings, []);
+        assert_eq!(run.warnings, [""; 0]);
     }
     let short = run(&chain, &RunSettings::new(0.11, OUTPUT_S));
     assert_eq!(short.bodies[0].moving_mean_deceleration_m_per_s2, None);
@@ -537,34 +536,34 @@ fn warnings_and_errors_name_the_interface() {
     let long = settings().with_step(OUTPUT_S);
     let run = run(&with(EnvelopeEnd::Hold), &long);
     let deflection_m = run.interfaces[0].max_deflection_m;
-    let interface = String::from("nose|wall");
     assert!(deflection_m > 0.2);
-    assert_eq!(
-        run.warnings,
-        [
-            RunWarning::BeyondEnd { interface, what: "crushed", deflection_m, end_m: 0.2 },
-            RunWarning::StillLoaded { end_s: 0.15, bodies: "car".into() }
-        ]
+    let beyond = format!(
+        "interface nose|wall is crushed {deflection_m:.4} m, beyond the end of its curve at 0.2000 m"
+    );
+    assert_eq!(run.warnings.len(), 2, "{:?}", run.warnings);
+    assert_eq!(run.warnings[0], beyond);
+    assert!(
+        run.warnings[1].starts_with("the run ends at 0.15 s while the contact still loads car:")
     );
     let stiff = against_wall(Interface::new("buffer", linear(1e4 * MEGA), 0.0));
-    match &simulate(&stiff, &long).unwrap().warnings[..] {
-        [RunWarning::StepShortened { asked_s, used_s, interface }] => {
-            assert_eq!((*asked_s, interface.as_str()), (OUTPUT_S, "buffer"));
-            assert!(*used_s <= 0.03 * (24.0 * TONNES / (1e4 * MEGA)).sqrt());
-        }
-        other => panic!("{other:?}"),
-    }
+    let run = simulate(&stiff, &long).unwrap();
+    let (asked_s, used_s) = (OUTPUT_S, run.step_s);
+    let shortened = format!(
+        "the step of {asked_s:.3e} s is too long for interface buffer: {used_s:.3e} s was used"
+    );
+    assert_eq!(run.warnings, [shortened]);
+    assert!(used_s <= 0.03 * (24.0 * TONNES / (1e4 * MEGA)).sqrt());
     for method in [Method::Verlet, Method::FourthOrder, Method::Reference] {
         let settings = settings().with_method(method);
-        match simulate(&with(EnvelopeEnd::Error), &settings).unwrap_err() {
-            SimulationError::CurveEnd { interface, deflection_m, time_s, end_m, what: _ } => {
-                assert_eq!((interface.as_str(), end_m), ("nose|wall", 0.2));
-                // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.
-                assert!(deflection_m > 0.2 && deflection_m < 0.212, "{method:?}: {deflection_m}");
-                assert!(time_s > 0.015 && time_s < 0.0165, "{method:?}: {time_s}");
-            }
-            other => panic!("{method:?}: {other}"),
-        }
+        let error = simulate(&with(EnvelopeEnd::Error), &settings).unwrap_err().to_string();
+        let words: Vec<&str> = error.split(' ').collect();
+        assert_eq!(words[..4], ["interface", "nose|wall", "is", "crushed"], "{error}");
+        assert!(error.contains("s, beyond the end of its curve (0.2000 m)"), "{error}");
+        let (deflection_m, time_s): (f64, f64) =
+            (words[4].parse().unwrap(), words[7].parse().unwrap());
+        // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.
+        assert!(deflection_m >= 0.2 && deflection_m < 0.212, "{method:?}: {deflection_m}");
+        assert!(time_s > 0.015 && time_s < 0.0165, "{method:?}: {time_s}");
     }
 }
 

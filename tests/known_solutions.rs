@@ -3,7 +3,7 @@
 use crumple::curve::Envelope;
 use crumple::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Run, RunSettings,
-    STANDARD_GRAVITY_M_PER_S2, SimulationError, Unloading, simulate,
+    STANDARD_GRAVITY_M_PER_S2, Unloading, simulate,
 };
 
 const TONNES: f64 = 1e3;
@@ -333,5 +333,6 @@ fn a_curve_that_ends_is_an_error_with_the_interface_named() {
 fn a_mistyped_duration_does_not_run_for_days() {
     let wall = chain(&[(24.0 * TONNES, 10.0)], &[elastic(linear(MEGA))]);
     let settings = RunSettings::new(1e9, 0.75e-3);
-    assert!(matches!(simulate(&wall, &settings), Err(SimulationError::TooLong { .. })));
+    let error = simulate(&wall, &settings).unwrap_err().to_string();
+    assert!(error.contains("shorten the duration or lengthen step"), "{error}");
 }

@@ -164,6 +164,14 @@ impl KeyPath {
         self
     }
 
+    /// The item if this is a path into a list of that name.
+    pub(crate) fn item_of(&self, list: &str) -> Option<usize> {
+        match &self.steps[..] {
+            [Step::Key(name), Step::Item(item), ..] if name == list => Some(*item),
+            _ => None,
+        }
+    }
+
     /// A path within the value at this one.
     pub(crate) fn then(mut self, inner: Self) -> Self {
         self.steps.extend(inner.steps);

@@ -2,9 +2,13 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::crush::{RateFactor, Stopping};
 use super::damping::Damping;
 use super::law::ForceLaw;
+use crate::error::{Error, KeyPath, error};
 
 /// One mass.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +32,8 @@ impl Body {
 
 /// Resistance against a body's motion over the track,
 /// `R = m (A + B|v| + C v² + μ g) sgn(v)`, with `sgn` smoothed to `tanh(v / 0.05 m/s)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct Resistance {
     /// `A` of the running resistance (Davis' equation per mass), in m/s².
     pub constant_m_per_s2: f64,
@@ -49,6 +54,12 @@ impl Resistance {
     /// Whether the body runs without resistance.
     pub(super) fn is_none(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// A term that is below 0 or not finite.
+    pub(crate) fn wrong_term(&self) -> Option<f64> {
+        let terms = [self.constant_m_per_s2, self.linear_per_s, self.quadratic_per_m, self.braking];
+        terms.into_iter().find(|term| !(*term >= 0.0 && term.is_finite()))
     }
 
     /// Force against the motion of `mass_kg` at `v_m_per_s`, with its sign, in N.
@@ -135,78 +146,26 @@ pub struct Chain {
     interfaces: Vec<Interface>,
 }
 
-/// Why bodies and interfaces are not a chain.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ChainError {
-    /// A chain needs a body.
-    #[error("there are no bodies")]
-    NoBodies,
-    /// Number of interfaces that fits neither a wall nor a free end.
-    #[error("{bodies} bodies need {} interfaces, or {bodies} with a wall in front, found {interfaces}", bodies - 1)]
-    Interfaces {
-        /// Number of bodies.
-        bodies: usize,
-        /// Number of interfaces.
-        interfaces: usize,
-    },
-    /// A mass that is not above 0.
-    #[error("the mass of {name} is {mass_kg} kg: expected more than 0")]
-    Mass {
-        /// Its name.
-        name: String,
-        /// Mass in kg.
-        mass_kg: f64,
-    },
-    /// A speed that is not finite.
-    #[error("the speed of {name} is {speed_m_per_s} m/s: expected a finite number")]
-    Speed {
-        /// Its name.
-        name: String,
-        /// Speed in m/s.
-        speed_m_per_s: f64,
-    },
-    /// A gap or slack below 0.
-    #[error("the {what} of {name} is {length_m} m: expected 0 or more")]
-    Length {
-        /// `gap` or `slack`.
-        what: &'static str,
-        /// Its name.
-        name: String,
-        /// Length in m.
-        length_m: f64,
-    },
-    /// A rate or a stopped mass that no crush zone has.
-    #[error("{name} has {what}")]
-    Crush {
-        /// Name of the interface.
-        name: String,
-        /// What is wrong, and what was expected.
-        what: &'static str,
-    },
-    /// A term of the resistance below 0.
-    #[error("the resistance of {name} has the term {value}: expected 0 or more")]
-    Resistance {
-        /// Its name.
-        name: String,
-        /// Its value.
-        value: f64,
-    },
-}
-
 impl Chain {
     /// Checks the invariant once.
     ///
     /// # Errors
-    /// [`ChainError`] names the body or interface that breaks it.
-    pub fn new(bodies: Vec<Body>, interfaces: Vec<Interface>) -> Result<Self, ChainError> {
+    /// It names the body or interface that breaks it.
+    pub fn new(bodies: Vec<Body>, interfaces: Vec<Interface>) -> Result<Self, Error> {
         if bodies.is_empty() {
-            return Err(ChainError::NoBodies);
+            return Err(error!(Other at "train", "there are no bodies"));
         }
         if interfaces.len() != bodies.len() && interfaces.len() + 1 != bodies.len() {
             let (bodies, interfaces) = (bodies.len(), interfaces.len());
-            return Err(ChainError::Interfaces { bodies, interfaces });
+            return Err(error!(
+                Other at "train",
+                "{bodies} bodies need {} interfaces, or {bodies} with a wall in front, found {interfaces}",
+                bodies - 1
+            ));
         }
-        Self { bodies, interfaces }.checked()
+        let chain = Self { bodies, interfaces };
+        chain.check()?;
+        Ok(chain)
     }
 
     /// Gives the bodies other masses and speeds (kg, m/s) and the interfaces other gaps and
@@ -216,7 +175,7 @@ impl Chain {
         motions: &[(f64, f64)],
         gaps_m: &[f64],
         slacks_m: &[f64],
-    ) -> Result<(), ChainError> {
+    ) -> Result<(), Error> {
         for (body, (mass_kg, speed_m_per_s)) in self.bodies.iter_mut().zip(motions) {
             (body.mass_kg, body.speed_m_per_s) = (*mass_kg, *speed_m_per_s);
         }
@@ -229,72 +188,75 @@ impl Chain {
         self.check()
     }
 
-    fn checked(self) -> Result<Self, ChainError> {
-        self.check().map(|()| self)
-    }
-
-    fn check(&self) -> Result<(), ChainError> {
-        for body in &self.bodies {
-            let Body { mass_kg, speed_m_per_s, resistance, .. } = *body;
-            let name = || body.name.clone();
-            if !(mass_kg > 0.0 && mass_kg.is_finite()) {
-                return Err(ChainError::Mass { name: name(), mass_kg });
+    fn check(&self) -> Result<(), Error> {
+        for (i, body) in self.bodies.iter().enumerate() {
+            let Body { name, mass_kg, speed_m_per_s, resistance } = body;
+            let key = |key| KeyPath::of("bodies").item(i).key(key);
+            if !(*mass_kg > 0.0 && mass_kg.is_finite()) {
+                return Err(error!(
+                    Other,
+                    "the mass of {name} is {mass_kg} kg: expected more than 0"
+                )
+                .at(key("mass")));
             }
             if !speed_m_per_s.is_finite() {
-                return Err(ChainError::Speed { name: name(), speed_m_per_s });
+                return Err(error!(
+                    Other at "train",
+                    "the speed of {name} is {speed_m_per_s} m/s: expected a finite number"
+                ));
             }
-            let Resistance { constant_m_per_s2, linear_per_s, quadratic_per_m, braking } =
-                resistance;
-            for value in [constant_m_per_s2, linear_per_s, quadratic_per_m, braking] {
-                if !(value >= 0.0 && value.is_finite()) {
-                    return Err(ChainError::Resistance { name: name(), value });
-                }
+            if let Some(value) = resistance.wrong_term() {
+                return Err(error!(
+                    Other,
+                    "the resistance of {name} has the term {value}: expected 0 or more"
+                )
+                .at(key("resistance")));
             }
         }
-        for interface in &self.interfaces {
-            self.check_crush(interface)?;
+        for (k, interface) in self.interfaces.iter().enumerate() {
+            let name = &interface.name;
+            if let Some(fault) = self.crush_fault(interface) {
+                let key = KeyPath::of("interfaces").item(k);
+                return Err(error!(Other, "{name} has {fault}").at(key));
+            }
             let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
             for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
                 if !(length_m >= 0.0 && length_m.is_finite()) {
-                    return Err(ChainError::Length {
-                        what,
-                        name: interface.name.clone(),
-                        length_m,
-                    });
+                    return Err(error!(
+                        Other at "contact.gap",
+                        "the {what} of {name} is {length_m} m: expected 0 or more"
+                    ));
                 }
             }
         }
         Ok(())
     }
 
-    fn check_crush(&self, interface: &Interface) -> Result<(), ChainError> {
-        let wrong = |what| Err(ChainError::Crush { name: interface.name.clone(), what });
+    /// What is wrong with the rate or the crush zone of an interface.
+    fn crush_fault(&self, interface: &Interface) -> Option<&'static str> {
         let bodies = self.bodies.len();
         if let Some(rate) = &interface.rate {
             let values = [rate.sensitivity_sqrt_s_per_m, rate.share];
             if !values.iter().all(|value| *value >= 0.0 && value.is_finite()) {
-                return wrong("a rate whose sensitivity or share is not 0 or more");
+                return Some("a rate whose sensitivity or share is not 0 or more");
             }
             if rate.behind >= bodies || rate.ahead.is_some_and(|ahead| ahead >= bodies) {
-                return wrong("a rate that follows a body which is not there");
+                return Some("a rate that follows a body which is not there");
             }
             if interface.tension.is_some() {
-                return wrong("a rate and a coupling: a rate is that of compression");
+                return Some("a rate and a coupling: a rate is that of compression");
             }
         }
-        let Some(stopping) = &interface.stopping else { return Ok(()) };
+        let stopping = interface.stopping.as_ref()?;
         let (Some(body), Some(zone)) =
             (self.bodies.get(stopping.body), self.bodies.get(stopping.zone))
         else {
-            return wrong("a crush zone which is not there");
+            return Some("a crush zone which is not there");
         };
-        if stopping.is_sound(body.mass_kg + zone.mass_kg) {
-            Ok(())
-        } else {
-            wrong(
-                "a stopped mass that falls with the deflection, or is not less than its vehicle's: expected that of a vehicle not much heavier than this one",
-            )
-        }
+        let is_sound = stopping.is_sound(body.mass_kg + zone.mass_kg);
+        (!is_sound).then_some(
+            "a stopped mass that falls with the deflection, or is not less than its vehicle's: expected that of a vehicle not much heavier than this one",
+        )
     }
 
     /// From back to front.

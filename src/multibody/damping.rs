@@ -1,5 +1,6 @@
 //! Dampers: a coefficient over the closing speed.
 
+use crate::error::{Error, error};
 use crate::piecewise;
 
 /// A damper's coefficient over the magnitude of its speed, piecewise linear, held beyond its
@@ -13,52 +14,25 @@ pub struct Damping {
     coefficient_n_s_per_m: Vec<f64>,
 }
 
-/// Why two columns are not a damper.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DampingError {
-    /// Columns that differ in length or are empty.
-    #[error(
-        "a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}"
-    )]
-    Lengths {
-        /// Number of speeds.
-        speeds: usize,
-        /// Number of coefficients.
-        coefficients: usize,
-    },
-    /// A point that breaks the invariant.
-    #[error(
-        "point {point} of the damper is ({speed_m_per_s} m/s, {coefficient_n_s_per_m} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more"
-    )]
-    Point {
-        /// Counted from 1.
-        point: usize,
-        /// Speed in m/s.
-        speed_m_per_s: f64,
-        /// Coefficient in N s/m.
-        coefficient_n_s_per_m: f64,
-    },
-}
-
 impl Damping {
     /// # Errors
-    /// [`DampingError`] names the first point that breaks the invariant, counted from 1.
-    pub fn new(
-        speed_m_per_s: Vec<f64>,
-        coefficient_n_s_per_m: Vec<f64>,
-    ) -> Result<Self, DampingError> {
+    /// It names the first point that breaks the invariant, counted from 1.
+    pub fn new(speed_m_per_s: Vec<f64>, coefficient_n_s_per_m: Vec<f64>) -> Result<Self, Error> {
         let (speeds, coefficients) = (speed_m_per_s.len(), coefficient_n_s_per_m.len());
         if speeds != coefficients || speeds == 0 {
-            return Err(DampingError::Lengths { speeds, coefficients });
+            return Err(error!(
+                Other,
+                "a damper needs as many coefficients as speeds, at least one: found {speeds} and {coefficients}"
+            ));
         }
         let mut before = -f64::MIN_POSITIVE;
         for (i, (&v, &c)) in speed_m_per_s.iter().zip(&coefficient_n_s_per_m).enumerate() {
             if !(v > before && v >= 0.0 && v.is_finite() && c >= 0.0 && c.is_finite()) {
-                return Err(DampingError::Point {
-                    point: i + 1,
-                    speed_m_per_s: v,
-                    coefficient_n_s_per_m: c,
-                });
+                return Err(error!(
+                    Other,
+                    "point {} of the damper is ({v} m/s, {c} N s/m): expected speeds that increase from 0 or more and coefficients of 0 or more",
+                    i + 1
+                ));
             }
             before = v;
         }
@@ -68,8 +42,8 @@ impl Damping {
     /// The same coefficient in N s/m at all speeds.
     ///
     /// # Errors
-    /// [`DampingError::Point`] for a coefficient below 0.
-    pub fn constant(coefficient_n_s_per_m: f64) -> Result<Self, DampingError> {
+    /// For a coefficient below 0.
+    pub fn constant(coefficient_n_s_per_m: f64) -> Result<Self, Error> {
         Self::new(vec![0.0], vec![coefficient_n_s_per_m])
     }
 

@@ -24,7 +24,6 @@ mod chain;
 mod contacts;
 mod crush;
 mod damping;
-mod driven;
 mod engine;
 mod law;
 mod ledger;
@@ -33,36 +32,17 @@ mod reference;
 mod rows;
 mod run;
 
-pub use chain::Body;
-pub use chain::Chain;
-pub use chain::ChainError;
-pub use chain::Interface;
-pub use chain::Resistance;
-pub use chain::STANDARD_GRAVITY_M_PER_S2;
-pub use chain::Tension;
-pub use crush::RateFactor;
-pub use crush::Stopping;
+use crate::error::{Error, error};
+pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension};
+pub use crush::{RateFactor, Stopping};
 pub use damping::Damping;
-pub use damping::DampingError;
-pub use driven::UnloadingChoice;
-pub use law::EnvelopeEnd;
-pub use law::ForceLaw;
-pub use law::LawTables;
-pub use law::Unloading;
-pub use law::UnloadingShape;
-pub use ledger::Ledger;
-pub use run::BodyHistory;
-pub use run::Method;
-pub use run::Record;
-pub use run::Run;
-pub use run::RunSettings;
-pub use run::RunWarning;
-pub use run::SimulationError;
-
 use engine::Scheme;
-pub use law::tables::MemoryTables;
+pub use law::{
+    EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingChoice, UnloadingShape,
+};
+pub use ledger::Ledger;
 use run::Grid;
-pub use run::InterfaceHistory;
+pub use run::{BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings};
 
 /// A curve's own run ends where the curve does, but for rounding.
 const AT_END_M: f64 = 1e-4;
@@ -73,8 +53,8 @@ const AT_END_M: f64 = 1e-4;
 /// first contact.
 ///
 /// # Errors
-/// [`SimulationError`] names the interface or body.
-pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, SimulationError> {
+/// It names the interface or body.
+pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
     let grid = Grid::new(chain, settings)?;
     let mut run = Run::new(chain, &grid, settings.record);
     run.warnings.extend(shortened_step(chain, settings, grid.step_s));
@@ -92,7 +72,7 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Simulation
 }
 
 /// The fourth-order scheme takes no forces that depend on speeds.
-fn refuse_rates(chain: &Chain) -> Result<(), SimulationError> {
+fn refuse_rates(chain: &Chain) -> Result<(), Error> {
     if !chain.has_rates() {
         return Ok(());
     }
@@ -103,22 +83,27 @@ fn refuse_rates(chain: &Chain) -> Result<(), SimulationError> {
     let what = named("the damper", |i| i.damping.is_some())
         .or_else(|| named("the force", |i| i.rate.is_some() || i.stopping.is_some()))
         .unwrap_or_else(|| "running or braking resistance".into());
-    Err(SimulationError::Rates { what })
+    Err(error!(
+        Simulation at "run.method",
+        "{what} depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
+    ))
 }
 
 /// Of a step that was asked for and is too long. Nobody has asked for the default one.
-fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<RunWarning> {
+fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<String> {
     let RunSettings { step_s: asked_s, method, .. } = *settings;
     let (shortest_s, k) = chain.shortest_time_s();
     if asked_s == method.default_step_s() || asked_s <= method.step_rule() * shortest_s {
         return None;
     }
-    let interface = chain.interfaces()[k].name.clone();
-    Some(RunWarning::StepShortened { asked_s, used_s, interface })
+    let interface = &chain.interfaces()[k].name;
+    Some(format!(
+        "the step of {asked_s:.3e} s is too long for interface {interface}: {used_s:.3e} s was used"
+    ))
 }
 
 /// Of interfaces that went beyond the end of their curves.
-fn beyond_ends(chain: &Chain, run: &Run) -> Vec<RunWarning> {
+fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
     let mut warnings = Vec::new();
     for (interface, history) in chain.interfaces().iter().zip(&run.interfaces) {
         let tension_end_m = interface.tension.as_ref().map_or(f64::INFINITY, |t| t.law.end_m());
@@ -128,8 +113,10 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<RunWarning> {
         ];
         for (what, deflection_m, end_m) in reached {
             if deflection_m > end_m + AT_END_M {
-                let interface = interface.name.clone();
-                warnings.push(RunWarning::BeyondEnd { interface, what, deflection_m, end_m });
+                warnings.push(format!(
+                    "interface {} is {what} {deflection_m:.4} m, beyond the end of its curve at {end_m:.4} m",
+                    interface.name
+                ));
             }
         }
     }
@@ -137,7 +124,7 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<RunWarning> {
 }
 
 /// Of bodies that a contact still loads at the end of the run.
-fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<RunWarning> {
+fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
     let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| b.is_loaded_at_end);
     let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
     if bodies.is_empty() {
@@ -145,5 +132,8 @@ fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<RunWarning> {
     }
     // Without the rounding of a product.
     let end_s = (end_s * 1e9).round() / 1e9;
-    Some(RunWarning::StillLoaded { end_s, bodies: bodies.join(", ") })
+    Some(format!(
+        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration is that up to there, and what comes may be more; lengthen duration",
+        bodies.join(", ")
+    ))
 }

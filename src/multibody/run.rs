@@ -1,7 +1,12 @@
 //! What a run is asked for and what it gives: method, times, histories, warnings, errors.
 
-use super::chain::Chain;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::chain::{Body, Chain, Interface};
+use super::law::ForceLaw;
 use super::ledger::Ledger;
+use crate::error::{Error, KeyPath, error};
 
 /// Default step of velocity Verlet: at 0.05 ms (a fifteenth of the output interval) the crush
 /// of a 24 t car on a 40 MN/m spring is off in the sixth digit; at 0.01 ms all seven printed
@@ -11,12 +16,14 @@ const DEFAULT_STEP_S: f64 = 1e-5;
 const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
 
 /// How the motion is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Velocity Verlet: order 2, takes everything.
+    /// Velocity Verlet, of order 2.
     #[default]
     Verlet,
-    /// Two forces and a gradient per step: order 4, for forces that do not depend on speeds.
+    /// Two forces and a gradient per step: order 4, about five times faster; not for dampers and
+    /// resistance, nor for rates.
     FourthOrder,
     /// Extrapolation with adaptive order and step: slow, for checks. Its extremes are those of its
     /// steps and its contacts those of the outputs; it gives no restitution.
@@ -160,129 +167,7 @@ pub struct Run {
     /// The step used, in s.
     pub step_s: f64,
     /// What a user must know; see [`Self::all_warnings`] for those of the ledger too.
-    pub warnings: Vec<RunWarning>,
-}
-
-/// What a user must know about a run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RunWarning {
-    /// The step that was asked for breaks the step rule.
-    #[error(
-        "the step of {asked_s:.3e} s is too long for interface {interface}: {used_s:.3e} s was used"
-    )]
-    StepShortened {
-        /// Step that was asked for, in s.
-        asked_s: f64,
-        /// Step that was used, in s.
-        used_s: f64,
-        /// Name of the interface that asks for the shortest step.
-        interface: String,
-    },
-    /// An interface went beyond the end of its curve, where the force is an assumption.
-    #[error(
-        "interface {interface} is {what} {deflection_m:.4} m, beyond the end of its curve at {end_m:.4} m"
-    )]
-    BeyondEnd {
-        /// Name of the interface.
-        interface: String,
-        /// How the curve was left: `crushed` or `pulled apart by`.
-        what: &'static str,
-        /// Deflection or extension in m.
-        deflection_m: f64,
-        /// Deflection in m at which the curve ends.
-        end_m: f64,
-    },
-    /// The run is shorter than the contact.
-    #[error(
-        "the run ends at {end_s} s while the contact still loads {bodies}: the mean deceleration is that up to there, and what comes may be more; lengthen duration"
-    )]
-    StillLoaded {
-        /// End of the run in s.
-        end_s: f64,
-        /// Names of the bodies.
-        bodies: String,
-    },
-}
-
-crate::error::passes_on!(crate::multibody::ChainError => Other, crate::multibody::DampingError => Other, SimulationError => Simulation);
-
-/// Why a run has no result.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SimulationError {
-    /// A time that is not above 0.
-    #[error("{what} is {value_s} s: expected a time above 0")]
-    Time {
-        /// Which quantity.
-        what: &'static str,
-        /// Its value in s.
-        value_s: f64,
-    },
-    /// The run is shorter than an output interval.
-    #[error("output_interval is {output_interval_s} s, longer than the duration of {duration_s} s")]
-    Interval {
-        /// Output interval in s.
-        output_interval_s: f64,
-        /// Duration in s.
-        duration_s: f64,
-    },
-    /// More steps or outputs than any real scenario needs.
-    #[error(
-        "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
-    )]
-    TooLong {
-        /// Number of steps.
-        steps: f64,
-        /// Step in s.
-        step_s: f64,
-        /// Number of outputs.
-        outputs: f64,
-        /// Name of the interface that asks for the shortest step.
-        interface: String,
-    },
-    /// An interface with [`EnvelopeEnd::Error`](super::EnvelopeEnd::Error) has reached the end of its curve.
-    #[error(
-        "interface {interface} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\""
-    )]
-    CurveEnd {
-        /// Name of the interface.
-        interface: String,
-        /// How the curve was left: `crushed` or `pulled apart by`.
-        what: &'static str,
-        /// Deflection or extension in m.
-        deflection_m: f64,
-        /// Time in s.
-        time_s: f64,
-        /// Deflection in m at which the curve ends.
-        end_m: f64,
-    },
-    /// A position or speed is not finite any more.
-    #[error(
-        "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
-    )]
-    Diverged {
-        /// Name of the body.
-        body: String,
-        /// Time in s.
-        time_s: f64,
-    },
-    /// A force that depends on the speed, which the fourth-order method does not take.
-    #[error(
-        "{what} depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
-    )]
-    Rates {
-        /// What causes the force.
-        what: String,
-    },
-    /// The reference method cannot follow the motion.
-    #[error(
-        "the step fell below {step_s:e} s at {time_s:.6} s: the reference method cannot follow this motion"
-    )]
-    Stuck {
-        /// Shortest step in s.
-        step_s: f64,
-        /// Time in s.
-        time_s: f64,
-    },
+    pub warnings: Vec<String>,
 }
 
 /// Steps and outputs of a run.
@@ -301,17 +186,23 @@ const MAX_OUTPUTS: f64 = 1e6;
 
 impl Grid {
     /// The longest step that divides the output interval and keeps to the step rule.
-    pub(crate) fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, SimulationError> {
+    pub(crate) fn new(chain: &Chain, settings: &RunSettings) -> Result<Self, Error> {
         let RunSettings { duration_s, output_interval_s, step_s, method, .. } = *settings;
         let times =
             [("duration", duration_s), ("output_interval", output_interval_s), ("step", step_s)];
         for (what, value_s) in times {
             if !(value_s > 0.0 && value_s.is_finite()) {
-                return Err(SimulationError::Time { what, value_s });
+                let key = format!("run.{what}");
+                return Err(
+                    error!(Simulation at &key, "{what} is {value_s} s: expected a time above 0"),
+                );
             }
         }
         if output_interval_s > duration_s * (1.0 + 1e-12) {
-            return Err(SimulationError::Interval { output_interval_s, duration_s });
+            return Err(error!(
+                Simulation at "run.output_interval",
+                "output_interval is {output_interval_s} s, longer than the duration of {duration_s} s"
+            ));
         }
         let (shortest_s, k) = chain.shortest_time_s();
         let longest = step_s.min(method.step_rule() * shortest_s);
@@ -320,8 +211,11 @@ impl Grid {
         let steps = per_output * outputs;
         let step_s = output_interval_s / per_output;
         if !(steps <= MAX_STEPS && outputs <= MAX_OUTPUTS) {
-            let interface = chain.interfaces().get(k).map_or("none".into(), |i| i.name.clone());
-            return Err(SimulationError::TooLong { steps, step_s, outputs, interface });
+            let interface = chain.interfaces().get(k).map_or("none", |i| i.name.as_str());
+            return Err(error!(
+                Simulation at "run.duration",
+                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
+            ));
         }
         Ok(Self {
             step_s,
@@ -360,7 +254,7 @@ impl Run {
     /// All that a user must know, as text.
     pub fn all_warnings(&self) -> Vec<String> {
         let mut warnings = self.ledger.warnings();
-        warnings.extend(self.warnings.iter().map(std::string::ToString::to_string));
+        warnings.extend(self.warnings.iter().cloned());
         warnings
     }
 
@@ -390,4 +284,29 @@ impl Run {
             }
         }
     }
+}
+
+/// The error of a curve that must not be left and has ended; `what` is `crushed` or `pulled apart by`.
+pub(super) fn curve_ended(
+    (k, interface): (usize, &Interface),
+    law: &ForceLaw,
+    what: &str,
+    deflection_m: f64,
+    time_s: f64,
+) -> Error {
+    let (name, end_m) = (&interface.name, law.end_m());
+    error!(
+        Simulation,
+        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\""
+    )
+    .at(KeyPath::of("interfaces").item(k))
+}
+
+/// The error of a position or speed that is not finite any more.
+pub(super) fn diverged(body: &Body, time_s: f64) -> Error {
+    let body = &body.name;
+    error!(
+        Simulation at "train",
+        "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
+    )
 }

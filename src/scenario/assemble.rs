@@ -9,9 +9,7 @@ use super::place::{self, Origin};
 use super::spring::{Spring, scale_error, spring};
 use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
 use crate::error::{Error, ErrorCode, KeyPath, error};
-use crate::multibody::{
-    Chain, ChainError, Damping, ForceLaw, Interface, Method, RunSettings, Tension,
-};
+use crate::multibody::{Chain, Damping, ForceLaw, Interface, RunSettings, Tension};
 use crate::surrogate::Model;
 use crate::unit::SpeedKind;
 
@@ -23,7 +21,8 @@ pub(super) fn assemble_at(
     sources: &Sources,
     speeds_m_per_s: &[f64],
 ) -> Result<Prepared, Error> {
-    let Layout { bodies, slots, order, vehicles } = layout(scenario);
+    let layout = layout(scenario);
+    let (slots, bodies) = (&layout.slots, &layout.bodies);
     let mut builder = Builder { path, scenario, sources, made: Vec::new(), warnings: Vec::new() };
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
     for (k, (slot, &speed)) in slots.iter().zip(speeds_m_per_s).enumerate() {
@@ -39,10 +38,11 @@ pub(super) fn assemble_at(
         interfaces.push(interface);
         used.push(of_curve);
     }
-    let chain =
-        Chain::new(bodies, interfaces).map_err(|source| no_chain(path, scenario, source))?;
+    let chain = Chain::new(bodies.clone(), interfaces)
+        .map_err(|error| no_chain(path, scenario, &layout, error))?;
+    let Layout { order, vehicles, .. } = layout;
     let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0)
-        .with_method(Method::from(scenario.run.method));
+        .with_method(scenario.run.method);
     let settings = scenario.run.step.map_or(settings, |step| settings.with_step(step.0));
     let mut warnings: Vec<String> = Vec::new();
     for warning in builder.warnings {
@@ -83,7 +83,8 @@ pub(crate) fn adjust(
     scenario: &CheckedScenario<'_>,
     prepared: &mut Prepared,
 ) -> Result<(), Error> {
-    let Layout { bodies, slots, .. } = layout(scenario);
+    let layout = layout(scenario);
+    let Layout { bodies, slots, .. } = &layout;
     let motions: Vec<(f64, f64)> = bodies.iter().map(|b| (b.mass_kg, b.speed_m_per_s)).collect();
     let own = |curve: &str| scenario.curves.get(curve).and_then(|c| c.gap).map_or(0.0, |g| g.0);
     let gaps: Vec<f64> = slots
@@ -96,12 +97,17 @@ pub(crate) fn adjust(
         .map(|tension| tension.map_or(0.0, |curve| own(curve)))
         .collect();
     let adjusted = prepared.chain.adjust(&motions, &gaps, &slacks);
-    adjusted.map_err(|source| no_chain(path, scenario, source))
+    adjusted.map_err(|error| no_chain(path, scenario, &layout, error))
 }
 
-fn no_chain(path: &Path, scenario: &CheckedScenario<'_>, source: ChainError) -> Error {
-    let key = scenario.chain_key(&source);
-    Error::below(ErrorCode::Scenario, source).at(key).placed(|key| scenario.place(path, key))
+fn no_chain(
+    path: &Path,
+    scenario: &CheckedScenario<'_>,
+    layout: &Layout<'_>,
+    error: Error,
+) -> Error {
+    let place = |key: &KeyPath| scenario.place(path, &scenario.chain_key(key, layout));
+    error.coded(ErrorCode::Scenario).placed(place)
 }
 
 /// What results name as the curve where plates meet.
@@ -158,9 +164,8 @@ impl<'a> Builder<'a> {
         }
         if let Some(damping) = &table.damping {
             let points = (damping.speed_m_per_s.clone(), damping.coefficient_n_s_per_m.clone());
-            let damping = Damping::new(points.0, points.1).map_err(|source| {
-                let error = Error::below(ErrorCode::Scenario, source);
-                self.no_spring(curve, error.at_key("damping"))
+            let damping = Damping::new(points.0, points.1).map_err(|error| {
+                self.no_spring(curve, error.coded(ErrorCode::Scenario).at_key("damping"))
             })?;
             interface.damping = Some(damping);
         }

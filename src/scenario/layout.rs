@@ -1,7 +1,7 @@
 //! Layout: the bodies of a scenario in their row, and the places between them.
 
 use super::{CheckedScenario, CrushZone, TrainTable, VehicleTable};
-use crate::multibody::{Body, Resistance};
+use crate::multibody::Body;
 
 /// Bodies from the back of the first train to its nose and on, and what lies between them.
 #[derive(Default)]
@@ -146,12 +146,7 @@ impl<'a> Layout<'a> {
         is_last: bool,
     ) -> [Option<usize>; 3] {
         let mut places = [None; 3];
-        let resistance = train.resistance.map_or(Resistance::default(), |r| Resistance {
-            constant_m_per_s2: r.constant_m_per_s2,
-            linear_per_s: r.linear_per_s,
-            quadratic_per_m: r.quadratic_per_m,
-            braking: r.braking,
-        });
+        let resistance = train.resistance.unwrap_or_default();
         let name = &vehicle.name;
         // Nothing meets the last end of a train: a model's stays part of its body.
         let free = |zone: &CrushZone<'_>| is_last && zone.is_of_model();

@@ -58,7 +58,8 @@ pub(crate) fn assemble(
         if !prepared.chain.has_rates() {
             settings = settings.with_method(Method::FourthOrder);
         }
-        let failed = |source| prepared.failed(source, "while the interfaces' speeds were sought: ");
+        let failed =
+            |error: Error| prepared.failed(error.of("while the interfaces' speeds were sought"));
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
         let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
         if largest < CHANGE_M_PER_S {

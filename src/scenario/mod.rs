@@ -46,22 +46,11 @@ pub(crate) use local::assemble;
 pub(crate) use sources::{CurveSource, Sources};
 pub(crate) use tables::*;
 
-use crate::error::{Document, Error, Place, error};
+use crate::error::{Document, Error, Place};
 use crate::manifest;
-use crate::multibody::{Chain, Run, RunSettings, SimulationError, simulate};
+use crate::multibody::{Chain, Run, RunSettings, simulate};
 use place::Origin;
-pub(crate) use tables::CrushZoneTable;
-pub(crate) use tables::CurveTable;
-pub(crate) use tables::DampingTable;
-pub(crate) use tables::EndName;
-pub(crate) use tables::InterfaceSpeed;
-pub(crate) use tables::LawName;
-pub(crate) use tables::LimitsTable;
-pub(crate) use tables::ReferenceTable;
 pub use tables::Scenario;
-pub(crate) use tables::StageTable;
-pub(crate) use tables::TrainTable;
-pub(crate) use tables::VehicleTable;
 
 /// A scenario ready to run.
 #[derive(Clone, Debug)]
@@ -89,13 +78,12 @@ impl Prepared {
     /// # Errors
     /// At the place of the key that decides it.
     pub fn run(&self) -> Result<Run, Error> {
-        simulate(&self.chain, &self.settings).map_err(|source| self.failed(source, ""))
+        simulate(&self.chain, &self.settings).map_err(|error| self.failed(error))
     }
 
     /// The error of a run, at the place of the key that decides it.
-    fn failed(&self, source: SimulationError, when: &str) -> Error {
-        let (place, text) = (self.place_of(&source), format!("{when}{source}"));
-        error!(Simulation, "{text}").caused_by(source).placed(|_| place)
+    fn failed(&self, error: Error) -> Error {
+        error.placed(|key| self.place(key))
     }
 }
 

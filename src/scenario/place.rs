@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::layout::Layout;
 use super::{CheckedScenario, Prepared, Scenario, TrainTable, VehicleTable};
 use crate::error::{Document, KeyPath, Place};
-use crate::multibody::{ChainError, SimulationError};
 
 impl CheckedScenario<'_> {
     /// The place of a key; of a scenario that is not as its file has it only the file, at `path`.
@@ -30,31 +30,16 @@ impl Origin {
 }
 
 impl Prepared {
-    /// The place of what made a run fail.
-    pub(super) fn place_of(&self, error: &SimulationError) -> Place {
-        match &self.origin.document {
-            Some(document) => document.place(&self.run_key(error)),
-            None => Place::of_file(&self.origin.path),
+    /// The place of a key of the scenario or of the chain made of it.
+    pub(super) fn place(&self, key: &KeyPath) -> Place {
+        let Some(document) = &self.origin.document else {
+            return Place::of_file(&self.origin.path);
+        };
+        match key.item_of("interfaces") {
+            Some(k) => document.place(&curve(&self.used[k].curve).key("end")),
+            None => document.place(key),
         }
     }
-
-    fn run_key(&self, error: &SimulationError) -> KeyPath {
-        match error {
-            SimulationError::Time { what, .. } => run(what),
-            SimulationError::Interval { .. } => run("output_interval"),
-            SimulationError::TooLong { .. } => run("duration"),
-            SimulationError::Rates { .. } | SimulationError::Stuck { .. } => run("method"),
-            SimulationError::CurveEnd { interface, .. } => {
-                let at = self.chain.interfaces().iter().position(|i| i.name == *interface);
-                at.map_or(KeyPath::of("curves"), |at| curve(&self.used[at].curve).key("end"))
-            }
-            SimulationError::Diverged { .. } => KeyPath::of("train"),
-        }
-    }
-}
-
-fn run(key: &str) -> KeyPath {
-    KeyPath::of("run").key(key)
 }
 
 /// The table of a curve.
@@ -132,29 +117,20 @@ impl Scenario {
         uses.find(|(_, name)| *name == curve).map_or(KeyPath::of("curves"), |(path, _)| path)
     }
 
-    /// The key that tells what is wrong with a chain.
-    pub(super) fn chain_key(&self, error: &ChainError) -> KeyPath {
-        match error {
-            ChainError::NoBodies | ChainError::Interfaces { .. } => KeyPath::of("train"),
-            ChainError::Mass { name, .. } => self.vehicle_of(name).key("mass"),
-            ChainError::Speed { .. } => KeyPath::of("train"),
-            ChainError::Length { .. } => KeyPath::of("contact.gap"),
-            ChainError::Crush { name, .. } => {
-                let body = name.split('|').find_map(|body| body.rsplit_once(' ').map(|b| b.0));
-                self.vehicle(body.unwrap_or_default())
-            }
-            ChainError::Resistance { .. } => self.resistance(),
+    /// The key of the scenario for a key of the chain that `layout` describes.
+    pub(super) fn chain_key(&self, key: &KeyPath, layout: &Layout<'_>) -> KeyPath {
+        if let Some(i) = key.item_of("bodies") {
+            let body = &layout.bodies[i];
+            return match body.resistance.wrong_term() {
+                Some(_) => train(self.train.iter().position(has_wrong_resistance).unwrap_or(0))
+                    .key("resistance"),
+                None => self.vehicle_of(&body.name).key("mass"),
+            };
         }
-    }
-
-    /// The first resistance with a term that it may not have.
-    fn resistance(&self) -> KeyPath {
-        let wrong = |t: &TrainTable| {
-            let Some(r) = t.resistance else { return false };
-            let terms = [r.constant_m_per_s2, r.linear_per_s, r.quadratic_per_m, r.braking];
-            terms.iter().any(|term| !(*term >= 0.0 && term.is_finite()))
-        };
-        train(self.train.iter().position(wrong).unwrap_or(0)).key("resistance")
+        let Some(k) = key.item_of("interfaces") else { return key.clone() };
+        let mut bodies = layout.slots[k].name.split('|');
+        let vehicle = bodies.find_map(|body| body.rsplit_once(' ').map(|b| b.0));
+        self.vehicle(vehicle.unwrap_or_default())
     }
 
     /// The vehicle that a body is, or is a crush zone of.
@@ -166,4 +142,8 @@ impl Scenario {
         let found = self.vehicles().find(|(_, vehicle)| is_of(vehicle));
         found.map_or(KeyPath::of("train"), |(path, _)| path)
     }
+}
+
+fn has_wrong_resistance(train: &TrainTable) -> bool {
+    train.resistance.is_some_and(|r| r.wrong_term().is_some())
 }

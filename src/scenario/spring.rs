@@ -1,11 +1,11 @@
 //! Springs: what a curve's source gives at one interface, and the force law made of it.
 
 use super::layout::{Connection, Role};
-use super::{CurveSource, CurveTable as Table, EndName, LawName};
+use super::{CurveSource, CurveTable as Table, LawName};
 use crate::curve::force_curve::ForceCurveError;
 use crate::curve::{ForceCurve, ForceKind};
 use crate::error::{Error, ErrorCode, error};
-use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
+use crate::multibody::{ForceLaw, UnloadingChoice};
 use crate::surrogate::invalid;
 use crate::surrogate::predict::predict_driving;
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
@@ -169,17 +169,12 @@ impl Spring {
         mut self,
         table: &Table,
     ) -> Result<(ForceLaw, Vec<String>), Error> {
-        let end = match table.end {
-            EndName::Hold => EnvelopeEnd::Hold,
-            EndName::Slope => EnvelopeEnd::Slope,
-            EndName::Error => EnvelopeEnd::Error,
-        };
         let (unloading, warnings) = match table.law {
             LawName::Elastic => (UnloadingChoice::Elastic, Vec::new()),
             LawName::Memory | LawName::Rate => self.memory(table)?,
         };
         self.warnings.extend(warnings);
-        Ok((ForceLaw::of_curve(&self.curve, unloading, end), self.warnings))
+        Ok((ForceLaw::of_curve(&self.curve, unloading, table.end), self.warnings))
     }
 
     fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), Error> {

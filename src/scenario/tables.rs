@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::curve::{ForceKind, Parameter};
-use crate::multibody::Method;
+use crate::multibody::{EnvelopeEnd, Method, Resistance};
 use crate::plan::Plan;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::unit::{
@@ -89,33 +89,10 @@ pub(crate) struct RunTable {
     pub(crate) step: Option<TimeText>,
     /// How the motion is integrated.
     #[serde(default)]
-    pub(crate) method: MethodName,
+    pub(crate) method: Method,
     /// Which speed an interface's model curve is predicted for.
     #[serde(default)]
     pub(crate) interface_speed: InterfaceSpeed,
-}
-
-/// How the motion is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum MethodName {
-    /// Velocity Verlet, of order 2.
-    #[default]
-    Verlet,
-    /// Of order 4, about five times faster; not for dampers and resistance.
-    FourthOrder,
-    /// Adaptive extrapolation, slow, for checks.
-    Reference,
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Verlet => Self::Verlet,
-            MethodName::FourthOrder => Self::FourthOrder,
-            MethodName::Reference => Self::Reference,
-        }
-    }
 }
 
 /// 0.75 ms, as in the reference data.
@@ -164,7 +141,7 @@ pub(crate) struct CurveTable {
     pub(crate) law: LawName,
     /// What the force does beyond the curve.
     #[serde(default)]
-    pub(crate) end: EndName,
+    pub(crate) end: EnvelopeEnd,
     /// Of a model: the rule for the maximal crush; the model's own if absent.
     #[serde(default)]
     pub(crate) max_crush: Option<MaxCrushRule>,
@@ -226,19 +203,6 @@ pub(crate) enum LawName {
     Rate,
 }
 
-/// What the force does beyond the curve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum EndName {
-    /// Holds the last force.
-    #[default]
-    Hold,
-    /// Continues the last segment.
-    Slope,
-    /// Ends the run with an error.
-    Error,
-}
-
 /// A train.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -255,7 +219,7 @@ pub(crate) struct TrainTable {
     /// absent.
     pub(crate) gap: Option<LengthText>,
     /// Running and braking resistance of its vehicles; none if absent.
-    pub(crate) resistance: Option<ResistanceTable>,
+    pub(crate) resistance: Option<Resistance>,
     /// From the nose back.
     pub(crate) vehicles: Vec<VehicleTable>,
 }
@@ -340,21 +304,6 @@ pub(crate) struct CrushZoneTable {
     pub(crate) mass: Option<MassText>,
     /// Curve between it and the body.
     pub(crate) curve: String,
-}
-
-/// `R = m (A + B|v| + C v² + μ g) sgn(v)`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-#[derive(Default)]
-pub(crate) struct ResistanceTable {
-    /// A.
-    pub(crate) constant_m_per_s2: f64,
-    /// B.
-    pub(crate) linear_per_s: f64,
-    /// C.
-    pub(crate) quadratic_per_m: f64,
-    /// Coefficient of friction of the brakes, over the whole weight.
-    pub(crate) braking: f64,
 }
 
 /// A rigid wall.

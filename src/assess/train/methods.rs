@@ -12,9 +12,10 @@ use crate::assess::validate::{self, Choice};
 use crate::curve::{Case, ForceCurve};
 use crate::database::Database;
 use crate::dataset::TrainingSet;
+use crate::multibody::EnvelopeEnd;
 use crate::scenario::{
-    CrushZoneTable, CurveSource, CurveTable, DampingTable, EndName, InterfaceSpeed, LawName,
-    Scenario, Sources,
+    CrushZoneTable, CurveSource, CurveTable, DampingTable, InterfaceSpeed, LawName, Scenario,
+    Sources,
 };
 use crate::surrogate::Model;
 
@@ -209,7 +210,7 @@ fn with_nsdm(
         let fit = fitted.best();
         let Some(table) = changed.curves.get_mut(name) else { continue };
         table.law = LawName::Elastic;
-        table.end = EndName::Slope;
+        table.end = EnvelopeEnd::Slope;
         table.damping = Some(DampingTable {
             speed_m_per_s: fit.model.damping.nodes().to_vec(),
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),

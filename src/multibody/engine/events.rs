@@ -3,8 +3,9 @@
 use super::super::contacts::{Direction, Move, StepPoint};
 use super::super::recorder::Moment;
 use super::super::rows::LaneIndex;
-use super::super::run::SimulationError;
+use super::super::run::curve_ended;
 use super::state::{Crossing, Engine, Scheme, Turn};
+use crate::error::Error;
 
 /// Rounding of a sum of works, and the share of a force from which on it counts as noise.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -88,9 +89,9 @@ impl Engine<'_> {
         let largest_m = contacts.largest_m(at, k);
         match direction {
             Direction::Compression => {
-                self.events.turned(k, largest_m, self.end_s - h + after_s);
+                self.events.interfaces[k].turned(largest_m, self.end_s - h + after_s);
             }
-            Direction::Tension => self.events.extended(k, largest_m),
+            Direction::Tension => self.events.interfaces[k].extended(largest_m),
         }
         (what, Turn { after_s, rate, stiffer_n_per_m })
     }
@@ -98,7 +99,7 @@ impl Engine<'_> {
     /// What the quadrature of the step has missed, and what happened in it.
     #[cold]
     #[inline(never)]
-    pub(super) fn finish(&mut self) -> Result<(), SimulationError> {
+    pub(super) fn finish(&mut self) -> Result<(), Error> {
         let crossings = std::mem::take(&mut self.crossings);
         let mut happened = false;
         for crossing in &crossings {
@@ -134,7 +135,7 @@ impl Engine<'_> {
 
     /// Fails if a curve that must not be left has ended.
     #[inline(always)]
-    fn check_end(&self, m: &Crossing) -> Result<(), SimulationError> {
+    fn check_end(&self, m: &Crossing) -> Result<(), Error> {
         let interface = &self.fixed.chain.interfaces()[m.k];
         let (law, contacts, what) = match (&interface.tension, &self.pull) {
             (Some(tension), Some(pull)) if m.direction == Direction::Tension => {
@@ -146,9 +147,7 @@ impl Engine<'_> {
         if !law.is_beyond_end(deflection_m) {
             return Ok(());
         }
-        let (interface, time_s) = (interface.name.clone(), self.end_s);
-        let end_m = law.end_m();
-        Err(SimulationError::CurveEnd { interface, what, deflection_m, time_s, end_m })
+        Err(curve_ended((m.k, interface), law, what, deflection_m, self.end_s))
     }
 
     /// A force that began or ended in the step; restitution is that of compression.
@@ -165,14 +164,14 @@ impl Engine<'_> {
         if what.loads && start <= 0.0 && compresses {
             // What the contact has not yet braked.
             let before = closing - h * rate * end / (end - start);
-            self.events.contact_began(k, before.max(closing));
+            self.events.interfaces[k].contact_began(before.max(closing));
         }
         if let Some(at_m) = what.pressed_m {
             self.record_sides(k, time_of(at_m));
         }
         if let Some(at_m) = what.released_m {
             if compresses {
-                self.events.released(k, -closing);
+                self.events.interfaces[k].released(-closing);
             }
             self.record_sides(k, time_of(at_m));
         }

@@ -77,7 +77,7 @@ impl Engine<'_> {
             net_n[slot] += extra_n;
             self.rate_factors[k] = factor;
             self.losses.power.damper_w += extra_n * closing;
-            self.events.pressed(k, net_n[slot]);
+            self.events.interfaces[k].pressed(net_n[slot]);
         }
     }
 
@@ -129,8 +129,8 @@ impl Engine<'_> {
             }
             net_n[slot] = force;
             self.losses.power.damper_w += (force - spring) * closing;
-            self.events.pressed(k, force);
-            self.events.pulled(k, -force);
+            self.events.interfaces[k].pressed(force);
+            self.events.interfaces[k].pulled(-force);
         }
     }
 

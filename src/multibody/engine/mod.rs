@@ -37,7 +37,8 @@ use multiversion::multiversion;
 use super::chain::Chain;
 use super::contacts::StepPoint;
 use super::recorder::{LOOK_S, Moment};
-use super::run::{Grid, Record, Run, SimulationError};
+use super::run::{Grid, Record, Run};
+use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 use state::Engine;
@@ -50,7 +51,7 @@ pub(super) fn run(
     record: Record,
     grid: &Grid,
     run: &mut Run,
-) -> Result<(), SimulationError> {
+) -> Result<(), Error> {
     let mut engine = Engine::new(chain, scheme, grid.step_s);
     let mut recorder = OutputRecorder::new(chain, &engine.fixed.layout, record);
     engine.output::<0>(&mut recorder, run, 0.0)?;
@@ -74,7 +75,7 @@ fn all_outputs<'a, const N: usize>(
     recorder: &mut OutputRecorder,
     run: &mut Run,
     grid: &Grid,
-) -> Result<(), SimulationError> {
+) -> Result<(), Error> {
     let h = grid.step_s;
     let scheme = engine.fixed.scheme;
     let ahead_s = engine.fixed.ahead_s();

@@ -4,8 +4,9 @@ use super::super::chain::Chain;
 use super::super::contacts::StepPoint;
 use super::super::ledger::{Account, Balance};
 use super::super::rows::{LANES, Layout, Row, Rows, each, larger};
-use super::super::run::{BodyHistory, Grid, InterfaceHistory, Record, Run, SimulationError};
+use super::super::run::{BodyHistory, Grid, InterfaceHistory, Record, Run, diverged};
 use super::state::Engine;
+use crate::error::Error;
 
 /// Outputs that are kept before they are appended to the histories: one history at a time is
 /// written faster than one value of each.
@@ -106,7 +107,7 @@ impl Engine<'_> {
         recorder: &mut OutputRecorder,
         run: &mut Run,
         time_s: f64,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), Error> {
         let n = self.fixed.layout.known::<N>();
         let (mut twice_kinetic, mut momentum) = ([0.0; LANES], [0.0; LANES]);
         let (m, v) = (self.mass_kg.values(n), self.v.values(n));
@@ -120,7 +121,7 @@ impl Engine<'_> {
             && let Some((_, body)) = (self.fixed.chain.bodies().iter().enumerate())
                 .find(|&(i, _)| !self.v[self.fixed.layout.of(i)].is_finite())
         {
-            return Err(SimulationError::Diverged { body: body.name.clone(), time_s });
+            return Err(diverged(body, time_s));
         }
         let interfaces_j = self.sum_work::<N>(recorder);
         recorder.account.audit(&Balance {
@@ -205,11 +206,11 @@ impl Engine<'_> {
         run.ledger = recorder.account.close(recorder.work_j.sum(n) - dissipated_j, dissipated_j);
         let end_s = grid.output_s(grid.outputs);
         for k in 0..self.fixed.chain.interfaces().len() {
-            self.events.pressed(k, self.push.peak_n(k));
-            self.events.deflected(k, self.push.deflection_m(StepPoint::End, k), end_s);
+            self.events.interfaces[k].pressed(self.push.peak_n(k));
+            self.events.interfaces[k].deflected(self.push.deflection_m(StepPoint::End, k), end_s);
             if let Some(pull) = &self.pull {
-                self.events.pulled(k, pull.peak_n(k));
-                self.events.extended(k, pull.largest_m(StepPoint::End, k).max(0.0));
+                self.events.interfaces[k].pulled(pull.peak_n(k));
+                self.events.interfaces[k].extended(pull.largest_m(StepPoint::End, k).max(0.0));
             }
         }
         self.events.close(run, recorder.record, grid.steps_s());

@@ -71,7 +71,8 @@ impl<'a> Engine<'a> {
             if !self.push.is_loading(k) {
                 continue;
             }
-            self.events.contact_began(k, self.closing(k));
+            let closing = self.closing(k);
+            self.events.interfaces[k].contact_began(closing);
             if self.push.presses(k) {
                 for i in self.sides(k) {
                     self.events.touched(i, 0.0);

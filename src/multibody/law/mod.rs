@@ -7,15 +7,20 @@
 //! otherwise a constant force would lose half a step.
 
 mod memory;
+mod of_curve;
 mod pieces;
 mod shape;
-pub(crate) mod tables;
+mod tables;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use crate::curve::Envelope;
 use memory::{Memory, StoredBy};
+pub use of_curve::UnloadingChoice;
 pub(super) use pieces::{Branch, OnEnvelope, Piece};
 pub use shape::UnloadingShape;
-pub use tables::LawTables;
+pub use tables::{LawTables, MemoryTables};
 
 /// What happens when the deflection falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,9 +36,11 @@ pub enum Unloading {
 }
 
 /// What the force does beyond the envelope's last point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum EnvelopeEnd {
     /// The last force is held.
+    #[default]
     Hold,
     /// The last segment is continued if it rises, else the last force is held.
     Slope,

@@ -7,7 +7,7 @@ const SLOWEST_APPROACH_M_PER_S: f64 = 0.1;
 
 /// What is known of an interface over all steps.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Extremes {
+pub(in super::super) struct Extremes {
     peak_n: f64,
     peak_tension_n: f64,
     max_extension_m: f64,

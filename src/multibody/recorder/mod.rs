@@ -23,7 +23,7 @@ pub(super) use spans::{LOOK_S, Moment};
 /// What happens in a run between its outputs.
 pub(super) struct EventRecorder {
     layout: Layout,
-    interfaces: Vec<Extremes>,
+    pub(crate) interfaces: Vec<Extremes>,
     bodies: Vec<BodyEvents>,
     present: Present,
 }
@@ -82,41 +82,6 @@ impl EventRecorder {
             bodies: events,
             present,
         }
-    }
-
-    /// Contact began at interface `k` with this closing speed.
-    pub(crate) fn contact_began(&mut self, k: usize, closing_m_per_s: f64) {
-        self.interfaces[k].contact_began(closing_m_per_s);
-    }
-
-    /// The force of interface `k` has fallen to zero while it opened with this speed.
-    pub(crate) fn released(&mut self, k: usize, separation_m_per_s: f64) {
-        self.interfaces[k].released(separation_m_per_s);
-    }
-
-    /// The deflection of interface `k` was largest.
-    pub(crate) fn turned(&mut self, k: usize, largest_m: f64, time_s: f64) {
-        self.interfaces[k].turned(largest_m, time_s);
-    }
-
-    /// Interface `k` has this deflection.
-    pub(crate) fn deflected(&mut self, k: usize, deflection_m: f64, time_s: f64) {
-        self.interfaces[k].deflected(deflection_m, time_s);
-    }
-
-    /// Interface `k` presses with this force.
-    pub(crate) fn pressed(&mut self, k: usize, force_n: f64) {
-        self.interfaces[k].pressed(force_n);
-    }
-
-    /// Interface `k` pulls with this force.
-    pub(crate) fn pulled(&mut self, k: usize, tension_n: f64) {
-        self.interfaces[k].pulled(tension_n);
-    }
-
-    /// Interface `k` is pulled apart by this length.
-    pub(crate) fn extended(&mut self, k: usize, extension_m: f64) {
-        self.interfaces[k].extended(extension_m);
     }
 
     /// Contact forces act on body `i` from `at_s` on.

@@ -14,7 +14,8 @@ use super::chain::Chain;
 use super::ledger::{Account, Balance};
 use super::recorder::{EventRecorder, Moment};
 use super::rows::{Layout, Rows};
-use super::run::{Grid, Record, Run, RunSettings, SimulationError};
+use super::run::{Grid, Record, Run, RunSettings, curve_ended, diverged};
+use crate::error::{Error, error};
 use motion::Contact;
 
 /// A shorter step, in s, says that the force is not a function of the state.
@@ -30,7 +31,7 @@ pub(super) fn run(
     settings: &RunSettings,
     grid: &Grid,
     run: &mut Run,
-) -> Result<(), SimulationError> {
+) -> Result<(), Error> {
     let mut reference = Reference::new(chain, settings);
     let mut interfaces_j = reference.output(0.0, run);
     for output in 1..=grid.outputs {
@@ -93,7 +94,7 @@ impl<'a> Reference<'a> {
     }
 
     /// Steps from one output to the next.
-    fn go_on(&mut self, from_s: f64, to_s: f64) -> Result<(), SimulationError> {
+    fn go_on(&mut self, from_s: f64, to_s: f64) -> Result<(), Error> {
         let mut time_s = from_s;
         while time_s < to_s {
             let left = to_s - time_s;
@@ -122,21 +123,24 @@ impl<'a> Reference<'a> {
     }
 
     /// Fails where the motion cannot be followed.
-    fn check(&self, time_s: f64) -> Result<(), SimulationError> {
+    fn check(&self, time_s: f64) -> Result<(), Error> {
         if !self.y.iter().all(|y| y.is_finite()) {
             let bodies = self.motion.chain.bodies();
             let speeds = &self.y[bodies.len()..];
             let i = (0..bodies.len()).find(|&i| !speeds[i].is_finite()).unwrap_or(0);
-            return Err(SimulationError::Diverged { body: bodies[i].name.clone(), time_s });
+            return Err(diverged(&bodies[i], time_s));
         }
         if self.h < SHORTEST_S {
-            return Err(SimulationError::Stuck { step_s: SHORTEST_S, time_s });
+            return Err(error!(
+                Simulation at "run.method",
+                "the step fell below {SHORTEST_S:e} s at {time_s:.6} s: the reference method cannot follow this motion"
+            ));
         }
         Ok(())
     }
 
     /// Memory and events of an accepted step.
-    fn accept(&mut self, time_s: f64) -> Result<(), SimulationError> {
+    fn accept(&mut self, time_s: f64) -> Result<(), Error> {
         let n = self.motion.chain.bodies().len();
         let a = self.motion.by_contacts(&self.y);
         for (i, &a) in a.iter().enumerate() {
@@ -146,25 +150,20 @@ impl<'a> Reference<'a> {
         for (k, interface) in self.motion.chain.interfaces().iter().enumerate() {
             let contact = self.motion.contact(&self.y, k);
             if interface.law.is_beyond_end(contact.deflection_m) {
-                return Err(SimulationError::CurveEnd {
-                    interface: interface.name.clone(),
-                    what: "crushed",
-                    deflection_m: contact.deflection_m,
-                    time_s,
-                    end_m: interface.law.end_m(),
-                });
+                let (law, deflection_m) = (&interface.law, contact.deflection_m);
+                return Err(curve_ended((k, interface), law, "crushed", deflection_m, time_s));
             }
             self.record_contact(k, &contact, time_s);
-            self.events.pulled(k, -contact.force_n());
-            self.events.extended(k, contact.extension_m);
+            self.events.interfaces[k].pulled(-contact.force_n());
+            self.events.interfaces[k].extended(contact.extension_m);
             self.motion.remember(k, &contact);
         }
         Ok(())
     }
 
     fn record_contact(&mut self, k: usize, contact: &Contact, time_s: f64) {
-        self.events.pressed(k, contact.force_n());
-        self.events.deflected(k, contact.deflection_m, time_s);
+        self.events.interfaces[k].pressed(contact.force_n());
+        self.events.interfaces[k].deflected(contact.deflection_m, time_s);
     }
 
     /// Records the state; gives what the interfaces have stored and dissipated, in J.
