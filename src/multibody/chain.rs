@@ -5,9 +5,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::crush::{RateFactor, Stopping};
-use super::damping::Damping;
 use super::law::ForceLaw;
+use super::rates::Damping;
+use super::rates::{RateFactor, Stopping};
 use crate::error::{Error, KeyPath, error};
 
 /// One mass.

@@ -22,11 +22,10 @@
 
 mod chain;
 mod contacts;
-mod crush;
-mod damping;
 mod engine;
 mod law;
 mod ledger;
+mod rates;
 mod recorder;
 mod reference;
 mod rows;
@@ -34,13 +33,12 @@ mod run;
 
 use crate::error::{Error, error};
 pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension};
-pub use crush::{RateFactor, Stopping};
-pub use damping::Damping;
 use engine::Scheme;
 pub use law::{
     EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingChoice, UnloadingShape,
 };
 pub use ledger::Ledger;
+pub use rates::{Damping, RateFactor, Stopping};
 use run::Grid;
 pub use run::{BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings};
 
