@@ -409,16 +409,16 @@ impl serde::de::Visitor<'_> for TextVisitor {
     }
 }
 
-/// A value read from text with a unit in a TOML file.
-macro_rules! text_quantity {
-    ($(#[$doc:meta])* $name:ident, $parse:expr, $pattern:literal) => {
+/// Values read from text with a unit in a TOML file, in SI.
+macro_rules! texts_with_units {
+    ($($(#[$doc:meta])* $name:ident: $dimension:ident.$parse:ident, $sign:literal;)*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct $name(pub f64);
 
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                d.deserialize_any(TextVisitor($parse)).map(Self)
+                d.deserialize_any(TextVisitor(|text| $dimension.$parse(text))).map(Self)
             }
         }
 
@@ -427,53 +427,36 @@ macro_rules! text_quantity {
                 stringify!($name).into()
             }
             fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-                schemars::json_schema!({ "type": "string", "pattern": $pattern })
+                let units: Vec<&str> = $dimension.units.iter().map(|(name, _)| *name).collect();
+                let pattern = format!("^{}[0-9.eE+-]+ *({})$", $sign, units.join("|"));
+                schemars::json_schema!({ "type": "string", "pattern": pattern })
             }
         }
-    };
+    )*};
 }
 
-text_quantity!(
+texts_with_units! {
     /// A speed in m/s, zero or above, written like `"36km/h"`.
-    SpeedText, |t: &str| SPEED.parse_not_negative(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
-);
-text_quantity!(
+    SpeedText: SPEED.parse_not_negative, "";
     /// A speed in m/s of either direction, written like `"-18km/h"`.
-    SignedSpeedText, |t: &str| SPEED.parse(t), "^-?[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
-);
-text_quantity!(
+    SignedSpeedText: SPEED.parse, "-?";
     /// A speed in m/s, above zero, written like `"36km/h"`.
-    ImpactSpeedText, |t: &str| SPEED.parse_positive(t), "^[0-9.eE+-]+ *(km/h|m/s|mm/ms|mm/s|mph)$"
-);
-text_quantity!(
+    ImpactSpeedText: SPEED.parse_positive, "";
     /// A mass in kg, above zero, written like `"24t"`.
-    MassText, |t: &str| MASS.parse_positive(t), "^[0-9.eE+-]+ *(t|kg|g)$"
-);
-text_quantity!(
+    MassText: MASS.parse_positive, "";
     /// A length in m, zero or above, written like `"30mm"`.
-    LengthText, |t: &str| LENGTH.parse_not_negative(t), "^[0-9.eE+-]+ *(mm|cm|m)$"
-);
-text_quantity!(
+    LengthText: LENGTH.parse_not_negative, "";
     /// A length in m, of either sign, written like `"-30mm"`.
-    SignedLengthText, |t: &str| LENGTH.parse(t), "^-?[0-9.eE+-]+ *(mm|cm|m)$"
-);
-text_quantity!(
+    SignedLengthText: LENGTH.parse, "-?";
     /// A time in s, zero or above, written like `"35ms"`.
-    InstantText, |t: &str| TIME.parse_not_negative(t), "^[0-9.eE+-]+ *(us|ms|s)$"
-);
-text_quantity!(
+    InstantText: TIME.parse_not_negative, "";
     /// A time in s, above zero, written like `"0.75ms"`.
-    TimeText, |t: &str| TIME.parse_positive(t), "^[0-9.eE+-]+ *(us|ms|s)$"
-);
-text_quantity!(
+    TimeText: TIME.parse_positive, "";
     /// A force in N, zero or above, written like `"1.2MN"`.
-    ForceText, |t: &str| FORCE.parse_not_negative(t), "^[0-9.eE+-]+ *(N|kN|MN)$"
-);
-text_quantity!(
+    ForceText: FORCE.parse_not_negative, "";
     /// A stiffness in N/m, above zero, written like `"80MN/m"`.
-    StiffnessText, |t: &str| STIFFNESS.parse_positive(t),
-    "^[0-9.eE+-]+ *(N/m|kN/m|MN/m|GN/m|N/mm|kN/mm)$"
-);
+    StiffnessText: STIFFNESS.parse_positive, "";
+}
 
 #[cfg(test)]
 mod tests {
