@@ -41,7 +41,7 @@ pub struct ErrorReport {
     pub message: String,
     /// Causes that the message does not contain itself, the nearest first.
     pub causes: Vec<String>,
-    /// File that is wrong, where its text tells so.
+    /// File that is wrong, where one is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Line in the file, counted from 1.

@@ -243,7 +243,7 @@ impl Findings<'_> {
                     self.add("attribute_differs", None, None, message);
                 }
                 None => {
-                    let message = format!("attribute {name} is missing or no number");
+                    let message = format!("attribute {name} is missing or not a number");
                     self.add("attribute_differs", None, None, message);
                 }
             }

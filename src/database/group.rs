@@ -26,16 +26,16 @@ pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrV
     all
 }
 
-/// The mass that the crush zone of a group stops; `None` if its cases do not tell one.
+/// The mass that the crush zone of a group stops; `None` if it does not follow from its cases.
 pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
     let first = cases.first()?;
     // Looked at before anything is filtered: a group may have thousands of cases.
-    let may_tell = first.curves.force_kind == ForceKind::Contact
+    let is_uniform = first.curves.force_kind == ForceKind::Contact
         && cases.iter().all(|c| {
             c.conditions.masses == first.conditions.masses
                 && c.conditions.parameters == first.conditions.parameters
         });
-    let set = may_tell.then(|| TrainingSet::new(name, cases).ok())??;
+    let set = is_uniform.then(|| TrainingSet::new(name, cases).ok())??;
     set.stopped_mass().filter(StoppedMass::is_known)
 }
 
@@ -51,7 +51,7 @@ fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
     ]
 }
 
-/// The first attribute of a stopped mass that is not what the cases tell, with what it is instead; a group
+/// The first attribute of a stopped mass that does not follow from the cases, with what is wrong; a group
 /// of an earlier version, which has none, differs in nothing.
 pub(super) fn differs(
     found: &HashMap<String, AttrValue>,
@@ -61,16 +61,16 @@ pub(super) fn differs(
     if GROUP_ATTRIBUTES[1..].iter().all(|name| !found.contains_key(*name)) {
         return None;
     }
-    let told = stopped_mass(name, cases).map(|stopped| of_stopped_mass(&stopped));
-    let Some(told) = told else { return Some((STOPPED, "the cases give none")) };
-    told.into_iter().find_map(|(name, value)| match found.get(name) {
+    let expected = stopped_mass(name, cases).map(|stopped| of_stopped_mass(&stopped));
+    let Some(expected) = expected else { return Some((STOPPED, "the cases give none")) };
+    expected.into_iter().find_map(|(name, value)| match found.get(name) {
         None => Some((name, "it is missing")),
         Some(there) if !same_value(there, &value) => Some((name, "the cases give another")),
         Some(_) => None,
     })
 }
 
-/// Share of the largest number by which stored numbers may differ from what the cases tell.
+/// Share of the largest number by which stored numbers may differ from what follows from the cases.
 const LIKE: f64 = 1e-6;
 
 fn same_value(a: &AttrValue, b: &AttrValue) -> bool {

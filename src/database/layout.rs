@@ -391,7 +391,7 @@ impl<'a> Opened<'a> {
     }
 
     /// The group of a case, found by name without looking at any other case; `None` if there is
-    /// no such case, or if other names have to be known to tell.
+    /// no such case, or if that depends on the names of others.
     pub(crate) fn find(&self, group: Option<&str>, case: &str) -> Option<(String, Group)> {
         let root = self.file.root();
         let name = match group {
@@ -485,7 +485,7 @@ struct Attrs<'a> {
 impl Attrs<'_> {
     fn number(&self, name: &str) -> Result<f64, Error> {
         self.optional_number(name)?
-            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or no number")))
+            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or not a number")))
     }
 
     fn optional_number(&self, name: &str) -> Result<Option<f64>, Error> {
@@ -509,7 +509,7 @@ impl Attrs<'_> {
         self.map
             .get(name)
             .and_then(AttrValue::as_str)
-            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or no text")))
+            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or not a text")))
     }
 
     fn kind<T>(&self, name: &str, parse: fn(&str) -> Option<T>) -> Result<T, Error> {

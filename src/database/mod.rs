@@ -305,8 +305,8 @@ impl Database {
             .collect()
     }
 
-    /// The mass that the crush zone of a group stops at each deflection, as its cases tell it now; `None` if
-    /// there is no such group, or its cases tell none.
+    /// The mass that the crush zone of a group stops at each deflection, as its cases are now; `None` if
+    /// there is no such group, or it does not follow from them.
     pub fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
         group::stopped_mass(group, self.cases(group))
     }
@@ -322,7 +322,7 @@ impl Database {
     }
 }
 
-/// Lets a case of an earlier version, which does not tell what it was built from, remember its names
+/// Lets a case of an earlier version, which does not say what it was built from, remember its names
 /// before it gets others: a build of its study knows it by them.
 pub(crate) fn remember_origin(case: &mut Case) {
     if case.provenance.origin.is_none() && case.id.study != IMPORTED {

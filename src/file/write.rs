@@ -105,7 +105,7 @@ const MAX_NAME_BYTES: usize = 200;
 
 /// A file under work beside its target. Its name is made of the target's, so that what a killed
 /// process left is taken up and emptied by the next; it is locked, so that of two processes that
-/// write one target the second is told.
+/// write one target the second gets an error.
 struct Draft {
     file: File,
     path: PathBuf,

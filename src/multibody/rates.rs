@@ -94,7 +94,7 @@ impl RateFactor {
         1.0 + self.sensitivity_sqrt_s_per_m * (self.share * closing_m_per_s).max(0.0).sqrt()
     }
 
-    /// Closing speed in m/s of its two bodies, of which `speed_m_per_s` tells the speeds.
+    /// Closing speed in m/s of its two bodies, whose speeds `speed_m_per_s` gives.
     pub(super) fn closing_m_per_s(&self, speed_m_per_s: impl Fn(usize) -> f64) -> f64 {
         speed_m_per_s(self.behind) - self.ahead.map_or(0.0, speed_m_per_s)
     }

@@ -187,7 +187,7 @@ fn normal_quantile(share: f64) -> f64 {
         return q * ratio(r, &CENTRE);
     }
     let tail = if q < 0.0 { share } else { 1.0 - share };
-    // Beyond what a double tells from 0 the quantile is about −38.
+    // Below the smallest double the quantile is about −38.
     let r = (-libm::log(tail.max(f64::MIN_POSITIVE))).sqrt();
     let z = if r <= 5.0 { ratio(r - 1.6, &MIDDLE) } else { ratio(r - 5.0, &TAIL) };
     if q < 0.0 { -z } else { z }

@@ -147,7 +147,7 @@ impl<'a> Builder<'a> {
         self.failed(error.at(place::curve(curve)))
     }
 
-    /// An interface that a curve of the scenario tells.
+    /// An interface whose law is a curve of the scenario.
     fn interface(
         &mut self,
         slot: &Connection<'_>,
@@ -172,7 +172,7 @@ impl<'a> Builder<'a> {
         Ok((interface, made.used))
     }
 
-    /// The crush zone of a vehicle whose end a model tells.
+    /// The crush zone of a vehicle whose end comes from a model.
     fn end(
         &mut self,
         slot: &Connection<'_>,

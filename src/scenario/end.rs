@@ -21,7 +21,7 @@ use crate::unit::SpeedKind;
 const PLATES_N_PER_M: f64 = 5e9;
 const PLATES_N_S_PER_M: f64 = 3e5;
 
-/// A crush force as the chain takes it, with what must be said of it.
+/// A crush force as the chain takes it, with its warnings.
 pub(super) struct Crush {
     /// Loads from (0, 0); of an end over its own deflection.
     pub curve: ForceCurve,

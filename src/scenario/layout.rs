@@ -38,7 +38,7 @@ pub(super) enum ConnectionKind<'a> {
     Plates,
 }
 
-/// The end of a vehicle that a model tells, by its bodies in the chain.
+/// The end of a vehicle that comes from a model, by its bodies in the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct End<'a> {
     pub curve: &'a str,
@@ -210,7 +210,7 @@ impl<'a> Layout<'a> {
         });
     }
 
-    /// Tells every end of a model which vehicles meet at its plates. Slot `k` lies between the
+    /// Notes at every end of a model which vehicles meet at its plates. Slot `k` lies between the
     /// bodies `k` and `k + 1`.
     fn join_ends(&mut self) {
         for k in 0..self.slots.len() {

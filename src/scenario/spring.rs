@@ -10,7 +10,7 @@ use crate::surrogate::invalid;
 use crate::surrogate::predict::predict_driving;
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
 
-/// The curve at one interface, with what must be said of it.
+/// The curve at one interface, with its warnings.
 pub(super) struct Spring {
     pub curve: ForceCurve,
     pub warnings: Vec<String>,
@@ -164,7 +164,7 @@ fn which_force(
 }
 
 impl Spring {
-    /// The force law that the curve's table asks for, with all that must be said of it.
+    /// The force law that the curve's table asks for, with all warnings.
     pub(crate) fn law_with_warnings(
         mut self,
         table: &Table,

@@ -179,7 +179,7 @@ impl Sweep {
         self.design.items()
     }
 
-    /// What tells this sweep from any other: BLAKE3 of plan, scenario, the files it names and
+    /// Identifies the sweep: BLAKE3 of plan, scenario, the files it names and
     /// this program's version.
     pub fn hash(&self) -> &str {
         &self.hash

@@ -129,7 +129,7 @@ impl<'a> Line<'a> {
 pub(crate) struct ShardHeader {
     /// Version of the program that wrote it.
     pub version: String,
-    /// What tells the sweep from any other, see [`Sweep::hash`].
+    /// Identifies the sweep, see [`Sweep::hash`].
     pub hash: String,
     /// Items of the whole sweep.
     pub items: u64,

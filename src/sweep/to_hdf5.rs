@@ -295,7 +295,7 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
     String::from_utf8_lossy(&bytes[..end])
 }
 
-/// The head that a file's attributes and columns tell.
+/// The head that a file's attributes and columns give.
 fn head(table: &Table) -> Result<Option<ShardHeader>, Error> {
     let mut texts = Vec::new();
     for name in ["written_by", "hash", "shard"] {

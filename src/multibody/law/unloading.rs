@@ -3,7 +3,7 @@
 use super::{EnvelopeEnd, ForceLaw, OnEnvelope, Unloading};
 use crate::curve::{CurveUnloading, ForceCurve};
 
-/// What tells how much energy a structure has stored.
+/// What the stored energy of a structure follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StoredBy {
     /// The force at the largest deflection.

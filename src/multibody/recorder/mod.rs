@@ -30,7 +30,7 @@ pub(super) struct EventRecorder {
 struct Present {
     /// 1 for bodies that no force acts on, else 0.
     is_free: Rows,
-    /// Accelerations between these tell nothing new: see [`Phase::nothing_new_between`].
+    /// Accelerations between these change nothing: see [`Phase::unchanged_between`].
     least: Rows,
     most: Rows,
     /// Accelerations by contacts at the last look, and its time.
@@ -105,12 +105,12 @@ impl EventRecorder {
     fn enter(&mut self, i: usize, slot: LaneIndex, phase: Phase) {
         let body = &mut self.bodies[i];
         body.phase = phase;
-        let (least, most) = phase.nothing_new_between(body.least_a);
+        let (least, most) = phase.unchanged_between(body.least_a);
         (self.present.least[slot], self.present.most[slot]) = (least, most);
         self.present.is_free[slot] = if phase == Phase::Free { 1.0 } else { 0.0 };
     }
 
-    /// Whether the accelerations by contact forces are news to [`Self::look`].
+    /// Whether [`Self::look`] has anything to do with these accelerations by contact forces.
     #[inline(always)]
     pub(crate) fn is_news<const N: usize>(&self, a: &Rows) -> bool {
         let n = self.layout.known::<N>();

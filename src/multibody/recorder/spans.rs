@@ -151,9 +151,9 @@ impl Phase {
         }
     }
 
-    /// Accelerations between these tell nothing new: those too small to count of a free body, all
+    /// Accelerations between these change nothing: those too small to count of a free body, all
     /// of one sign while a force of that sign acts. Everything is new in the other phases.
-    pub(crate) fn nothing_new_between(self, least_a: f64) -> (f64, f64) {
+    pub(crate) fn unchanged_between(self, least_a: f64) -> (f64, f64) {
         match self {
             Self::Free => (-least_a, least_a),
             Self::Announced { .. } | Self::Fading { .. } => (f64::INFINITY, f64::NEG_INFINITY),
