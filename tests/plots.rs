@@ -324,3 +324,22 @@ fn committed_pictures_are_drawn_again() {
 fn same_bytes(a: &Path, b: &Path) -> bool {
     fs::read(a).unwrap() == fs::read(b).unwrap_or_default()
 }
+
+/// Curve files of every format that is read are drawn; what is neither is named as both.
+#[test]
+fn curve_files_are_drawn() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for (to, file, units) in [("lsdyna", "c.k", &["--units", "mm-t-s"][..]), ("csv", "c.csv", &[])]
+    {
+        let export = ["export", "lead50.json", "--to", to, "-o", file];
+        crumple_ok(here, &[&export[..], units].concat());
+        crumple_ok(here, &[&["plot", file, "-o", "c.svg"][..], units].concat());
+        let picture = std::fs::read_to_string(here.join("c.svg")).unwrap();
+        assert!(picture.contains("deflection") && picture.contains("<path"), "{file}");
+    }
+    std::fs::write(here.join("notes"), "no\nnumbers\n").unwrap();
+    let error = crumple_fails(here, 1, &["plot", "notes", "-o", "n.svg"]);
+    assert!(error.contains("no solver output is recognised"), "{error}");
+    assert!(error.contains("as a curve: notes: the format of this file"), "{error}");
+}

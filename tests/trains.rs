@@ -431,3 +431,52 @@ fn sweeps_reach_every_place_of_a_curve() {
         }
     }
 }
+
+/// A curve file of any format that `db add` reads drives an interface, as its CSV does.
+#[test]
+fn a_curve_file_of_any_format_drives_an_interface() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let crush = |file: &str, more: &str| -> (f64, String) {
+        let curve = format!("nose = {{ file = '{file}', unloading = \"90MN/m\"{more} }}");
+        let vehicles = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]";
+        std::fs::write(here.join("any.toml"), scenario(&curve, vehicles, "[wall]")).unwrap();
+        let run = json(&crumple_ok(here, &["simulate", "any.toml", "--json", "-q"]));
+        let crush = run["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap();
+        (crush, run["warnings"].to_string())
+    };
+    let export = |to: &str, file: &str, more: &[&str]| {
+        let words = ["export", "lead50.json", "--tail", "none", "--to", to, "-o", file];
+        crumple_ok(here, &[&words[..], more].concat());
+    };
+    export("csv", "c.csv", &[]);
+    let (expected, _) = crush("c.csv", "");
+    assert!(expected > 0.3, "{expected}");
+    let units = ["--units", "mm-t-s"];
+    for (to, file, options, more) in [
+        ("lsdyna", "c.k", &units[..], ", units = \"mm-t-s\""),
+        ("radioss", "c.rad", &units, ", units = \"mm-t-s\""),
+        ("modelica", "c.mo", &[], ""),
+        ("mat", "c.mat", &[], ", units = \"SI\""),
+    ] {
+        export(to, file, options);
+        let (found, _) = crush(file, more);
+        assert!((found / expected - 1.0).abs() < 1e-4, "{file}: {found} m, c.csv {expected} m");
+    }
+    // A spreadsheet's way: titles above, semicolons, a unit row; and columns that are turned.
+    let rows: String = (0..=20).rev().map(|i| format!("-{}\t;-{}\n", 50 * i, 100 * i)).collect();
+    std::fs::write(here.join("x.csv"), format!("Test 12\n\ndeflection;force\nmm;kN\n{rows}"))
+        .unwrap();
+    let (found, warnings) = crush("x.csv", "");
+    assert!(found > 0.5 && warnings.contains("third quadrant"), "{found} {warnings}");
+    // A record over time drives from its contact on.
+    let rows: String = (0..=200)
+        .map(|i| {
+            let d = 20.0 + f64::from(i) * 5.0;
+            format!("{},{d},{}\n", f64::from(i) * 0.5, (d - 120.0).max(0.0) * 3.0)
+        })
+        .collect();
+    std::fs::write(here.join("t.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();
+    let (found, warnings) = crush("t.csv", "");
+    assert!(found > 0.5 && warnings.contains("record over time"), "{found} {warnings}");
+}

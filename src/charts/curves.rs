@@ -89,6 +89,13 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     chart
 }
 
+/// Force over deflection of one curve, in m and N.
+pub(crate) fn file_curve(title: &str, name: &str, deflection_m: &[f64], force_n: &[f64]) -> Chart {
+    let mut panel = axes(largest(force_n));
+    panel.series.push(Series::line(name, 0, deflection_m.to_vec(), force_n.to_vec()));
+    Chart::of(title, panel)
+}
+
 /// A predicted curve with its band, over the training curves beside its speed.
 ///
 /// `neighbours` are a model's cases; the nearest below and above are drawn, or the two nearest outside of all.

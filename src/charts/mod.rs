@@ -23,13 +23,10 @@ mod histories;
 mod motion;
 mod train;
 
-pub use curves::group_curves;
-pub use curves::left_out_at;
-pub use curves::prediction;
-pub use histories::HistoryOptions;
-pub use histories::histories;
-pub use motion::Motion;
-pub use motion::Quantity;
+pub(crate) use curves::file_curve;
+pub use curves::{group_curves, left_out_at, prediction};
+pub use histories::{HistoryOptions, histories};
+pub use motion::{Motion, Quantity};
 pub use train::train_speeds;
 
 use crate::unit::km_per_h;

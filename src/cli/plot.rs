@@ -11,7 +11,8 @@ use crate::charts::{self, HistoryOptions, Motion, Quantity};
 use crate::curve::ForceKind;
 use crate::database::Database;
 use crate::file::{self, write_all_whole};
-use crate::formats::read::json;
+use crate::formats::ReadOptions;
+use crate::formats::read::{self, json};
 use crate::plot::Chart;
 use crate::scenario;
 use crate::solver::{self, Access, Selection, WantedId};
@@ -37,7 +38,8 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
 The content says what the file is. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
 pub(super) struct Args {
-    /// Database, model, predicted curve, scenario, result (CSV) or solver file
+    /// Database, model, predicted curve, scenario, result (CSV), solver file, or a curve's file (crumple db
+    /// add --list)
     file: PathBuf,
     /// Picture to write: .svg or .png; may be repeated
     #[arg(short, long, required = true)]
@@ -72,7 +74,8 @@ pub(super) struct Args {
     /// Of a solver file: its kind (nodout, rcforc, …), if not by its content
     #[arg(long)]
     format: Option<String>,
-    /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units
+    /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units. Of a
+    /// curve's file: its units where it does not say them
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
     /// Of a solver file: filtered lines beside the raw ones, by channel frequency class such as 60
@@ -351,7 +354,23 @@ fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure>
         access: Access::Plain,
         audit: false,
     };
-    let file = solver::read(&args.file, args.format.as_deref(), &selection)?;
+    let file = match solver::read(&args.file, args.format.as_deref(), &selection) {
+        // Not what a solver wrote, so a curve's file, if any reader of these knows it.
+        Err(error)
+            if args.format.is_none() && (error.is_about("format") || error.is_about("deck")) =>
+        {
+            let how = ReadOptions { units: args.units, ..ReadOptions::default() };
+            let (curve, _) = read::read(&args.file, &how)
+                .map_err(|of_curve| error.followed_by(&format!("; and as a curve: {of_curve}")))?;
+            let (title, name) = (args.file.display().to_string(), curve.title.as_deref());
+            let (d, f) = (&curve.deflection_m, &curve.force_n);
+            let mut chart = charts::file_curve(&title, name.unwrap_or("curve"), d, f);
+            let is_change = |n: &&String| n.starts_with("points: ") || n.starts_with("sign: ");
+            chart.notes.extend(curve.notes.iter().filter(is_change).cloned());
+            return Ok(chart);
+        }
+        file => file?,
+    };
     for problem in &file.problems {
         options.warn(&format!("{}: {problem}", args.file.display()));
     }

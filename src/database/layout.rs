@@ -484,8 +484,9 @@ struct Attrs<'a> {
 
 impl Attrs<'_> {
     fn number(&self, name: &str) -> Result<f64, Error> {
-        self.optional_number(name)?
-            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or not a number")))
+        self.optional_number(name)?.ok_or_else(|| {
+            self.place.damaged(format!("attribute {name} is missing or not a number"))
+        })
     }
 
     fn optional_number(&self, name: &str) -> Result<Option<f64>, Error> {

@@ -277,6 +277,8 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), Error> {
             "a model, predicted curve or case",
             table.stages.is_some() && table.force.is_some(),
         ),
+        ("units", "a file", table.file.is_none() && table.units.is_some()),
+        ("curve", "a file", table.file.is_none() && table.curve.is_some()),
         ("case", "a database", table.database.is_none() && table.case.is_some()),
         ("max_crush", "a model", no_model && table.max_crush.is_some()),
         ("parameters", "a model", no_model && !table.parameters.is_empty()),

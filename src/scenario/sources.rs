@@ -8,7 +8,8 @@ use super::{CheckedScenario, CurveTable, Scenario, StageTable};
 use crate::curve::{Case, Envelope, ForceCurve};
 use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};
-use crate::formats::read::{csv, json};
+use crate::formats::ReadOptions;
+use crate::formats::read::{self, DrivingFile};
 use crate::surrogate::{Model, PredictedCurve};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
@@ -22,7 +23,8 @@ pub(crate) struct Sources {
 pub(crate) enum CurveSource {
     Model(Box<Model>),
     Predicted(Box<PredictedCurve>),
-    Curve(Box<ForceCurve>),
+    /// With what its file needed to drive an interface.
+    Curve(Box<ForceCurve>, Vec<String>),
     /// Stages of a device between two bodies.
     Stages(Envelope),
     Case(Box<Case>),
@@ -109,14 +111,21 @@ impl CurveSource {
             }
             (None, Some(file), None, None) => {
                 let file = folder.join(file);
-                let below = |e: Error| of_curve(e).at_key("file");
-                if file.extension().is_some_and(|e| e == "json") {
-                    let read = json::predicted(&file);
-                    let read = read.map_err(|e| below(Error::below(ErrorCode::CurveFile, e)))?;
-                    return Ok(Self::Predicted(Box::new(read)));
-                }
-                let read = csv::driving(&file);
-                let mut held = read.map_err(|e| below(Error::below(ErrorCode::CurveFile, e)))?;
+                let options = ReadOptions {
+                    units: table.units,
+                    curve: table.curve.clone(),
+                    ..ReadOptions::default()
+                };
+                let read = read::driving(&file, &options).map_err(|error| {
+                    let asks = error.message().contains("--units");
+                    let here = if asks { "; here as units = \"…\" beside file" } else { "" };
+                    let error = Error::below(ErrorCode::CurveFile, error).followed_by(here);
+                    of_curve(error).at_key("file")
+                })?;
+                let (mut held, changes) = match read {
+                    DrivingFile::Predicted(curve) => return Ok(Self::Predicted(curve)),
+                    DrivingFile::Curve(curve, changes) => (curve, changes),
+                };
                 let stated = table.force.or(held.kind);
                 if held.kind.is_some() && stated != held.kind {
                     return Err(of_curve(error!(
@@ -126,7 +135,7 @@ impl CurveSource {
                     )));
                 }
                 held.kind = stated;
-                Ok(Self::Curve(Box::new(held)))
+                Ok(Self::Curve(held, changes))
             }
             (None, None, Some(database), None) => {
                 let case = table.case.as_deref().and_then(|c| c.split_once('/'));

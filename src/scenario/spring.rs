@@ -46,7 +46,7 @@ pub(super) fn spring(
         CurveSource::Case(case) => {
             (Some(case.curves.force_kind), case.curves.force_kind == ForceKind::Contact)
         }
-        CurveSource::Curve(curve) => (curve.kind, curve.kind == Some(ForceKind::Body)),
+        CurveSource::Curve(curve, _) => (curve.kind, curve.kind == Some(ForceKind::Body)),
         CurveSource::Stages(_) => (None, false),
     };
     let force = which_force(table.force, slot, declared, has_body)?;
@@ -60,10 +60,11 @@ pub(super) fn spring(
     let Spring { mut curve, mut warnings } = match source {
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
         CurveSource::Predicted(curve) => of_predicted(curve, table, force)?,
-        CurveSource::Curve(curve) => Spring {
-            warnings: curve.kind.is_none().then(|| UNKNOWN_FORCE.into()).into_iter().collect(),
-            curve: (**curve).clone(),
-        },
+        CurveSource::Curve(curve, changes) => {
+            let unknown = curve.kind.is_none().then(|| UNKNOWN_FORCE.into());
+            let warnings = changes.iter().cloned().chain(unknown).collect();
+            Spring { curve: (**curve).clone(), warnings }
+        }
         // A device between two bodies moves these, and no mass is stopped in it.
         CurveSource::Stages(envelope) => {
             Spring { curve: ForceCurve::of_body(envelope.clone()), warnings: Vec::new() }
@@ -81,7 +82,7 @@ pub(super) fn spring(
         }
     };
     let only_contact = force != Some(ForceKind::Body) && curve.kind == Some(ForceKind::Contact);
-    let stated = table.force.is_some() && !matches!(source, CurveSource::Curve(_));
+    let stated = table.force.is_some() && !matches!(source, CurveSource::Curve(..));
     if only_contact && !stated && !slot.split && slot.role != Role::Within {
         warnings.push(ONLY_CONTACT.into());
     }

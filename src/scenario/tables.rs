@@ -117,8 +117,13 @@ pub(crate) enum InterfaceSpeed {
 pub(crate) struct CurveTable {
     /// Model file; the curve is predicted for the speed of the interface.
     pub(crate) model: Option<PathBuf>,
-    /// Curve file: predicted curve (.json) or table (.csv).
+    /// Curve file: predicted curve (JSON), table (CSV), or any other format of `crumple db add --list`.
     pub(crate) file: Option<PathBuf>,
+    /// Of a file that does not say its units, such as "mm-t-s".
+    #[schemars(with = "Option<String>")]
+    pub(crate) units: Option<UnitSystem>,
+    /// Of a file of several curves: number or name of the one that is meant.
+    pub(crate) curve: Option<String>,
     /// Curve database, with `case`.
     pub(crate) database: Option<PathBuf>,
     /// Case of the database, as "group/case".

@@ -216,7 +216,7 @@ fn with_nsdm(
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),
         });
         let curve = ForceCurve::of_body(fit.model.envelope()?);
-        springs.replace(name, CurveSource::Curve(Box::new(curve)));
+        springs.replace(name, CurveSource::Curve(Box::new(curve), Vec::new()));
     }
     Ok((changed, springs))
 }

@@ -3,7 +3,9 @@
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
-use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind};
+use crate::curve::contact::{onset, threshold_n};
+use crate::curve::loading::loading_branch;
+use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};
 use crate::unit::{SpeedKind, UnitSystem};
 use std::fmt;
 
@@ -30,6 +32,54 @@ pub struct ReadCurve {
     pub notes: Vec<String>,
     /// The files that were read.
     pub files: Vec<ReadFile>,
+}
+
+impl ReadCurve {
+    /// The curve as it drives an interface, and what was changed for that. Of a record over time it is
+    /// the loading branch from where contact begins.
+    pub(super) fn driving(self) -> Result<(ForceCurve, Vec<String>), Error> {
+        let is_change = |note: &String| note.starts_with("points: ") || note.starts_with("sign: ");
+        let mut changes: Vec<String> =
+            self.notes.iter().filter(|n| is_change(n)).cloned().collect();
+        let (d, mut f) = (self.deflection_m, self.force_n);
+        let curve = match self.time_s {
+            None => Curve::new((0..d.len()).map(|i| i as f64).collect(), d, f)?,
+            Some(time_s) => {
+                let impulse: f64 = time_s
+                    .windows(2)
+                    .zip(f.windows(2))
+                    .map(|(t, f)| (t[1] - t[0]) * (f[0] + f[1]))
+                    .sum();
+                f.iter_mut().for_each(|f| *f *= impulse.signum());
+                let onset = onset(&time_s, &f, threshold_n(&f)).ok_or_else(|| {
+                    error!(CurveFile, "its force never rises: there is no contact in this record")
+                })?;
+                let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);
+                let rest = &d[first..];
+                let farthest = rest.iter().fold(0.0, |a: f64, v| {
+                    if (v - rest[0]).abs() > f64::abs(a) { v - rest[0] } else { a }
+                });
+                let deflection_m = rest.iter().map(|v| (v - rest[0]) * farthest.signum()).collect();
+                changes.push(format!(
+                    "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add takes all of it)",
+                    1e3 * time_s[first]
+                ));
+                changes.extend(onset.warnings);
+                Curve::new(time_s[first..].to_vec(), deflection_m, f[first..].to_vec())?
+            }
+        };
+        let envelope = loading_branch(&curve)?.envelope;
+        if let Some(point) = envelope.first_pulling_point() {
+            return Err(error!(
+                CurveFile,
+                "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and pull as 0"
+            ));
+        }
+        let known = self.facts.unloading_stiffness_n_per_m;
+        let stiffness = known.or_else(|| unloading_stiffness(&curve));
+        let unloading = CurveUnloading::of(stiffness);
+        Ok((ForceCurve { unloading, ..self.facts.driving(envelope) }, changes))
+    }
 }
 
 /// A file as it was read.

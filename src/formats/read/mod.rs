@@ -30,8 +30,9 @@ use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
-use crate::curve::ForceKind;
+use crate::curve::{ForceCurve, ForceKind};
 use crate::file;
+use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
 use columns::Columns;
 pub(crate) use curve::Metadata;
@@ -74,7 +75,7 @@ pub const READERS: &[Reader] = &[
         read: Read::Binary(mat::read),
     },
     Reader {
-        name: "json",
+        name: JSON,
         extensions: &["json"],
         description: "predicted curve (of crumple predict)",
         recognise: json::recognise,
@@ -157,6 +158,8 @@ pub struct ColumnNames {
     pub time: Option<String>,
 }
 
+/// The reader of predicted curves.
+const JSON: &str = "json";
 /// The reader that has columns to choose.
 const TABLES: &str = "csv";
 /// The table's times are not read.
@@ -269,6 +272,34 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static R
     }
     curve.files.splice(0..0, own);
     Ok((curve, reader))
+}
+
+/// A curve that can drive an interface, as its file has it.
+pub(crate) enum DrivingFile {
+    Predicted(Box<PredictedCurve>),
+    /// With what was changed to make it drive.
+    Curve(Box<ForceCurve>, Vec<String>),
+}
+
+/// Reads a file of any format as the curve of an interface. A plain table with a header is taken as
+/// it stands; of a record over time the loading branch drives.
+///
+/// # Errors
+/// As of [`read`], and if the curve cannot drive an interface.
+pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
+    let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
+    if (has("csv") || has("tsv"))
+        && options.units.is_none()
+        && let Ok(curve) = csv::driving(path)
+    {
+        return Ok(DrivingFile::Curve(Box::new(curve), Vec::new()));
+    }
+    let (curve, reader) = read(path, options)?;
+    if reader.name == JSON {
+        return json::predicted(path).map(|curve| DrivingFile::Predicted(Box::new(curve)));
+    }
+    let (curve, changes) = curve.driving().map_err(curve::content(path))?;
+    Ok(DrivingFile::Curve(Box::new(curve), changes))
 }
 
 /// The reader that was named, else the first that knows the content, else that of the extension.
