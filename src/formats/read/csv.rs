@@ -17,22 +17,21 @@ use crate::unit::UnitSystem;
 
 /// Reads a curve that drives an interface from a CSV file, as it stands: increasing deflections
 /// from 0, forces of 0 or above, no titles above the header. Which columns it takes and what of the
-/// `# key: value` lines: [`super`].
-pub(crate) fn driving(path: &Path) -> Result<ForceCurve, Error> {
+/// `# key: value` lines: [`super`]. An error of the points is about `points`.
+pub(super) fn driving(path: &Path) -> Result<ForceCurve, Error> {
     let (bytes, _) = open(path)?;
-    let read = || {
-        let text = decoded(&bytes).bytes;
-        let table = Table::read(&text, None, &ColumnNames::default(), Missing::OfColumn)?;
-        let envelope = Envelope::new(table.deflection_m, table.force_n)?;
-        match envelope.first_pulling_point() {
-            Some(point) => Err(error!(
-                CurveFile,
-                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
-            )),
-            None => Ok(table.facts.driving(envelope)),
-        }
-    };
-    read().map_err(curve::content(path))
+    let text = decoded(&bytes).bytes;
+    let table = Table::read(&text, None, &ColumnNames::default(), Missing::OfColumn)
+        .map_err(curve::content(path))?;
+    let of_points = |error| curve::content(path)(error).at_key("points");
+    let envelope = Envelope::new(table.deflection_m, table.force_n).map_err(of_points)?;
+    match envelope.first_pulling_point() {
+        Some(point) => Err(of_points(error!(
+            CurveFile,
+            "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+        ))),
+        None => Ok(table.facts.driving(envelope)),
+    }
 }
 
 /// Whether the extension says so, as that of no other tool's files does, or a header that names a

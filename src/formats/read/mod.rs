@@ -288,13 +288,13 @@ pub(crate) enum DrivingFile {
 /// As of [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
     let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
-    if (has("csv") || has("tsv"))
-        && options.units.is_none()
-        && let Ok(curve) = csv::driving(path)
-    {
-        return Ok(DrivingFile::Curve(Box::new(curve), Vec::new()));
-    }
-    let (curve, reader) = read(path, options)?;
+    let plain = ((has("csv") || has("tsv")) && options.units.is_none()).then(|| csv::driving(path));
+    let plain = match plain {
+        Some(Ok(curve)) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
+        Some(Err(error)) => Some(error).filter(|error| error.is_about("points")),
+        None => None,
+    };
+    let (curve, reader) = read(path, options).map_err(|error| plain.unwrap_or(error))?;
     if reader.name == JSON {
         return json::predicted(path).map(|curve| DrivingFile::Predicted(Box::new(curve)));
     }
