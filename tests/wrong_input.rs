@@ -142,6 +142,47 @@ fn a_second_writer_is_known_and_changes_nothing() {
     assert_eq!(fs::read(&path).unwrap(), before);
 }
 
+/// A database that another program writes, or whose writer has died, is named as that.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn a_database_in_use_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = build_fixture(here, "lead-car-wall");
+    fs::copy(&path, here.join("died.h5")).unwrap();
+    let died =
+        "import h5py, os\nf = h5py.File('died.h5', 'r+')\nf.attrs['x'] = 1\nf.flush()\nos._exit(0)";
+    assert!(python().args(["-c", died]).current_dir(here).status().unwrap().success());
+    let open =
+        "import h5py, sys\nf = h5py.File('curves.h5', 'r+')\nprint(flush=True)\nsys.stdin.read()";
+    let mut writer = python()
+        .args(["-c", open])
+        .current_dir(here)
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut is_open = [0];
+    std::io::Read::read_exact(writer.stdout.as_mut().unwrap(), &mut is_open).unwrap();
+    let study = fixture("fe/lead-car-pair/study.toml");
+    let study = study.to_str().unwrap();
+    for file in ["curves.h5", "died.h5"] {
+        for command in
+            [&["db", "ls", file][..], &["db", "check", file], &["build", study, "-o", file]]
+        {
+            let error = crumple_fails(here, 1, command);
+            assert!(
+                error.contains("another program has this HDF5 file open for writing"),
+                "{error}"
+            );
+            assert!(error.contains("h5clear -s") && !error.contains("::"), "{error}");
+        }
+    }
+    drop(writer.stdin.take());
+    assert!(writer.wait().unwrap().success());
+    crumple_ok(here, &["db", "ls", "curves.h5"]);
+}
+
 /// Flipped bits in a database: an error or a result, never a panic.
 #[test]
 fn damaged_databases_never_panic() {

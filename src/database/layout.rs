@@ -288,6 +288,7 @@ fn not_hdf5(path: &Path, detail: impl Display) -> Error {
 pub(crate) fn open(path: &Path) -> Result<Opened<'_>, Error> {
     let file = hdf5::open(path).map_err(|e| match e {
         OpenError::Io(source) => Error::io(path, source),
+        OpenError::InUse => error!(Locked, "{}: {e}", path.display()),
         other => not_hdf5(path, other),
     })?;
     Opened::of(path, file)

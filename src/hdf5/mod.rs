@@ -24,6 +24,11 @@ pub(crate) enum OpenError {
     /// It does not begin as HDF5 does.
     #[error("this is not an HDF5 file (its signature is missing)")]
     NoSignature,
+    /// A mark in it says that a program writes it, or its lock that one has it open.
+    #[error(
+        "another program has this HDF5 file open for writing, or ended without closing it: close that program, or clear the mark it has left (h5clear -s FILE, of the HDF5 tools)"
+    )]
+    InUse,
     /// It begins as HDF5 and cannot be read as such.
     #[error("this is not an HDF5 file ({detail})")]
     Damaged {
@@ -38,7 +43,10 @@ pub(crate) fn open(path: &Path) -> Result<File, OpenError> {
     if !hdf5_pure::is_hdf5(path)? {
         return Err(OpenError::NoSignature);
     }
-    File::open_streaming(path).map_err(|e| OpenError::Damaged { detail: e.to_string() })
+    File::open_streaming(path).map_err(|e| match e {
+        Error::FileMarkedInUse(_) | Error::FileLocked(_) => OpenError::InUse,
+        other => OpenError::Damaged { detail: other.to_string() },
+    })
 }
 
 /// Bytes of a dataset's values, at least as many as they take as doubles.
