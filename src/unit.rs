@@ -15,11 +15,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::error::{Error, error};
-use crate::guess;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, error};
+use crate::guess;
 
 /// Metres per second in one kilometre per hour.
 pub(crate) const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;

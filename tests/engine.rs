@@ -562,8 +562,8 @@ fn warnings_and_errors_name_the_interface() {
         let (deflection_m, time_s): (f64, f64) =
             (words[4].parse().unwrap(), words[7].parse().unwrap());
         // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.
-        assert!(deflection_m >= 0.2 && deflection_m < 0.212, "{method:?}: {deflection_m}");
-        assert!(time_s > 0.015 && time_s < 0.0165, "{method:?}: {time_s}");
+        assert!((0.2..0.212).contains(&deflection_m), "{method:?}: {deflection_m}");
+        assert!((0.015..0.0165).contains(&time_s), "{method:?}: {time_s}");
     }
 }
 

@@ -145,7 +145,7 @@ fn a_second_writer_is_known_and_changes_nothing() {
 /// A database that another program writes, or whose writer has died, is named as that.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
-fn a_database_in_use_is_named() {
+fn a_database_in_use_by_h5py_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let path = build_fixture(here, "lead-car-wall");

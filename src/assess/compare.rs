@@ -1,20 +1,18 @@
 //! Comparison of the methods at a speed that is left out: the curve of each in one multi-body
 //! model, against FE.
 
-use crate::error::{Error, ErrorCode, error};
-use crate::plural::counted;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::left_out::LeftOutCase;
-use super::left_out::NotLeftOut;
-use super::methods;
-use super::methods::ComparisonSettings;
+use super::left_out::{LeftOutCase, NotLeftOut};
+use super::methods::{self, ComparisonSettings};
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
 use crate::curve::Case;
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
+use crate::error::{Error, ErrorCode, error};
 use crate::nsdm::{self, Identifiability, Start};
+use crate::plural::counted;
 use crate::unit::{SpeedKind, km_per_h};
 
 /// Errors of every method at one left-out speed.

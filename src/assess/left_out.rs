@@ -1,12 +1,12 @@
 //! Left-out cases: one speed is dropped, predicted from the rest, run, and measured against FE.
 
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
+use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, Residuals};

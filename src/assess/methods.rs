@@ -1,19 +1,19 @@
 //! The methods that are compared: FE's own curves, FDRM, NSDM, DDTCM and the best model.
 
+use std::time::Instant;
+
 use super::left_out::{LeftOutCase, query_of, rebounding};
 use super::reference::Reference;
 use super::validate::choose_and_fit;
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
 use crate::error::Error;
-use crate::nsdm::Start;
-use crate::nsdm::{self, Target};
+use crate::nsdm::{self, Start, Target};
 use crate::plural::counted;
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
-use std::time::Instant;
 
 /// A method's curve at a left-out speed.
 pub(super) struct Method {

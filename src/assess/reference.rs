@@ -11,8 +11,7 @@ use crate::error::{Error, error};
 use crate::multibody::{
     Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, UnloadingChoice, simulate,
 };
-use crate::signal::resample::interpolate;
-use crate::signal::{derivative, l1_ratio};
+use crate::signal::{derivative, interpolate, l1_ratio};
 
 /// The comparison ends this long after FE's largest deflection, so that rebound counts.
 const AFTER_MAX_CRUSH_S: f64 = 0.030;
@@ -94,7 +93,7 @@ impl Reference {
         let output_interval_s = self.time_s[1] - self.time_s[0];
         // One output more than is compared, so that rounding cannot make it too short.
         let duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
-        Ok(simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?)
+        simulate(&chain, &RunSettings::new(duration_s, output_interval_s))
     }
 
     /// Errors of the one-mass run that a force curve gives.

@@ -1,13 +1,14 @@
 //! Rows: the motion that a method gives, rated against FE's.
 
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
 use crate::curve::ForceKind;
 use crate::error::Error;
-use schemars::JsonSchema;
-use serde::Serialize;
-use std::time::Instant;
-
 use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
 

@@ -5,8 +5,6 @@
 //! comparing structures of vehicles, and unfiltered beside it: above 100 Hz FE's body oscillates on its crush zone, which
 //! no curve over deflection can hold. FE's own curves in the same model stand beside them.
 
-use crate::error::Error;
-use crate::plural::counted;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -18,6 +16,8 @@ use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
+use crate::error::Error;
+use crate::plural::counted;
 use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Validation};

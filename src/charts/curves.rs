@@ -6,11 +6,9 @@ use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::{Error, error};
-use crate::plot::Chart;
-use crate::plot::{self, Axis, Mark, Panel, Series, Shown};
+use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
-use crate::surrogate::{ModelCase, PredictedCurve};
-use crate::surrogate::{Query, predict};
+use crate::surrogate::{ModelCase, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
 
 /// Axes of force over deflection.

@@ -21,15 +21,12 @@
 mod curves;
 mod histories;
 mod motion;
-mod train;
 
+use crate::unit::km_per_h;
 pub(crate) use curves::file_curve;
 pub use curves::{group_curves, left_out_at, prediction};
 pub use histories::{HistoryOptions, histories};
-pub use motion::{Motion, Quantity};
-pub use train::train_speeds;
-
-use crate::unit::km_per_h;
+pub use motion::{Motion, Quantity, train_speeds};
 
 /// A speed in km/h with at most one digit behind the point.
 fn speed(m_per_s: f64) -> String {

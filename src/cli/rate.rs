@@ -3,17 +3,16 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::arguments::one_of;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 use crate::error::Error;
 use crate::file;
 use crate::rating::deceleration::Deceleration;
+use crate::rating::differences::MagnitudePhase;
 use crate::rating::iso18571::Iso18571;
-use crate::rating::magnitude_phase::MagnitudePhase;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
 use crate::solver::{self, Selection, WantedId};
 use crate::unit::TIME;
-
-use super::arguments::one_of;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 
 /// Most bytes of a table that is rated: some million rows.
 const MAX_TABLE_BYTES: u64 = 256 << 20;

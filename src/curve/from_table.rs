@@ -8,11 +8,8 @@
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
 
-use crate::error::{Error, ErrorCode, error};
-use crate::plural::counted;
 use std::sync::Arc;
 
-use super::contact;
 use super::extract::{
     self, ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact,
 };
@@ -20,9 +17,13 @@ use super::recipe::{
     DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
 };
 use super::retrace::retrace;
-use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
+use super::{
+    Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, contact, energy, loading,
+};
+use crate::error::{Error, ErrorCode, error};
 use crate::history::{EntityId, History};
-use crate::signal::resample::interpolate;
+use crate::plural::counted;
+use crate::signal::interpolate;
 use crate::unit::{Speed, UnitSystem};
 
 /// Study of the cases that were added from files and not built of FE runs.

@@ -1,7 +1,6 @@
 //! Checking a database file: every dataset is read, and what is stored twice or follows from
 //! the curves is held against each other.
 
-use crate::error::Error;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -11,9 +10,10 @@ use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup
 use super::{group, listed};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
+use crate::error::Error;
 use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
-use crate::signal::resample::interpolate;
+use crate::signal::interpolate;
 
 /// Something to look at before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -2,7 +2,6 @@
 //! edited and, after it was read back and nothing of theirs is missing, renamed into place. So
 //! their links, types and attributes stay as they were encoded.
 
-use crate::error::{Error, error};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::path::Path;
@@ -12,6 +11,7 @@ use super::group::{self, GROUP_ATTRIBUTES};
 use super::layout::{self, CASE_ATTRIBUTES, Content, ORIGINAL, VERSION};
 use super::{CasePath, Database};
 use crate::curve::Case;
+use crate::error::{Error, error};
 use crate::file::write_by_path;
 use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Group};
 

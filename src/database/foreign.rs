@@ -1,12 +1,12 @@
 //! What others have put into a database file.
 
-use crate::error::Error;
 use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
 use super::CasePath;
 use super::group::GROUP_ATTRIBUTES;
 use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, FoundGroup, ORIGINAL, Opened, ROOT};
+use crate::error::Error;
 use crate::hdf5::{self, Dataset, Group};
 
 /// Something of others: what it is, and its path in the file.

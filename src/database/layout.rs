@@ -1,6 +1,5 @@
 //! Layout of the database file: `/group/case` with attributes and datasets.
 
-use crate::error::{Error, error};
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -14,6 +13,7 @@ use crate::curve::{
     Case, CaseId, Conditions, Curve, EnergyAudit, ForceKind, Masses, Provenance, Quality,
     RecordedCurves, SourceFile,
 };
+use crate::error::{Error, error};
 use crate::file;
 use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};

@@ -29,13 +29,13 @@ mod group;
 mod layout;
 pub(crate) mod names;
 
-use crate::error::{Error, error};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::path::Path;
 
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CaseId, Origin, StoppedMass};
+use crate::error::{Error, error};
 use crate::file::write_whole;
 
 /// The cases of one database file.

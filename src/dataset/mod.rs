@@ -1,6 +1,5 @@
 //! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
 
-use crate::error::{Error, error};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -14,6 +13,7 @@ use crate::curve::loading::loading_branch;
 use crate::curve::replicates::mean_of;
 use crate::curve::stopped_mass::{LoadingRun, StoppedMass};
 use crate::curve::{Case, Envelope, ForceKind, Masses, Parameter};
+use crate::error::{Error, error};
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
 /// One case as models see it: a run, or the mean of runs that differ in nothing.

@@ -1,6 +1,5 @@
 //! The forest: trees grown in parallel, predictions as their mean.
 
-use crate::error::{Error, error};
 use std::cmp::Ordering;
 
 use linfa::Float;
@@ -13,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use super::grow::{Table, grow};
 use super::members::Members;
 use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
-use super::tree::Tree;
-use super::walk::{BATCH, Rows, Walk, groups};
+use super::walk::{BATCH, Rows, Tree, Walk, groups};
+use crate::error::{Error, error};
 use crate::stream::Stream;
 
 /// A fitted regression forest.

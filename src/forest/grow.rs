@@ -14,10 +14,9 @@ use std::ops::Range;
 
 use linfa::Float;
 
-use super::criterion::{Sums, stops};
 use super::params::ForestValidParams;
-use super::splitter::{self, Drawn, Room, Rules};
-use super::tree::Tree;
+use super::splitter::{self, Drawn, Room, Rules, Sums, stops};
+use super::walk::Tree;
 use crate::stream::Stream;
 
 /// Training data by columns; shared by all trees.

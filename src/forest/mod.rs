@@ -19,25 +19,16 @@
 //! # Ok::<(), crumple::forest::ForestError>(())
 //! ```
 
-mod criterion;
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
 mod grow;
 mod members;
 mod onnx;
 mod params;
-mod quantiles;
 mod splitter;
-mod tree;
 mod walk;
 
-pub use forest::OutOfBag;
-pub use forest::RegressionForest;
+pub use forest::{OutOfBag, RegressionForest};
 pub(crate) use onnx::OnnxDescription;
-pub use params::FeaturesPerSplit;
-pub use params::ForestError;
-pub use params::ForestParams;
-pub use params::StopRule;
-pub use params::Thresholds;
-pub use params::Ties;
-pub use tree::Tree;
+pub use params::{FeaturesPerSplit, ForestError, ForestParams, StopRule, Thresholds, Ties};
+pub use walk::Tree;

@@ -1,10 +1,10 @@
 //! A forest as an ONNX model: one `TreeEnsembleRegressor` of `ai.onnx.ml`, opset 3.
 
-use crate::error::{Error, error};
 use std::iter::repeat_n;
 
 use super::forest::RegressionForest;
-use super::tree::Tree;
+use super::walk::Tree;
+use crate::error::{Error, error};
 
 /// What the model says of itself.
 #[derive(Clone, Copy, Debug)]

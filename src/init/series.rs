@@ -2,8 +2,7 @@
 
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::History;
-use crate::signal::resample::interpolate;
-use crate::signal::{derivative, integral};
+use crate::signal::{derivative, integral, interpolate};
 
 /// The states whose time is later than all before: printed times may repeat, restarts go back.
 pub(super) fn rising(time: &[f64]) -> Vec<usize> {

@@ -6,8 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::law::ForceLaw;
-use super::rates::Damping;
-use super::rates::{RateFactor, Stopping};
+use super::rates::{Damping, RateFactor, Stopping};
 use crate::error::{Error, KeyPath, error};
 
 /// One mass.

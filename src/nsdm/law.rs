@@ -1,9 +1,10 @@
 //! The law of the nonlinear spring-damper: two piecewise linear functions.
 
+use serde::{Deserialize, Serialize};
+
 use crate::curve::Envelope;
 use crate::error::{Error, error};
 use crate::piecewise;
-use serde::{Deserialize, Serialize};
 
 /// Largest difference between [`Nsdm::envelope`] and the spring, as a share of its peak.
 const ENVELOPE_ERROR: f64 = 1e-4;

@@ -24,7 +24,6 @@
 //! # Ok::<(), crumple::Error>(())
 //! ```
 
-mod genes;
 mod genetic;
 mod law;
 mod motion;
@@ -32,20 +31,17 @@ mod simplex;
 mod spread;
 mod start;
 
-use crate::error::{Error, error};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
-use genes::{Genes, Scales};
-pub use law::Nsdm;
-pub use law::PiecewiseLinear;
+use genetic::{Genes, Scales};
+pub use law::{Nsdm, PiecewiseLinear};
 pub use motion::Motion;
 use motion::Steps;
-pub use spread::Identifiability;
-pub use spread::LawSpread;
-pub use spread::Range;
+pub use spread::{Identifiability, LawSpread, Range};
 
 /// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
@@ -360,7 +356,7 @@ mod tests {
     /// A mass so light that some or all laws are too stiff for the steps.
     #[test]
     fn laws_that_diverge_are_penalised() {
-        let (light, stiff) = (target(10.0), [1.0; genes::VARIABLES]);
+        let (light, stiff) = (target(10.0), [1.0; genetic::VARIABLES]);
         let steps = Steps::new(&light.time_s).unwrap();
         assert_eq!(light.objective(&stiff, &steps, 1.0), PENALTY);
         let settings = FitSettings {
@@ -388,7 +384,7 @@ mod tests {
         let target =
             Target::new(2.0, 3.0, vec![0.0, 1e-9, 2e-9], vec![3.0, 3.0, 1.0], vec![0.0; 3])
                 .unwrap();
-        let mut genes = [0.0; genes::VARIABLES];
+        let mut genes = [0.0; genetic::VARIABLES];
         // All damping at a millionth of its range: 0.5 N s/m.
         genes[20..26].fill(1e-6);
         let steps = Steps::new(&target.time_s).unwrap();

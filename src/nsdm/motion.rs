@@ -216,7 +216,7 @@ struct State {
 #[cfg(test)]
 mod tests {
     use super::super::PiecewiseLinear;
-    use super::super::genes::{Genes, Scales};
+    use super::super::genetic::{Genes, Scales};
     use super::*;
     use crate::signal::l1_ratio;
     use crate::stream::Stream;

@@ -1,10 +1,10 @@
 //! How far fits of several seeds lie apart: whether their parameters mean anything.
 
-use crate::error::{Error, error};
 use serde::Serialize;
 
 use super::Fit;
 use super::law::PiecewiseLinear;
+use crate::error::{Error, error};
 
 /// Fewest fits that show a spread.
 const FEWEST: usize = 3;

@@ -2,9 +2,8 @@
 //!
 //! Bounded Gauss–Seidel on the normal equations. It makes the first population several times better, the last one little.
 
-use super::Target;
-use super::genes::{DAMPING_NODES, Genes, STIFFNESS_NODES, Scales};
-use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M};
+use super::genetic::{DAMPING_NODES, Genes, STIFFNESS_NODES, Scales};
+use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M, Target};
 
 const COLUMNS: usize = STIFFNESS_NODES + DAMPING_NODES;
 /// Rounds over all values; the start need not be exact, because the search goes on from it.
@@ -70,7 +69,7 @@ fn add_shares(row: &mut [f64], nodes: &[f64], u: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::genes::VARIABLES;
+    use super::super::genetic::VARIABLES;
     use super::*;
     use crate::stream::Stream;
 

@@ -3,7 +3,7 @@
 use super::chart::{Axis, Chart, Mark, Panel, Shown};
 use super::drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text};
 use super::ticks::{self, Ticks};
-use super::{clip, font, legend, thin};
+use super::{font, style, thin};
 
 /// Around the picture, in pixels.
 pub(super) const MARGIN: f64 = 12.0;
@@ -47,7 +47,7 @@ impl Chart {
         y = places.last().map_or(y, |last| last.area[3] + below_axes());
         let left = places.first().map_or(MARGIN, |p| p.area[0].min(0.2 * chart.width));
         let legend_top = y;
-        let (entries, end) = legend::draw(chart, left, legend_top);
+        let (entries, end) = draw_legend(chart, left, legend_top);
         shapes.extend(entries);
         y = end + 4.0;
         for note in &chart.notes {
@@ -183,7 +183,7 @@ fn draw_panel(
                     (x, low, place.place(band.x[i], band.high[i]).1)
                 })
                 .collect();
-        let edges = clip::band(&edges, place.area);
+        let edges = thin::band(&edges, place.area);
         let low = thin::thinned(&edges.iter().map(|e| (e.0, e.1)).collect::<Vec<_>>());
         let high = thin::thinned(&edges.iter().map(|e| (e.0, e.2)).collect::<Vec<_>>());
         let outline: Vec<(f64, f64)> = low.into_iter().chain(high.into_iter().rev()).collect();
@@ -191,7 +191,7 @@ fn draw_panel(
             lines: vec![outline],
             is_closed: true,
             stroke: None,
-            fill: Some((Paint::Series(band.look), legend::BAND)),
+            fill: Some((Paint::Series(band.look), BAND)),
             shows: Some(Shows::Band(number, k)),
         });
     }
@@ -263,17 +263,17 @@ fn draw_series(
     let shows = Some(Shows::Series(number, k));
     let points: Vec<(f64, f64)> =
         series.x.iter().zip(&series.y).map(|(&x, &y)| place.place(x, y)).collect();
-    let Some(stroke) = legend::stroke(series.look, series.shown) else {
-        let seen: Vec<_> = points.into_iter().filter(|p| clip::holds(place.area, *p)).collect();
-        shapes.push(legend::markers(series.look, &seen, shows));
+    let Some(stroke) = stroke(series.look, series.shown) else {
+        let seen: Vec<_> = points.into_iter().filter(|p| thin::holds(place.area, *p)).collect();
+        shapes.push(markers(series.look, &seen, shows));
         return;
     };
-    let parts = clip::line(&points, place.area);
+    let parts = thin::clipped_line(&points, place.area);
     let lines: Vec<Vec<(f64, f64)>> = parts.iter().map(|part| thin::thinned(part)).collect();
-    let markers = along(&lines, series.look);
+    let at = along(&lines, series.look);
     shapes.push(path(lines, stroke, shows));
-    if series.shown == Shown::Line && !markers.is_empty() {
-        shapes.push(legend::markers(series.look, &markers, shows));
+    if series.shown == Shown::Line && !at.is_empty() {
+        shapes.push(markers(series.look, &at, shows));
     }
 }
 
@@ -330,4 +330,135 @@ fn draw_marks(shapes: &mut Vec<Shape>, marks: &[Mark], place: &PanelPlace) {
             shapes.push(text(&word, (from, y + TICK), TICK, Paint::Faint, None));
         }
     }
+}
+
+/// Width of the sample beside a name, in pixels.
+const SAMPLE: f64 = 34.0;
+const GAP: f64 = 7.0;
+const COLUMN_GAP: f64 = 20.0;
+const ROW: f64 = 19.0;
+pub(super) const SIZE: f64 = 13.0;
+pub(super) const BAND: f64 = 0.22;
+
+#[derive(PartialEq)]
+struct Entry<'a> {
+    name: &'a str,
+    look: usize,
+    /// `None` for a band.
+    shown: Option<Shown>,
+}
+
+fn entries(chart: &Chart) -> Vec<Entry<'_>> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for panel in &chart.panels {
+        let series = panel.series.iter().map(|s| Entry {
+            name: &s.name,
+            look: s.look,
+            shown: Some(s.shown),
+        });
+        let bands = panel.bands.iter().map(|b| Entry { name: &b.name, look: b.look, shown: None });
+        for entry in series.chain(bands) {
+            if !entry.name.is_empty() && !entries.contains(&entry) {
+                entries.push(entry);
+            }
+        }
+    }
+    entries
+}
+
+/// The legend's shapes from a height downwards, and the height where it ends.
+fn draw_legend(chart: &Chart, left: f64, top: f64) -> (Vec<Shape>, f64) {
+    let entries = entries(chart);
+    let room = chart.width - left - super::layout::MARGIN;
+    let most = (room - SAMPLE - GAP).max(1.0);
+    let names: Vec<String> = entries.iter().map(|e| font::fitted(e.name, SIZE, most)).collect();
+    let (rows, lefts) = columns(&names, room);
+    let mut shapes = Vec::new();
+    for (k, (entry, name)) in entries.iter().zip(names).enumerate() {
+        let (x, y) = (left + lefts[k / rows], top + ROW * ((k % rows) as f64 + 0.5));
+        shapes.extend(sample(entry, x, y));
+        shapes.push(Shape::Text(Text {
+            text: name,
+            x: x + SAMPLE + GAP,
+            y: y + 0.35 * SIZE,
+            size: SIZE,
+            is_upright: false,
+            paint: Paint::Ink,
+            shows: Some(Shows::Legend),
+        }));
+    }
+    (shapes, top + ROW * rows as f64)
+}
+
+/// How many rows the names need, and where the columns begin: as many columns as the room takes.
+fn columns(names: &[String], room: f64) -> (usize, Vec<f64>) {
+    let width = |name: &String| SAMPLE + GAP + font::width(name, SIZE) + COLUMN_GAP;
+    for rows in 1..=names.len() {
+        let mut lefts = vec![0.0];
+        for column in names.chunks(rows) {
+            let widest = column.iter().map(width).fold(0.0, f64::max);
+            lefts.push(lefts[lefts.len() - 1] + widest);
+        }
+        if lefts[lefts.len() - 1] <= room + COLUMN_GAP {
+            return (rows, lefts);
+        }
+    }
+    (names.len().max(1), vec![0.0; 2])
+}
+
+/// A short piece of what the entry names.
+fn sample(entry: &Entry, x: f64, y: f64) -> Vec<Shape> {
+    let shows = Some(Shows::Legend);
+    let Some(shown) = entry.shown else {
+        let corners =
+            vec![(x, y - 6.0), (x + SAMPLE, y - 6.0), (x + SAMPLE, y + 6.0), (x, y + 6.0)];
+        let fill = Some((Paint::Series(entry.look), BAND));
+        return vec![Shape::Path {
+            lines: vec![corners],
+            is_closed: true,
+            stroke: None,
+            fill,
+            shows,
+        }];
+    };
+    let mut shapes = Vec::new();
+    if let Some(stroke) = stroke(entry.look, shown) {
+        let lines = vec![vec![(x, y), (x + SAMPLE, y)]];
+        shapes.push(Shape::Path {
+            lines,
+            is_closed: false,
+            stroke: Some(stroke),
+            fill: None,
+            shows,
+        });
+    }
+    if shown != Shown::Emphasis {
+        shapes.push(markers(entry.look, &[(x + 0.5 * SAMPLE, y)], shows));
+    }
+    shapes
+}
+
+/// The line of a look; none where only points are shown.
+pub(super) fn stroke(look: usize, shown: Shown) -> Option<Stroke> {
+    let width = match shown {
+        Shown::Line => 1.5,
+        Shown::Emphasis => 3.0,
+        Shown::Points => return None,
+    };
+    Some(Stroke { paint: Paint::Series(look), width, dash: style::dash(look).to_vec() })
+}
+
+/// Markers of a look at some places.
+pub(super) fn markers(look: usize, places: &[(f64, f64)], shows: Option<Shows>) -> Shape {
+    let paint = Paint::Series(look);
+    let mut lines = Vec::new();
+    let mut is_closed = false;
+    for place in places {
+        let (outline, closed) = style::outline(style::marker(look), *place);
+        lines.extend(outline);
+        is_closed = closed;
+    }
+    let stroke = Some(Stroke { paint, width: 1.4, dash: Vec::new() });
+    let fill = is_closed.then_some((paint, 1.0));
+    Shape::Path { lines, is_closed, stroke, fill, shows }
 }

@@ -15,32 +15,16 @@
 //! ```
 
 mod chart;
-mod clip;
 mod drawing;
 mod font;
 mod layout;
-mod legend;
-mod look;
 mod png;
+mod style;
 mod svg;
 mod thin;
 mod ticks;
 
-pub use chart::Axis;
-pub use chart::Band;
-pub use chart::Chart;
-pub use chart::Mark;
-pub use chart::Panel;
-pub use chart::Series;
-pub use chart::Shown;
-pub use drawing::Drawing;
-pub use drawing::PanelPlace;
-pub use drawing::Shape;
-pub use drawing::Shows;
-pub use drawing::Stroke;
+pub use chart::{Axis, Band, Chart, Mark, Panel, Series, Shown};
+pub use drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text, TextBox};
+pub(crate) use style::looks_for_pages;
 pub use svg::SvgFor;
-
-pub use drawing::Paint;
-pub use drawing::Text;
-pub use drawing::TextBox;
-pub(crate) use look::looks_for_pages;

@@ -1,6 +1,5 @@
 //! A drawing as PNG.
 
-use crate::error::{Error, error};
 use tiny_skia::{
     Color, FillRule, LineJoin, Paint as Ink, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
@@ -8,6 +7,7 @@ use tiny_skia::{
 use super::drawing::{Drawing, Paint, Shape, Stroke, Text};
 use super::font::{self, Piece};
 use super::svg::colour;
+use crate::error::{Error, error};
 
 /// Most pixels each way: 400 MB of memory.
 const MOST: u32 = 10_000;

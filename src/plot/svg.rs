@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::drawing::{Drawing, Paint, Shape, Shows, Stroke, Text};
 use super::font::{self, Piece};
-use super::look;
+use super::style;
 
 /// Size of texts that say no other, in pixels: that of the numbers at ticks.
 const SIZE: f64 = 12.0;
@@ -144,7 +144,7 @@ pub(super) fn colour(paint: Paint) -> &'static str {
         Paint::Ink => "#222222",
         Paint::Faint => "#595959",
         Paint::Grid => "#dddddd",
-        Paint::Series(look) => look::colour(look),
+        Paint::Series(look) => style::colour(look),
     }
 }
 

@@ -6,8 +6,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::corridor::corridor;
-use super::iso18571::MOST_SAMPLES;
+use super::iso18571::{MOST_SAMPLES, corridor};
 use super::shift::{best, plain};
 
 /// Exponent K_V of the progression.

@@ -1,11 +1,10 @@
-//! ISO/TS 18571:2014: objective rating metric of two signals that are not ambiguous.
+//! ISO/TS 18571:2014: objective rating metric of two signals that are not ambiguous, with its
+//! corridor and dynamic time warping.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::corridor::corridor;
 use super::shift::{best, centred};
-use super::warping;
 use crate::signal::derivative;
 
 /// Largest phase error that has a score, as a share of the samples; nothing is shifted further.
@@ -120,7 +119,7 @@ fn score(error: f64, largest: f64) -> f64 {
 
 /// Relative difference along the path on which the two belong together.
 fn magnitude_error(reference: &[f64], prediction: &[f64]) -> f64 {
-    let path = warping::path(prediction, reference, reference.len().div_ceil(WINDOW));
+    let path = warping_path(prediction, reference, reference.len().div_ceil(WINDOW));
     relative(path.into_iter().map(|(p, r)| (reference[r], prediction[p])))
 }
 
@@ -151,6 +150,89 @@ fn smoothed(values: &[f64]) -> Vec<f64> {
             around.iter().sum::<f64>() / around.len() as f64
         })
         .collect()
+}
+
+/// Half width of the inner corridor, as a share of the reference's largest magnitude.
+const INNER: f64 = 0.05;
+/// Half width of the outer corridor.
+const OUTER: f64 = 0.5;
+/// Exponent between the two.
+const EXPONENT: i32 = 2;
+
+/// Mean over the samples of 1 inside the inner corridor, 0 outside the outer one, and
+/// `((b − |p − r|)/(b − a))²` between them. ISO/TS 18571:2014 and CORA have the same.
+///
+/// Equal lengths, at least one. 0 to 1. Of a reference that is zero throughout the corridors
+/// have no width: samples that are zero as well count 1.
+pub(crate) fn corridor(reference: &[f64], prediction: &[f64]) -> f64 {
+    let scale = reference.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    let (inner, outer) = (INNER * scale, OUTER * scale);
+    let score = |(r, p): (&f64, &f64)| {
+        let distance = (p - r).abs();
+        if distance < inner || distance == 0.0 {
+            1.0
+        } else if distance > outer || outer == 0.0 {
+            0.0
+        } else {
+            ((outer - distance) / (outer - inner)).powi(EXPONENT)
+        }
+    };
+    reference.iter().zip(prediction).map(score).sum::<f64>() / reference.len() as f64
+}
+
+/// Which cell a path comes from.
+const FROM_FIRST: u8 = 0;
+const FROM_SECOND: u8 = 1;
+const FROM_BOTH: u8 = 2;
+
+/// The path of pairs `(index of first, index of second)` with the smallest sum of squared
+/// distances from the first samples to the last, in steps (1,0), (0,1), (1,1).
+///
+/// Equal lengths, at least one; pairs lie less than `window` samples apart (at least one).
+/// Of equal sums the step that stands first above is taken. Needs one byte for each cell of
+/// the window: `n (2 window − 1)`.
+pub(crate) fn warping_path(first: &[f64], second: &[f64], window: usize) -> Vec<(usize, usize)> {
+    let n = first.len();
+    let reach = window - 1;
+    let width = 2 * reach + 1;
+    // Cell (i, j) stands at j + reach − i of row i.
+    let mut from = vec![FROM_BOTH; n * width];
+    // The row above, and the row in work: sums, infinite outside of the window.
+    let mut above = vec![f64::INFINITY; width + 1];
+    let mut row = vec![f64::INFINITY; width + 1];
+    for i in 0..n {
+        row.fill(f64::INFINITY);
+        let within = i.saturating_sub(reach)..(i + reach + 1).min(n);
+        for (j, other) in within.clone().zip(&second[within]) {
+            let cell = j + reach - i;
+            let distance = first[i] - other;
+            let left = if cell > 0 { row[cell - 1] } else { f64::INFINITY };
+            // One row up the same j stands one further to the right.
+            let before = [above[cell + 1], left, above[cell]];
+            let mut least = 0;
+            for step in 1..3 {
+                if before[step] < before[least] {
+                    least = step;
+                }
+            }
+            let sum = if (i, j) == (0, 0) { 0.0 } else { before[least] };
+            row[cell] = sum + distance * distance;
+            from[i * width + cell] = [FROM_FIRST, FROM_SECOND, FROM_BOTH][least];
+        }
+        std::mem::swap(&mut above, &mut row);
+    }
+    let (mut i, mut j) = (n - 1, n - 1);
+    let mut path = vec![(i, j)];
+    while (i, j) != (0, 0) {
+        match from[i * width + j + reach - i] {
+            FROM_FIRST => i -= 1,
+            FROM_SECOND => j -= 1,
+            _ => (i, j) = (i - 1, j - 1),
+        }
+        path.push((i, j));
+    }
+    path.reverse();
+    path
 }
 
 #[cfg(test)]
@@ -230,5 +312,69 @@ mod tests {
         assert_eq!(iso18571(&zero, &zero, INTERVAL_S).unwrap().rating, 1.0);
         // Against zeros only phase and slope cannot be wrong.
         assert_eq!(iso18571(&zero, &one, INTERVAL_S).unwrap().rating, 0.4);
+    }
+}
+
+#[cfg(test)]
+mod corridor_tests {
+    use super::*;
+
+    #[test]
+    fn corridor_by_hand() {
+        // Distances of 0.2, 2.75, 5 and 6 in a signal of 10: inside, half way, edge, outside.
+        let score = corridor(&[10.0, 0.0, 0.0, 0.0], &[10.2, 2.75, 5.0, -6.0]);
+        assert!((score - (1.0 + 0.25 + 0.0 + 0.0) / 4.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_reference_of_zeros_has_a_corridor_without_width() {
+        assert_eq!(corridor(&[0.0, 0.0], &[0.0, 1e-9]), 0.5);
+    }
+}
+
+#[cfg(test)]
+mod warping_tests {
+    use super::*;
+
+    #[test]
+    fn path_by_hand() {
+        // The peak is one sample late: 0-0, 0-1, 1-2, 2-3, 3-3.
+        let path = warping_path(&[0.0, 5.0, 1.0, 1.0], &[0.0, 0.0, 5.0, 1.0], 4);
+        assert_eq!(path, [(0, 0), (0, 1), (1, 2), (2, 3), (3, 3)]);
+    }
+
+    #[test]
+    fn a_window_of_one_is_the_diagonal() {
+        let path = warping_path(&[0.0, 5.0, 1.0], &[5.0, 1.0, 0.0], 1);
+        assert_eq!(path, [(0, 0), (1, 1), (2, 2)]);
+    }
+
+    #[test]
+    fn no_path_within_the_window_is_shorter() {
+        /// Smallest sum from the first cell to (i, j), by trying all paths.
+        fn least(a: &[f64], b: &[f64], i: usize, j: usize, window: usize) -> f64 {
+            if i.abs_diff(j) >= window {
+                return f64::INFINITY;
+            }
+            let own = (a[i] - b[j]).powi(2);
+            let mut before = f64::INFINITY;
+            if i > 0 {
+                before = before.min(least(a, b, i - 1, j, window));
+            }
+            if j > 0 {
+                before = before.min(least(a, b, i, j - 1, window));
+            }
+            if i > 0 && j > 0 {
+                before = before.min(least(a, b, i - 1, j - 1, window));
+            }
+            own + if (i, j) == (0, 0) { 0.0 } else { before }
+        }
+        let a = [0.0, 3.0, 1.0, 4.0, 1.0, 5.0, 9.0];
+        let b = [2.0, 6.0, 5.0, 3.0, 5.0, 8.0, 9.0];
+        for window in 1..=7 {
+            let sum: f64 =
+                warping_path(&a, &b, window).iter().map(|&(i, j)| (a[i] - b[j]).powi(2)).sum();
+            assert_eq!(sum, least(&a, &b, 6, 6, window), "window {window}");
+        }
     }
 }

@@ -26,32 +26,28 @@
 //! ```
 
 pub(crate) mod cora;
-pub(crate) mod corridor;
 pub(crate) mod deceleration;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
-pub(crate) mod magnitude_phase;
 pub(crate) mod shift;
 mod signal;
 pub(crate) mod table;
-pub(crate) mod warping;
 
-use crate::error::Error;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::error::Error;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
 pub use cora::Cora;
 use cora::cora;
 pub use deceleration::Deceleration;
-pub use differences::MaxAbs;
-pub use differences::Pointwise;
-use differences::{integral_error, max_abs, peak_norm, pointwise, rms_ratio};
+pub use differences::{MagnitudePhase, MaxAbs, Pointwise};
+use differences::{
+    integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
+};
 use iso18571::iso18571;
 pub use iso18571::{Grade, Iso18571};
-pub use magnitude_phase::MagnitudePhase;
-use magnitude_phase::{russell, sprague_geers};
 pub use signal::Signal;
 pub(crate) use signal::{INTERVAL_S, Pair};
 

@@ -1,9 +1,7 @@
 //! Signals: checked values over time, brought to common times.
 
 use crate::error::{Error, error};
-use crate::signal::CfcError;
-use crate::signal::cfc;
-use crate::signal::resample::interpolate;
+use crate::signal::{CfcError, cfc, interpolate};
 
 /// Interval of ISO/TS 18571: 10 kHz.
 pub(crate) const INTERVAL_S: f64 = 1e-4;

@@ -1,9 +1,9 @@
 //! Tables: a signal from a CSV file with a header line, whose first column is the time.
 
-use crate::error::{Error, ErrorCode, error};
-use crate::guess;
 use std::io::Read;
 
+use crate::error::{Error, ErrorCode, error};
+use crate::guess;
 use crate::table::{CsvTable, NoNumber};
 
 /// Columns of a table that hold a signal: its times as they stand, and its values.

@@ -9,14 +9,14 @@ mod group;
 mod page;
 mod train;
 
-use crate::error::Error;
 use std::path::{Path, PathBuf};
 
-use figure::Figure;
 use serde::Serialize;
 
 use crate::database::Database;
+use crate::error::Error;
 use crate::surrogate::Model;
+use figure::Figure;
 
 /// What a report is about.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! The page: content into the template.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
@@ -9,7 +10,6 @@ use super::figure::Figure;
 use super::{Content, Part};
 use crate::plot::looks_for_pages;
 use crate::unit::Shown;
-use std::path::Path;
 
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");

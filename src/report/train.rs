@@ -1,6 +1,5 @@
 //! What the report says of a scenario: motion, crush and energy of its run, and FE's train beside it.
 
-use crate::error::Error;
 use std::path::Path;
 
 use super::figure::Figure;
@@ -9,6 +8,7 @@ use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Sectio
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
 use crate::charts::{Motion, Quantity, train_speeds};
+use crate::error::Error;
 use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::scenario::{self, Prepared};
 use crate::unit::km_per_h;

@@ -5,8 +5,9 @@ use std::collections::HashSet;
 use std::ops::Deref;
 
 use super::layout::layout;
-use super::place;
-use super::{CrushZone, CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable};
+use super::{
+    CrushZone, CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable, place,
+};
 use crate::error::{Document, Error, KeyPath, error};
 use crate::unit::km_per_h;
 

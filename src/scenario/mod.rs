@@ -40,17 +40,16 @@ mod tables;
 
 use std::path::Path;
 
-pub(crate) use assemble::{PLATES, adjust};
-pub use check::CheckedScenario;
-pub(crate) use local::assemble;
-pub(crate) use sources::{CurveSource, Sources};
-pub(crate) use tables::*;
-
 use crate::error::{Document, Error, Place};
 use crate::manifest;
 use crate::multibody::{Chain, Run, RunSettings, simulate};
+pub(crate) use assemble::{PLATES, adjust};
+pub use check::CheckedScenario;
+pub(crate) use local::assemble;
 use place::Origin;
+pub(crate) use sources::{CurveSource, Sources};
 pub use tables::Scenario;
+pub(crate) use tables::*;
 
 /// A scenario ready to run.
 #[derive(Clone, Debug)]

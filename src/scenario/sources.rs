@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::place;
-use super::{CheckedScenario, CurveTable, Scenario, StageTable};
+use super::{CheckedScenario, CurveTable, Scenario, StageTable, place};
 use crate::curve::{Case, Envelope, ForceCurve};
 use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};

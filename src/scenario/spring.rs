@@ -6,9 +6,8 @@ use crate::curve::force_curve::ForceCurveError;
 use crate::curve::{ForceCurve, ForceKind};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{ForceLaw, UnloadingChoice};
-use crate::surrogate::invalid;
 use crate::surrogate::predict::predict_driving;
-use crate::surrogate::{Model, PredictedCurve, Query, Warning};
+use crate::surrogate::{Model, PredictedCurve, Query, Warning, invalid};
 
 /// The curve at one interface, with its warnings.
 pub(super) struct Spring {

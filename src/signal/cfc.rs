@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use super::resample::interpolate;
+use super::interpolate;
 
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,19 +1,19 @@
 //! The journal of a run: CSV beside the output, taken up again where it ends, renamed or
 //! converted when it is complete.
 
-use crate::error::Error;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use super::merge::{ShardFile, read_line};
 use super::row::ShardHeader;
 use super::run::{self, Chunk};
-use super::shard_file::{ShardFile, read_line};
-use super::tally::Tally;
+use super::statistics::Tally;
 use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, Sweep, foreign};
+use crate::error::Error;
 use crate::file::{WriterLock, not_written};
 
 /// How a sweep is written.

@@ -3,9 +3,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::merge::ShardFile;
 use super::row::{FORMAT, LAYOUT, Line, ShardHeader, Status, bad_row};
-use super::shard_file::ShardFile;
-use super::tally::Tally;
+use super::statistics::Tally;
 use super::{Shard, damaged, foreign};
 use crate::error::{Error, ErrorCode};
 use crate::hdf5::table::{Attribute, Column, Put, Table, Values, write_table};

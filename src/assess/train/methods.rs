@@ -1,17 +1,16 @@
 //! The methods in a train: what each makes of the scenario and its sources.
 
-use crate::error::{Error, KeyPath, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
 use crate::assess::choose::Purpose;
-use crate::assess::methods::ComparisonSettings;
-use crate::assess::methods::{ddtcm_model, fit_nsdm};
+use crate::assess::methods::{ComparisonSettings, ddtcm_model, fit_nsdm};
 use crate::assess::validate::{self, Choice};
 use crate::curve::{Case, ForceCurve};
 use crate::database::Database;
 use crate::dataset::TrainingSet;
+use crate::error::{Error, KeyPath, error};
 use crate::multibody::EnvelopeEnd;
 use crate::scenario::{
     CrushZoneTable, CurveSource, CurveTable, DampingTable, InterfaceSpeed, LawName, Scenario,

@@ -1,18 +1,16 @@
 //! One method in a train: its run, held against FE's.
 
-use crate::error::{Error, KeyPath, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use super::fe::FeTrain;
 use super::methods::Method;
-use super::{InterfaceCrush, TrainRow, VehicleErrors};
+use super::{FeTrain, InterfaceCrush, TrainRow, VehicleErrors};
 use crate::curve::body::filtered;
+use crate::error::{Error, KeyPath, error};
 use crate::multibody::{Chain, Run, simulate};
 use crate::scenario;
-use crate::signal::resample::interpolate;
-use crate::signal::{derivative, integral, l1_ratio};
+use crate::signal::{derivative, integral, interpolate, l1_ratio};
 
 /// Runs a method's scenario and compares the vehicles with FE's at `time_s`, the first times of
 /// FE's run.

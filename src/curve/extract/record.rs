@@ -1,17 +1,14 @@
 //! Motion and force of a run in SI, at common times.
 
-use super::error::ExtractError;
-use super::error::Origin;
-use super::input::Setup;
-use super::input::{Measured, MeasuredForce};
+use super::error::{ExtractError, Origin};
+use super::input::{Measured, MeasuredForce, Setup};
 use super::remarks::Notes;
 use crate::curve::Curve;
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
 use crate::history::History;
 use crate::plural::counted;
-use crate::signal::derivative;
-use crate::signal::resample::interpolate;
+use crate::signal::{derivative, interpolate};
 use crate::unit::UnitSystem;
 
 /// Times of two files count as equal up to the six digits that solvers print.

@@ -5,20 +5,19 @@
 //! reference channel, or without any, times are the time of the first sample and multiples of the interval, in s;
 //! with an explicit one they are the values of the channel that `Reference channel name` says.
 
-use crate::error::{Error, error};
-use crate::guess;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, MAX_POINTS, Places};
-use super::curve::{Metadata, ReadFile, title};
-use super::curve::{Place, shown};
+use super::curve::{Metadata, Place, ReadFile, shown, title};
 use super::encoding::decoded;
 use super::label::Quantity;
 use super::text::{lines, number};
 use super::{Input, MAX_CURVE_BYTES};
+use crate::error::{Error, error};
 use crate::file;
-use crate::signal::resample::interpolate;
+use crate::guess;
+use crate::signal::interpolate;
 
 /// Files of a folder that are looked at: a test has some hundred channels.
 const MOST_FILES: usize = 1_000;
