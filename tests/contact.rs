@@ -108,7 +108,8 @@ impl Run {
             contact: recipe.contact.as_ref().map(|_| &self.force),
         };
         let setup = Setup {
-            recipe: &recipe,
+            filter: recipe.filter,
+            sampling: recipe.sampling,
             kind: SpeedKind::Wall,
             half_model: false,
             masses: Masses { body_kg: 24e3, other_kg: None },

@@ -8,58 +8,16 @@
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
 
-use std::sync::Arc;
-
-use super::extract::{
-    self, ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact,
-};
-use super::recipe::{
-    DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, Sampling,
-};
-use super::retrace::retrace;
-use super::{
-    Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, contact, energy, loading,
-};
+use super::extract::{self, ExtractError, Extracted, Record, Setup, Stated, StatedContact};
+use super::recipe::{Filter, Sampling};
+use super::retrace::{Impact, Table, retrace};
+use super::{Curve, EnergyAudit, Quality, RecordedCurves, contact, energy, loading};
 use crate::error::{Error, ErrorCode, error};
-use crate::history::{EntityId, History};
 use crate::plural::counted;
 use crate::signal::interpolate;
-use crate::unit::{Speed, UnitSystem};
 
 /// Study of the cases that were added from files and not built of FE runs.
 pub(crate) const IMPORTED: &str = "imported";
-
-/// A table of force over deflection.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Table<'a> {
-    /// In m. Without times: from 0 to the largest, then falling if it holds the unloading.
-    pub deflection_m: &'a [f64],
-    /// In N, one per deflection.
-    pub force_n: &'a [f64],
-    /// In s, one per deflection.
-    pub time_s: Option<&'a [f64]>,
-    /// In N, one per deflection: the force that moves the body, where that is another.
-    pub body_force_n: Option<&'a [f64]>,
-}
-
-/// The impact that a table belongs to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Impact {
-    /// Which force the table holds.
-    pub force_kind: ForceKind,
-    /// Speed at contact.
-    pub speed: Speed,
-    /// Of the body, or of both bodies.
-    pub masses: Masses,
-    /// From the largest deflection, in N/m, if it is known.
-    pub unloading_stiffness_n_per_m: Option<f64>,
-    /// The same of the force that moves the body, where that is another.
-    pub body_unloading_stiffness_n_per_m: Option<f64>,
-    /// Units that the table's values were read in, to tell what was mistaken.
-    pub units: UnitSystem,
-    /// Take the table whatever its energy says.
-    pub accept_energy: bool,
-}
 
 fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     let (found, cause) = (impossible.found(), impossible.cause_in_file());
@@ -186,33 +144,14 @@ fn recorded(
     time_s: &[f64],
     impact: &Impact,
 ) -> Result<(RecordedCurves, Quality), Error> {
-    let recipe = recipe();
     let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
-    // In the units that were given, so that a mistaken unit is found as in a build.
-    let units = impact.units;
-    let history = |component: &str, values: &[f64], size: f64| History {
-        entity: Some(EntityId::new(1)),
-        component: component.into(),
-        time: time_s.iter().map(|t| t / units.time_s).collect::<Arc<[f64]>>(),
-        values: values.iter().map(|v| v / size).collect(),
-    };
-    let deflection = history("x_displacement", table.deflection_m, units.length_m);
-    let force = history("x_force", table.force_n, units.force());
     let contact = begins_in_contact(time_s, table.force_n).then(|| {
         notes.push("contact: the record begins with it".into());
         StatedContact::Time { s: time_s[0] }
     });
-    let measured = Measured {
-        units,
-        displacement: &deflection,
-        minus_displacement: None,
-        velocity: None,
-        minus_velocity: None,
-        force: MeasuredForce::Contact(&force),
-        contact: None,
-    };
     let setup = Setup {
-        recipe: &recipe,
+        filter: Filter::None,
+        sampling: Sampling::default(),
         kind: impact.speed.kind,
         half_model: false,
         masses: impact.masses,
@@ -222,7 +161,9 @@ fn recorded(
         others: &[],
     };
     let Extracted { curves, quality, .. } =
-        extract::extract(&measured, &setup).map_err(of_table)?;
+        Record::of_columns(time_s, table.deflection_m, table.force_n, impact.units)
+            .and_then(|(record, remarks)| extract::curve_of(record, remarks, &setup))
+            .map_err(of_table)?;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
     let (of_unloading, mut warnings) = remarks(&curves, impact)?;
     warnings.splice(0..0, quality.warnings);
@@ -289,31 +230,11 @@ fn begins_in_contact(time_s: &[f64], force_n: &[f64]) -> bool {
     positive.iter().take(2).any(|f| *f > threshold_n)
 }
 
-/// What an extraction needs to know beside the histories.
-fn recipe() -> Recipe {
-    Recipe {
-        deflection: DeflectionSource {
-            file: String::new(),
-            node: 1,
-            minus_node: None,
-            component: DisplacementComponent::XDisplacement,
-        },
-        force: ForceSource::Contact {
-            file: String::new(),
-            id: 1,
-            side: None,
-            component: "x_force".into(),
-        },
-        contact: None,
-        filter: Filter::None,
-        sampling: Sampling::default(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::unit::SpeedKind;
+    use crate::curve::{ForceKind, Masses};
+    use crate::unit::{Speed, SpeedKind, UnitSystem};
 
     fn impact(v: f64, m: f64) -> Impact {
         Impact {

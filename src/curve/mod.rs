@@ -15,32 +15,25 @@ pub(crate) mod replicates;
 pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
 
-use crate::error::{Error, error};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, error};
 use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
-pub use energy::ImpossibleRun;
-pub use energy::audit;
+pub use energy::{ImpossibleRun, audit};
 pub use envelope::Envelope;
-pub use extract::input::DeckSpeed;
-pub use extract::input::StatedContact;
+pub use extract::input::{DeckSpeed, StatedContact};
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
-pub use force_curve::CurveUnloading;
-pub use force_curve::ForceCurve;
-pub use from_table::{Impact, Table, from_table};
-pub use loading::Loading;
-pub use loading::unloading_stiffness;
-pub use recipe::DeflectionSource;
-pub use recipe::DisplacementComponent;
-pub use recipe::Filter;
-pub use recipe::ForceSource;
-pub use recipe::Sampling;
-pub use recipe::{Recipe, RecordedMotion};
-use std::collections::BTreeSet;
+pub use force_curve::{CurveUnloading, ForceCurve};
+pub use from_table::from_table;
+pub use loading::{Loading, unloading_stiffness};
+pub use recipe::{
+    DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, RecordedMotion, Sampling,
+};
+pub use retrace::{Impact, Table};
 pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.

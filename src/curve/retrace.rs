@@ -4,8 +4,41 @@
 //! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
 //! stands still.
 
-use super::from_table::{Impact, Table};
+use super::{ForceKind, Masses};
 use crate::error::{Error, error};
+use crate::unit::{Speed, UnitSystem};
+
+/// A table of force over deflection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table<'a> {
+    /// In m. Without times: from 0 to the largest, then falling if it holds the unloading.
+    pub deflection_m: &'a [f64],
+    /// In N, one per deflection.
+    pub force_n: &'a [f64],
+    /// In s, one per deflection.
+    pub time_s: Option<&'a [f64]>,
+    /// In N, one per deflection: the force that moves the body, where that is another.
+    pub body_force_n: Option<&'a [f64]>,
+}
+
+/// The impact that a table belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Which force the table holds.
+    pub force_kind: ForceKind,
+    /// Speed at contact.
+    pub speed: Speed,
+    /// Of the body, or of both bodies.
+    pub masses: Masses,
+    /// From the largest deflection, in N/m, if it is known.
+    pub unloading_stiffness_n_per_m: Option<f64>,
+    /// The same of the force that moves the body, where that is another.
+    pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Units that the table's values were read in, to tell what was mistaken.
+    pub units: UnitSystem,
+    /// Take the table whatever its energy says.
+    pub accept_energy: bool,
+}
 
 /// The error of a force so small somewhere that the body hardly moves.
 pub(super) fn endless() -> Error {
@@ -35,7 +68,7 @@ const FINER: f64 = 8.0;
 /// The longest of a slow motion's steps is this share of its time.
 const STEPS: f64 = 20_000.0;
 /// Most states beside the points of the table.
-const MOST_STATES: usize = 200_000;
+const MAX_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
 /// Nor than this share of the largest deflection: states closer than a millionth of it are none of a
@@ -51,7 +84,7 @@ pub(super) fn retrace(
     let (d, f) = (table.deflection_m, table.force_n);
     let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
     let moving = table.body_force_n.unwrap_or(f);
-    let loading = Path { d: &d[..=end], f: &f[..=end], moving: &moving[..=end] };
+    let loading = Branch { d: &d[..=end], f: &f[..=end], moving: &moving[..=end] };
     let work = loading.work();
     if moving[end] <= 0.0 || f[end] <= 0.0 {
         let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
@@ -64,42 +97,42 @@ pub(super) fn retrace(
     let v0 = impact.speed.m_per_s;
     let step_s = (interval_s / FINER).max(2.0 * d[end] / v0 / STEPS);
     let mass = 2.0 * work[end] / (v0 * v0);
-    let mut march =
+    let mut builder =
         MotionBuilder { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
-    march.motion.notes.push(
+    builder.motion.notes.push(
         "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
             .into(),
     );
     if table.body_force_n.is_some() {
-        march.motion.notes.push("motion: by the work of the body force".into());
+        builder.motion.notes.push("motion: by the work of the body force".into());
     }
-    march.begin(0.0, f[0], v0);
+    builder.begin(0.0, f[0], v0);
     let speeds: Vec<f64> =
         work.iter().map(|w| v0 * (1.0 - w / work[end]).max(0.0).sqrt()).collect();
-    march.along(&loading, &speeds, 1.0)?;
-    let (d, f, moving) = march.unloading(table, impact, end)?;
-    let unloading = Path { d: &d, f: &f, moving: &moving };
-    let (back, mass) = (unloading.work(), march.mass);
+    builder.push_branch(&loading, &speeds, 1.0)?;
+    let [d, f, moving] = builder.unloading(table, impact, end)?;
+    let unloading = Branch { d: &d, f: &f, moving: &moving };
+    let (back, mass) = (unloading.work(), builder.mass);
     let speeds: Vec<f64> = back.iter().map(|w| -(2.0 * -w / mass).max(0.0).sqrt()).collect();
-    march.along(&unloading, &speeds, -1.0)?;
+    builder.push_branch(&unloading, &speeds, -1.0)?;
     if f.last().is_some_and(|f| *f <= 0.0) {
-        march.free()?;
+        builder.push_free_flight()?;
     } else {
-        march.motion.warnings.push(
+        builder.motion.warnings.push(
             "unloading: the table ends before its force has fallen to 0; so does the motion".into(),
         );
     }
-    Ok(march.motion)
+    Ok(builder.motion)
 }
 
 /// Points along which a body moves in one direction: deflection, force, and what moves it.
-struct Path<'a> {
+struct Branch<'a> {
     d: &'a [f64],
     f: &'a [f64],
     moving: &'a [f64],
 }
 
-impl Path<'_> {
+impl Branch<'_> {
     /// Work of the moving force from the first point to each, in J; below 0 where it falls.
     fn work(&self) -> Vec<f64> {
         let mut work = vec![0.0];
@@ -110,9 +143,6 @@ impl Path<'_> {
         work
     }
 }
-
-/// Three columns of an unloading branch: deflection, force, and what moves the body.
-type Branch = (Vec<f64>, Vec<f64>, Vec<f64>);
 
 /// A motion that is being made.
 struct MotionBuilder {
@@ -153,8 +183,13 @@ impl MotionBuilder {
 
     /// Follows a path whose points are passed at `speeds`; `direction` is 1 where the deflection
     /// grows.
-    fn along(&mut self, path: &Path<'_>, speeds: &[f64], direction: f64) -> Result<(), Error> {
-        let most = self.motion.time_s.len() + path.d.len() + MOST_STATES;
+    fn push_branch(
+        &mut self,
+        path: &Branch<'_>,
+        speeds: &[f64],
+        direction: f64,
+    ) -> Result<(), Error> {
+        let most = self.motion.time_s.len() + path.d.len() + MAX_STATES;
         for i in 1..path.d.len() {
             let length = (path.d[i] - path.d[i - 1]).abs();
             let between =
@@ -189,14 +224,14 @@ impl MotionBuilder {
         table: &Table<'_>,
         impact: &Impact,
         end: usize,
-    ) -> Result<Branch, Error> {
+    ) -> Result<[Vec<f64>; 3], Error> {
         let (d, f) = (table.deflection_m, table.force_n);
         let stated = impact.unloading_stiffness_n_per_m;
         if end + 1 < d.len() {
             let stated = stated.map_or("", |_| "; the stated stiffness is not used");
             self.motion.notes.push(format!("unloading: the table's own branch{stated}"));
             let moving = table.body_force_n.unwrap_or(f);
-            return Ok((d[end..].to_vec(), f[end..].to_vec(), moving[end..].to_vec()));
+            return Ok([d, f, moving].map(|values| values[end..].to_vec()));
         }
         let stiffness = match stated {
             Some(stiffness) => {
@@ -239,20 +274,17 @@ impl MotionBuilder {
         let falls = |top: f64, end: f64| {
             way.iter().map(|x| (top * (1.0 - x / end)).max(0.0)).collect::<Vec<f64>>()
         };
-        let mut branch = (
-            way.iter().map(|x| d - x).collect::<Vec<_>>(),
-            falls(f, ends),
-            falls(moving, moving_ends),
-        );
+        let (mut force, mut moving) = (falls(f, ends), falls(moving, moving_ends));
         // Behind both ends there is no force, whatever rounding leaves of it.
-        if let (Some(f), Some(moving)) = (branch.1.last_mut(), branch.2.last_mut()) {
-            (*f, *moving) = (0.0, 0.0);
+        for values in [&mut force, &mut moving] {
+            values.pop();
+            values.push(0.0);
         }
-        Ok(branch)
+        Ok([way.iter().map(|x| d - x).collect(), force, moving])
     }
 
     /// Free motion at the last speed.
-    fn free(&mut self) -> Result<(), Error> {
+    fn push_free_flight(&mut self) -> Result<(), Error> {
         let last = self.motion.time_s.len() - 1;
         let (d, v) = (self.motion.deflection_m[last], self.motion.closing_m_per_s[last]);
         let begin_s = self.motion.time_s[last];

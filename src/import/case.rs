@@ -1,18 +1,19 @@
 //! From a file to its case: read, said, made, and traced.
 
-use crate::error::{Error, ErrorCode, error};
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::said::Said;
 use super::{Item, Settings};
-use crate::curve::from_table::{IMPORTED, Impact, Table, from_table};
+use crate::curve::from_table::{IMPORTED, from_table};
 use crate::curve::recipe::{Filter, Sampling};
 use crate::curve::{
-    Case, CaseId, Conditions, ForceKind, Parameter, Provenance, Quality, RecordedCurves, SourceFile,
+    Case, CaseId, Conditions, ForceKind, Impact, Parameter, Provenance, Quality, RecordedCurves,
+    SourceFile, Table,
 };
 use crate::database::names;
+use crate::error::{Error, ErrorCode, error};
 use crate::formats::read::{self, ReadCurve};
 use crate::unit::{SpeedKind, UnitSystem};
 

@@ -1,12 +1,10 @@
 //! Extraction of a run's case: units, histories, curve, notes and warnings.
 
 use super::absolute;
-use super::files::Located;
-use super::files::shown_name;
+use super::files::{Located, shown_name};
 use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
-use crate::curve::extract::Notes;
-use crate::curve::extract::{DeckSpeed, Extracted, Setup, extract};
+use crate::curve::extract::{DeckSpeed, Extracted, Notes, Setup, extract};
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::error::{Error, ErrorCode, KeyPath, error};
@@ -80,7 +78,8 @@ impl LocatedRun<'_> {
             .filter_map(|run| Some((run.case_name(), run.speed?.0)))
             .collect();
         let setup = Setup {
-            recipe: &study.manifest.recipe,
+            filter: study.manifest.recipe.filter,
+            sampling: study.manifest.recipe.sampling,
             kind: study.speed_kind(),
             half_model: study.manifest.study.half_model,
             masses: study.masses(entry),

@@ -94,7 +94,7 @@ pub enum ExtractError {
     )]
     NoSpeed {
         /// Component that would have told it.
-        component: &'static str,
+        component: String,
     },
     /// The body does not move in the first state.
     #[error("the body is at rest in the first state: add speed = \"…km/h\" to the run")]

@@ -1,7 +1,7 @@
 //! What an extraction starts from: the run's histories, and what the manifest says of it.
 
 use crate::curve::Masses;
-use crate::curve::recipe::{Recipe, RecordedMotion};
+use crate::curve::recipe::{Filter, RecordedMotion, Sampling};
 use crate::history::History;
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -34,8 +34,10 @@ pub enum MeasuredForce<'a> {
 /// What the manifest says of a run.
 #[derive(Clone, Debug)]
 pub struct Setup<'a> {
-    /// The study's.
-    pub recipe: &'a Recipe,
+    /// Of the force.
+    pub filter: Filter,
+    /// Common times.
+    pub sampling: Sampling,
     /// What the speed is measured against.
     pub kind: SpeedKind,
     /// One of two identical bodies against the symmetry plane: closing speed and

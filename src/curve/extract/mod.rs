@@ -22,13 +22,9 @@ use crate::signal::cfc;
 use crate::unit::Speed;
 pub use error::ExtractError;
 use from_contact::FromContact;
-pub(crate) use input::DeckSpeed;
-pub use input::Measured;
-pub use input::MeasuredForce;
-pub use input::Setup;
-pub use input::Stated;
-pub(crate) use input::StatedContact;
-use record::Record;
+pub(crate) use input::{DeckSpeed, StatedContact};
+pub use input::{Measured, MeasuredForce, Setup, Stated};
+pub(crate) use record::Record;
 use record::sample;
 pub(crate) use remarks::Notes;
 use speed::{ImpactSpeed, SpeedBy};
@@ -55,11 +51,19 @@ pub struct Extracted {
 /// # Errors
 /// [`ExtractError`] says which history cannot be used and what to change.
 pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, ExtractError> {
-    let mut remarks = Notes::default();
-    let mut record = remarks.take(Record::of(measured, setup)?);
+    let (record, remarks) = Record::of(measured, setup)?;
+    curve_of(record, remarks, setup)
+}
+
+/// The curve of a record, which left these remarks.
+pub(crate) fn curve_of(
+    mut record: Record,
+    mut remarks: Notes,
+    setup: &Setup<'_>,
+) -> Result<Extracted, ExtractError> {
     // Before the filter, which without phase shift begins ahead of the contact.
-    let start = remarks.take(Start::find(measured, setup, &record)?);
-    if let Filter::Cfc(class) = setup.recipe.filter {
+    let start = remarks.take(Start::find(setup, &record)?);
+    if let Filter::Cfc(class) = setup.filter {
         remarks.append(filter(class, &mut record)?);
     }
     let contact = remarks.take(FromContact::of(&record, start.time_s, setup.stated.offset_m)?);
@@ -67,15 +71,15 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
     let FromContact { curve: original, closing_m_per_s: closing, .. } = contact;
     let before = contact.before;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
-        remarks.take(ImpactSpeed::of(measured, setup, &record, before)?);
+        remarks.take(ImpactSpeed::of(setup, &record, before)?);
     let claim = energy::StatedConditions {
         curve: &original,
         masses: setup.masses,
         speed,
-        closing_m_per_s: measured.velocity.map(|_| &closing[..]),
+        closing_m_per_s: record.missing_velocity.is_none().then_some(&closing[..]),
         recorded_m_per_s,
-        units: measured.units,
-        is_body_force: matches!(measured.force, MeasuredForce::Body(..)),
+        units: record.units,
+        is_body_force: record.force_kind == ForceKind::Body,
         others: setup.others,
     };
     let balance = match claim.check() {
@@ -96,10 +100,7 @@ pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, 
             warnings: remarks.warnings,
         },
         curves: RecordedCurves {
-            force_kind: match measured.force {
-                MeasuredForce::Contact(_) => ForceKind::Contact,
-                MeasuredForce::Body(..) => ForceKind::Body,
-            },
+            force_kind: record.force_kind,
             sampled,
             closing_speed_m_per_s,
             unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),

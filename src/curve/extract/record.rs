@@ -3,9 +3,9 @@
 use super::error::{ExtractError, Origin};
 use super::input::{Measured, MeasuredForce, Setup};
 use super::remarks::Notes;
-use crate::curve::Curve;
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
+use crate::curve::{Curve, ForceKind};
 use crate::history::History;
 use crate::plural::counted;
 use crate::signal::{derivative, interpolate};
@@ -14,83 +14,124 @@ use crate::unit::UnitSystem;
 /// Times of two files count as equal up to the six digits that solvers print.
 const SAME_TIME: f64 = 1e-5;
 
-/// Motion and force at the same times, the force positive in compression.
-pub(super) struct Record {
+/// Motion and force at the same times, the force positive in compression: of a run, or of a file with times.
+pub(crate) struct Record {
     pub time_s: Vec<f64>,
     pub deflection_m: Vec<f64>,
     pub rate_m_per_s: Vec<f64>,
     pub force_n: Vec<f64>,
     /// Rate of the first state of the motion, before any cut.
     pub first_rate_m_per_s: f64,
+    /// Name of the velocity that the files do not have: the rate is then a derivative.
+    pub missing_velocity: Option<String>,
+    pub force_kind: ForceKind,
+    /// Contact force that shows when contact begins, beside a body force.
+    pub contact: Option<Signal>,
+    /// Of the files, to name what was mistaken.
+    pub units: UnitSystem,
 }
 
 impl Record {
     /// The record of a run, up to the manifest's end.
-    pub(crate) fn of(
+    pub(super) fn of(
         measured: &Measured<'_>,
         setup: &Setup<'_>,
     ) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
+        let units = measured.units;
         let motion = remarks.take(Motion::of(measured, setup)?);
         let force = remarks.take(force(measured, setup)?);
-        let mut record = remarks.take(Self::at_common_times(motion, force)?);
+        let mut record = remarks.take(Self::at_common_times(motion, force, units)?);
+        if let MeasuredForce::Body(..) = measured.force {
+            record.force_kind = ForceKind::Body;
+        }
         if let Some(until_s) = setup.stated.truncate_s {
             remarks.note(record.truncate(until_s)?);
         }
-        let sign = match setup.stated.force_sign {
-            Some(sign) => sign,
-            None => sign_of_impulse(&record.time_s, &record.force_n),
-        };
-        if sign < 0.0 {
-            remarks.note("force: sign flipped, positive in compression");
+        remarks.append(record.turn_force(setup.stated.force_sign));
+        if let (None, Some(contact)) = (setup.stated.contact, measured.contact) {
+            let signal = Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
+            let mut signal = remarks.take(signal);
+            let sign = sign_of_impulse(&signal.time_s, &signal.values);
+            signal.values.iter_mut().for_each(|f| *f *= sign);
+            remarks.note(format!("contact: found by {}", contact.label()));
+            record.contact = Some(signal);
         }
-        record.force_n.iter_mut().for_each(|f| *f *= sign);
         Ok((record, remarks))
     }
 
-    fn at_common_times(motion: Motion, force: Signal) -> Result<(Self, Notes), ExtractError> {
+    /// The record of columns in SI, which were read in `units`.
+    pub(crate) fn of_columns(
+        time_s: &[f64],
+        deflection_m: &[f64],
+        force_n: &[f64],
+        units: UnitSystem,
+    ) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
-        let first_rate_m_per_s = motion.rate_m_per_s[0];
-        let (from, to) = (motion.time_s[0], motion.time_s[motion.time_s.len() - 1]);
-        let pairs = || motion.time_s.iter().zip(&force.time_s);
-        if motion.time_s.len() == force.time_s.len()
-            && pairs().all(|(a, b)| (a - b).abs() <= SAME_TIME * to.abs())
+        let states = |values: &'_ [f64]| time_s.iter().copied().zip(values.to_vec());
+        let deflection =
+            remarks.take(Signal::new(states(deflection_m), "displacement", Origin::Motion)?);
+        let motion = Motion::differentiated(deflection, "velocity".into(), &mut remarks);
+        let force = remarks.take(Signal::new(states(force_n), "force", Origin::Force)?);
+        let mut record = remarks.take(Self::at_common_times(motion, force, units)?);
+        remarks.append(record.turn_force(None));
+        Ok((record, remarks))
+    }
+
+    /// Makes compression positive, by the impulse where no sign is stated.
+    fn turn_force(&mut self, stated: Option<f64>) -> Notes {
+        let mut remarks = Notes::default();
+        let sign = stated.unwrap_or_else(|| sign_of_impulse(&self.time_s, &self.force_n));
+        if sign < 0.0 {
+            remarks.note("force: sign flipped, positive in compression");
+        }
+        self.force_n.iter_mut().for_each(|f| *f *= sign);
+        remarks
+    }
+
+    fn at_common_times(
+        motion: Motion,
+        force: Signal,
+        units: UnitSystem,
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
+        let mut record = Self {
+            first_rate_m_per_s: motion.rate_m_per_s[0],
+            time_s: motion.time_s,
+            deflection_m: motion.deflection_m,
+            rate_m_per_s: motion.rate_m_per_s,
+            force_n: Vec::new(),
+            missing_velocity: motion.missing_velocity,
+            force_kind: ForceKind::Contact,
+            contact: None,
+            units,
+        };
+        let (from, to) = (record.time_s[0], record.time_s[record.time_s.len() - 1]);
+        let mut pairs = record.time_s.iter().zip(&force.time_s);
+        if record.time_s.len() == force.time_s.len()
+            && pairs.all(|(a, b)| (a - b).abs() <= SAME_TIME * to.abs())
         {
-            let record = Self {
-                time_s: motion.time_s,
-                deflection_m: motion.deflection_m,
-                rate_m_per_s: motion.rate_m_per_s,
-                force_n: force.values,
-                first_rate_m_per_s,
-            };
+            record.force_n = force.values;
             return Ok((record, remarks));
         }
-        let (time_s, force_n): (Vec<f64>, Vec<f64>) = force
-            .time_s
-            .iter()
-            .zip(&force.values)
-            .filter(|(t, _)| (from..=to).contains(*t))
-            .map(|(&t, &f)| (t, f))
-            .unzip();
+        let states = force.time_s.iter().copied().zip(force.values);
+        let (time_s, force_n): (Vec<f64>, Vec<f64>) =
+            states.filter(|(t, _)| (from..=to).contains(t)).unzip();
         if time_s.len() < 2 {
             return Err(ExtractError::NoOverlap);
         }
         remarks.note(format!(
             "times: the force has {} states and the motion {}; the motion was interpolated to {} common ones",
             force.time_s.len(),
-            motion.time_s.len(),
+            record.time_s.len(),
             time_s.len()
         ));
         let at = |values: &[f64]| {
-            interpolate(&motion.time_s, values, &time_s).map_err(|_| ExtractError::NoOverlap)
+            interpolate(&record.time_s, values, &time_s).map_err(|_| ExtractError::NoOverlap)
         };
-        let record = Self {
-            deflection_m: at(&motion.deflection_m)?,
-            rate_m_per_s: at(&motion.rate_m_per_s)?,
-            time_s,
-            force_n,
-            first_rate_m_per_s,
-        };
+        (record.deflection_m, record.rate_m_per_s) =
+            (at(&record.deflection_m)?, at(&record.rate_m_per_s)?);
+        (record.time_s, record.force_n) = (time_s, force_n);
         Ok((record, remarks))
     }
 
@@ -129,7 +170,7 @@ impl Record {
 }
 
 /// The sign of `∫F dt`: a single state that is wrong does not turn it.
-pub(super) fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
+fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
     let impulse: f64 = (1..time_s.len())
         .map(|i| 0.5 * (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
         .sum();
@@ -137,38 +178,44 @@ pub(super) fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
 }
 
 /// A history in SI with strictly increasing times.
-pub(super) struct Signal {
+pub(crate) struct Signal {
     pub time_s: Vec<f64>,
     pub values: Vec<f64>,
 }
 
 impl Signal {
-    pub(crate) fn of(
+    /// A history's values times `factor`.
+    fn of(
         history: &History,
         units: UnitSystem,
         factor: f64,
         what: &'static str,
         origin: Origin,
     ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
         if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
-            let what = history.label();
-            return Err(ExtractError::NotFinite {
-                origin,
-                what,
-                state: i + 1,
-                value: history.values[i],
-            });
+            let (what, value) = (history.label(), history.values[i]);
+            return Err(ExtractError::NotFinite { origin, what, state: i + 1, value });
         }
+        let times = history.time.iter().map(|t| t * units.time_s);
+        Self::new(times.zip(history.values.iter().map(|v| v * factor)), what, origin)
+    }
+
+    /// The states whose time comes after that of the one before.
+    fn new(
+        states: impl ExactSizeIterator<Item = (f64, f64)>,
+        what: &'static str,
+        origin: Origin,
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
+        let all = states.len();
         let (mut time_s, mut values) = (Vec::new(), Vec::new());
-        for (&t, &v) in history.time.iter().zip(&history.values) {
-            let t = t * units.time_s;
+        for (t, v) in states {
             if time_s.last().is_none_or(|&last| t > last) {
                 time_s.push(t);
-                values.push(v * factor);
+                values.push(v);
             }
         }
-        let skipped = history.time.len() - time_s.len();
+        let skipped = all - time_s.len();
         if skipped > 0 {
             let skipped = counted(skipped, "state");
             remarks.note(format!("{what}: {skipped} left out because time did not increase"));
@@ -185,6 +232,7 @@ struct Motion {
     time_s: Vec<f64>,
     deflection_m: Vec<f64>,
     rate_m_per_s: Vec<f64>,
+    missing_velocity: Option<String>,
 }
 
 impl Motion {
@@ -192,7 +240,7 @@ impl Motion {
         let mut remarks = Notes::default();
         let units = measured.units;
         let bodies = if setup.half_model { 2.0 } else { 1.0 };
-        let Signal { time_s, values: deflection_m } = remarks.take(relative(
+        let deflection = remarks.take(relative(
             measured.displacement,
             measured.minus_displacement,
             units,
@@ -202,18 +250,30 @@ impl Motion {
         if setup.half_model {
             remarks.note("half model: deflection and speed are twice the run's");
         }
-        let rate_m_per_s = match measured.velocity {
-            Some(velocity) => {
-                let (minus, factor) = (measured.minus_velocity, units.speed() * bodies);
-                remarks.take(relative(velocity, minus, units, factor, "velocity")?).values
-            }
-            None => {
-                remarks
-                    .note("closing speed: displacement differentiated, the file has no velocity");
-                derivative(&time_s, &deflection_m)
-            }
+        let Some(velocity) = measured.velocity else {
+            let missing = measured.displacement.component.replace("displacement", "velocity");
+            let motion = Self::differentiated(deflection, missing, &mut remarks);
+            return Ok((motion, remarks));
         };
-        Ok((Self { time_s, deflection_m, rate_m_per_s }, remarks))
+        let (minus, factor) = (measured.minus_velocity, units.speed() * bodies);
+        let rate = remarks.take(relative(velocity, minus, units, factor, "velocity")?);
+        let motion = Self {
+            time_s: deflection.time_s,
+            deflection_m: deflection.values,
+            rate_m_per_s: rate.values,
+            missing_velocity: None,
+        };
+        Ok((motion, remarks))
+    }
+
+    fn differentiated(deflection: Signal, missing: String, remarks: &mut Notes) -> Self {
+        remarks.note("closing speed: displacement differentiated, the file has no velocity");
+        Self {
+            rate_m_per_s: derivative(&deflection.time_s, &deflection.values),
+            time_s: deflection.time_s,
+            deflection_m: deflection.values,
+            missing_velocity: Some(missing),
+        }
     }
 }
 
@@ -262,7 +322,7 @@ pub(super) fn sample(
     setup: &Setup<'_>,
 ) -> Result<((Curve, Vec<f64>), Notes), ExtractError> {
     let mut remarks = Notes::default();
-    let sampling = setup.recipe.sampling;
+    let sampling = setup.sampling;
     let at = original.time_s();
     let last_s = at[at.len() - 1];
     // The last state may come a rounding error before its nominal time.

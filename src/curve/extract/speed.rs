@@ -1,7 +1,7 @@
 //! The impact speed of a run.
 
 use super::error::ExtractError;
-use super::input::{Measured, Setup};
+use super::input::Setup;
 use super::record::Record;
 use super::remarks::Notes;
 use crate::unit::{Speed, km_per_h};
@@ -29,7 +29,6 @@ impl ImpactSpeed {
     /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
     /// are said. `before`: the last state that contact has not changed.
     pub(crate) fn of(
-        measured: &Measured<'_>,
         setup: &Setup<'_>,
         record: &Record,
         before: usize,
@@ -37,7 +36,7 @@ impl ImpactSpeed {
         let mut remarks = Notes::default();
         let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
         let first = record.first_rate_m_per_s.abs();
-        let recorded = measured.velocity.map(|_| record.rate_m_per_s[before].abs());
+        let recorded = record.missing_velocity.is_none().then(|| record.rate_m_per_s[before].abs());
         if let Some(recorded) = recorded
             && differ(first, recorded)
         {
@@ -53,7 +52,7 @@ impl ImpactSpeed {
             (None, None) => match &setup.deck_speed {
                 Some(deck) => (deck.m_per_s, SpeedBy::Deck, "deck's"),
                 None => {
-                    let component = setup.recipe.deflection.component.velocity();
+                    let component = record.missing_velocity.clone().unwrap_or_default();
                     return Err(ExtractError::NoSpeed { component });
                 }
             },

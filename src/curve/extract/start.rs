@@ -1,14 +1,12 @@
 //! Where contact begins in a record.
 
-use super::error::{ExtractError, Origin};
+use super::error::ExtractError;
 use super::from_contact::FromContact;
-use super::input::{Measured, MeasuredForce, Setup, StatedContact};
-use super::record::{Record, Signal, sign_of_impulse};
+use super::input::{Setup, StatedContact};
+use super::record::Record;
 use super::remarks::Notes;
 use crate::curve::contact::{self, milliseconds};
-use crate::curve::{Curve, loading};
-use crate::history::History;
-use crate::unit::UnitSystem;
+use crate::curve::{Curve, ForceKind, loading};
 
 /// A beginning of the crush, as a share of it, that brings less than this share of the impulse
 /// is doubtful: light noses of real runs bring twice as much and more.
@@ -35,11 +33,7 @@ enum StartBy {
 
 impl Start {
     /// Where the manifest says, else where the force does.
-    pub(crate) fn find(
-        measured: &Measured<'_>,
-        setup: &Setup<'_>,
-        record: &Record,
-    ) -> Result<(Self, Notes), ExtractError> {
+    pub(crate) fn find(setup: &Setup<'_>, record: &Record) -> Result<(Self, Notes), ExtractError> {
         match setup.stated.contact {
             Some(StatedContact::Time { s: time_s }) => {
                 if !record.holds(time_s) {
@@ -56,19 +50,18 @@ impl Start {
                 remarks.notes.extend(found_elsewhere(record, time_s));
                 Ok((Self { time_s, by: StartBy::Manifest }, remarks))
             }
-            None => Self::in_force(measured, record),
+            None => Self::in_force(record),
         }
     }
 
     /// Where the contact force begins, if the recipe names one; else the record's.
-    fn in_force(measured: &Measured<'_>, record: &Record) -> Result<(Self, Notes), ExtractError> {
+    fn in_force(record: &Record) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
-        let onset = match measured.contact {
-            Some(contact) => remarks.take(onset_of(contact, measured.units)?),
+        let onset = match &record.contact {
+            Some(contact) => onset(&contact.time_s, &contact.values)?,
             None => onset(&record.time_s, &record.force_n)?,
         };
-        let of_body =
-            measured.contact.is_none() && matches!(measured.force, MeasuredForce::Body(..));
+        let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
             remarks.warn(format!(
                 "contact: found at {} where the body slows down; what touches first is stopped earlier by some milliseconds, and the crush is too short by as much times the speed: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or say contact_time in the run",
@@ -131,16 +124,6 @@ fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
             milliseconds(found.time_s)
         )
     })
-}
-
-/// The onset of a contact force where the force is a body force.
-fn onset_of(contact: &History, units: UnitSystem) -> Result<(contact::Onset, Notes), ExtractError> {
-    let (signal, mut remarks) =
-        Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
-    let sign = sign_of_impulse(&signal.time_s, &signal.values);
-    let force_n: Vec<f64> = signal.values.iter().map(|f| sign * f).collect();
-    remarks.note(format!("contact: found by {}", contact.label()));
-    Ok((onset(&signal.time_s, &force_n)?, remarks))
 }
 
 fn onset(time_s: &[f64], force_n: &[f64]) -> Result<contact::Onset, ExtractError> {
