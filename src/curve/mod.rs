@@ -23,18 +23,16 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, error};
 use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
-pub use energy::{ImpossibleRun, audit};
+pub use energy::audit;
 pub use envelope::Envelope;
 pub use extract::input::{DeckSpeed, StatedContact};
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
 pub use force_curve::{CurveUnloading, ForceCurve};
 pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};
-pub use recipe::{
-    DeflectionSource, DisplacementComponent, Filter, ForceSource, Recipe, RecordedMotion, Sampling,
-};
+pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
-pub use stopped_mass::StoppedMass;
+pub(crate) use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
 ///

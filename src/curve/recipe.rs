@@ -10,7 +10,7 @@ use crate::history::{EntityId, Side};
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// Where the deflection comes from.
-    pub deflection: DeflectionSource,
+    pub(crate) deflection: DeflectionSource,
     /// Where the force comes from.
     pub force: ForceSource,
     /// Contact force that tells when contact begins, where the force is a body force: a body
@@ -35,7 +35,7 @@ impl Recipe {
 /// Displacement of one node, or the difference of two.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct DeflectionSource {
+pub(crate) struct DeflectionSource {
     /// File in the run's folder.
     pub file: String,
     /// Node behind the crush zone, or the centre of gravity.
@@ -62,7 +62,7 @@ impl std::fmt::Display for DeflectionSource {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(clippy::enum_variant_names, reason = "the names are the components' in the files")]
-pub enum DisplacementComponent {
+pub(crate) enum DisplacementComponent {
     /// Along x.
     XDisplacement,
     /// Along y.

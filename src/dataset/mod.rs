@@ -439,7 +439,7 @@ impl TrainingSet {
     /// The mass that is stopped at each deflection, of a group whose runs differ in speed alone and know a
     /// contact force on one body, or between two of the same mass. Its
     /// `is_known` says whether the runs agree on one.
-    pub fn stopped_mass(&self) -> Option<StoppedMass> {
+    pub(crate) fn stopped_mass(&self) -> Option<StoppedMass> {
         let is_even =
             self.masses.other_kg.is_none_or(|m| (m / self.masses.body_kg - 1.0).abs() <= EVEN);
         let may_tell = self.force_kind == ForceKind::Contact && self.features.is_empty() && is_even;

@@ -45,7 +45,7 @@ pub struct ExportCurve {
 
 /// How a target lets go of the energy that it has stored at the maximal crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TargetUnloading {
+pub(crate) enum TargetUnloading {
     /// On a straight line of this stiffness in N/m.
     Line(f64),
     /// Along the loading branch: everything comes back.

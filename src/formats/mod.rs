@@ -23,24 +23,19 @@ mod tail;
 mod text;
 mod thin;
 
-use crate::error::{Error, error};
-use crate::guess;
 use std::path::Path;
 
 use crate::curve::{Case, ForceKind};
+use crate::error::{Error, error};
+use crate::guess;
 use crate::surrogate::{Model, Query};
 use crate::unit::UnitSystem;
-
-pub use export_curve::ExportCurve;
-pub use export_curve::ExportInput;
-pub use export_curve::TargetUnloading;
+pub(crate) use export_curve::TargetUnloading;
+pub use export_curve::{ExportCurve, ExportInput};
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
-pub use read::Reader;
-pub use read::curve::Metadata;
-pub use read::curve::Place;
-pub use read::curve::ReadFile;
-pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, read};
+pub use read::curve::{Metadata, Place, ReadFile};
+pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
 pub use tail::Tail;
 
 /// One target: its name, its file extensions, what it can hold, how it is written.

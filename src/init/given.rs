@@ -13,7 +13,7 @@ pub struct UserHints {
     /// Units of the solver's files.
     pub units: Option<UnitSystem>,
     /// What hits what.
-    pub kind: Option<StudyKind>,
+    pub(crate) kind: Option<StudyKind>,
     /// The runs are of one body against the symmetry plane of a pair.
     pub half_model: bool,
     /// Node of the (moving) body.

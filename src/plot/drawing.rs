@@ -14,14 +14,14 @@ pub struct Drawing {
     /// From the lowest to the topmost.
     pub shapes: Vec<Shape>,
     /// Where the panels are.
-    pub panels: Vec<PanelPlace>,
+    pub(crate) panels: Vec<PanelPlace>,
     /// Where the legend begins, in pixels from the top.
     pub legend_top: f64,
 }
 
 /// Where a panel's axes are and what they span.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PanelPlace {
+pub(crate) struct PanelPlace {
     /// Left, top, right and bottom of the area between the axes, in pixels.
     pub area: [f64; 4],
     /// What it spans to the right, in SI.

@@ -25,6 +25,7 @@ mod thin;
 mod ticks;
 
 pub use chart::{Axis, Band, Chart, Mark, Panel, Series, Shown};
-pub use drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text, TextBox};
+pub(crate) use drawing::PanelPlace;
+pub use drawing::{Drawing, Paint, Shape, Shows, Stroke, Text, TextBox};
 pub(crate) use style::looks_for_pages;
-pub use svg::SvgFor;
+pub(crate) use svg::SvgFor;

@@ -12,7 +12,7 @@ const SIZE: f64 = 12.0;
 
 /// Where an SVG is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SvgFor {
+pub(crate) enum SvgFor {
     /// A file: colours are written out, and texts are outlines, so that no font is needed.
     File,
     /// Within an HTML page: texts are texts, and colours are classes (`ink`, `grid`, `s0` to `s7`) of its styles.
@@ -26,7 +26,7 @@ impl Drawing {
     }
 
     /// The drawing as SVG 1.1; in a page without its namespace.
-    pub fn svg_for(&self, target: SvgFor) -> String {
+    pub(crate) fn svg_for(&self, target: SvgFor) -> String {
         let mut out = String::new();
         let (width, height) = (number(self.width), number(self.height));
         let namespaces = match target {

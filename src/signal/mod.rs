@@ -6,7 +6,7 @@ pub(crate) mod peaks;
 
 use crate::piecewise;
 pub(crate) use bounded::{Cholesky, bounded};
-pub use cfc::CfcError;
+pub(crate) use cfc::CfcError;
 
 /// Integral of `values` over `time` from the first state on, by the trapezoidal rule.
 ///

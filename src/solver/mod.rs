@@ -42,39 +42,24 @@ use std::path::Path;
 
 use crate::error::{Error, error};
 use crate::guess;
-
 pub use decks::read_deck;
 use detect::{check_format, detect, files_in};
 use error::check_selection;
 pub(crate) use error::no_component;
 pub(crate) use family::family;
 use family::missing_continuation;
-pub use format::FORMATS;
-pub use format::Format;
-pub(crate) use format::entity_word;
-pub(crate) use format::format_names;
 use format::named;
-pub use lsdyna::deck::contents::DeckPlace;
-pub use lsdyna::deck::contents::ImpactSpeed;
-pub use lsdyna::deck::contents::Include;
-pub use lsdyna::deck::contents::InitialVelocity;
-pub use lsdyna::deck::contents::Output;
-pub use lsdyna::deck::contents::Scope;
-pub use lsdyna::deck::contents::StatedUnits;
+pub use format::{FORMATS, Format};
+pub(crate) use format::{entity_word, format_names};
+pub use lsdyna::deck::contents::{DeckPlace, ImpactSpeed, Include, Output, StatedUnits};
 pub use lsdyna::deck::parameters::Value;
 pub use lsdyna::deck::{Deck, DeckInterface, TitledEntity, parse_deck};
 pub use lsdyna::nodout::Blocks;
 pub use lsdyna::nodout::blocks::Column;
-pub use problem::Problem;
-pub use problem::ProblemCode;
-pub use selection::Selection;
-pub use selection::WantedId;
-pub use solver_file::Entity;
-pub use solver_file::NoDataReason;
-pub use solver_file::SolverFile;
-pub use solver_file::WithoutData;
-pub use source::Access;
-pub use source::{Source, Window};
+pub use problem::{Problem, ProblemCode};
+pub use selection::{Selection, WantedId};
+pub use solver_file::{Entity, NoDataReason, SolverFile, WithoutData};
+pub use source::{Access, Source, Window};
 
 /// Reads the selected histories of the file at `path`, of one section.
 ///

@@ -16,17 +16,17 @@ use crate::unit::{
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// What all runs share.
-    pub study: StudyHeader,
+    pub(crate) study: StudyHeader,
     /// How a curve is made of a run.
     pub recipe: Recipe,
     /// One entry per FE run.
-    pub run: Vec<RunEntry>,
+    pub(crate) run: Vec<RunEntry>,
 }
 
 /// What all runs of a study share.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct StudyHeader {
+pub(crate) struct StudyHeader {
     /// Name of the study.
     pub name: String,
     /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
@@ -50,7 +50,7 @@ pub struct StudyHeader {
 /// What hits what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum StudyKind {
+pub(crate) enum StudyKind {
     /// A body against a rigid wall; speeds are wall speeds.
     Wall,
     /// Two bodies; speeds are closing speeds.
@@ -70,7 +70,7 @@ impl StudyKind {
 /// One FE run.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RunEntry {
+pub(crate) struct RunEntry {
     /// Folder with the solver's files, relative to the manifest.
     pub path: String,
     /// Name of the case; the path if absent.

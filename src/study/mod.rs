@@ -18,12 +18,8 @@ use crate::error::{Document, Error, KeyPath};
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub(crate) use locate::LocatedRun;
-pub use manifest::Manifest;
-pub use manifest::RunEntry;
-pub use manifest::Sign;
-pub use manifest::SignError;
-pub use manifest::StudyHeader;
-pub use manifest::StudyKind;
+pub use manifest::{Manifest, Sign, SignError};
+pub(crate) use manifest::{RunEntry, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

@@ -14,7 +14,7 @@ pub struct Deck {
     /// As a comment or `*CONTROL_UNITS` states them.
     pub units: Option<StatedUnits>,
     /// In the order of the deck.
-    pub initial_velocities: Vec<InitialVelocity>,
+    pub(crate) initial_velocities: Vec<InitialVelocity>,
     /// `*DATABASE_…` of the ASCII files, in order.
     pub outputs: Vec<Output>,
     /// `*DATABASE_HISTORY_NODE`.
@@ -58,7 +58,7 @@ pub struct StatedUnits {
 /// One velocity given at the start: `*INITIAL_VELOCITY`, `_NODE`, `_RIGID_BODY`,
 /// `_GENERATION`, or that of an `_INERTIA` body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InitialVelocity {
+pub(crate) struct InitialVelocity {
     /// In capitals and without its star.
     pub keyword: String,
     /// Where it is given.
@@ -73,7 +73,7 @@ pub struct InitialVelocity {
 
 /// What an initial velocity holds for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scope {
+pub(crate) enum Scope {
     /// Every node of the model.
     AllNodes,
     /// The node of that id.
