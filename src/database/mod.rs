@@ -52,7 +52,7 @@ pub struct Database {
 
 /// A case by its names; no name has a `/`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct CasePath {
+pub struct CasePath {
     /// Its group.
     pub group: String,
     /// Its name in the group.
@@ -307,7 +307,7 @@ impl Database {
 
     /// The mass that the crush zone of a group stops at each deflection, as its cases are now; `None` if
     /// there is no such group, or it does not follow from them.
-    pub(crate) fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
+    pub fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
         group::stopped_mass(group, self.cases(group))
     }
 
