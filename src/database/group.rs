@@ -3,7 +3,6 @@
 
 use std::collections::HashMap;
 
-use super::layout::case_names;
 use crate::curve::{Case, ForceKind, StoppedMass};
 use crate::dataset::TrainingSet;
 use crate::hdf5::AttrValue;
@@ -16,6 +15,11 @@ const RATE: &str = "stopped_mass_rate_kg_per_m";
 const RESIDUAL: &str = "stopped_mass_residual_kg";
 /// Every attribute that a group can have; what else it has is others'.
 pub(super) const GROUP_ATTRIBUTES: [&str; 5] = [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL];
+
+/// The value of a group's attribute `cases`.
+fn case_names(cases: &[Case]) -> AttrValue {
+    AttrValue::VarLenStringArray(cases.iter().map(|c| c.id.name.clone()).collect())
+}
 
 /// The attributes of a group with these cases, in order of speed.
 pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrValue)> {

@@ -223,11 +223,6 @@ pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
     ]
 }
 
-/// The value of a group's attribute `cases`.
-pub(crate) fn case_names(cases: &[Case]) -> AttrValue {
-    AttrValue::VarLenStringArray(cases.iter().map(|c| c.id.name.clone()).collect())
-}
-
 /// Encodes a database as the bytes of an HDF5 file.
 pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
     let mut file = FileBuilder::new();

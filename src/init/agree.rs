@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::UserHints;
 use super::explain::{self, Explanation, FOLLOWS, RELATED, size};
-use super::left_out::Reason;
+use super::folders::Reason;
 use super::survey::{ForceCandidate, NodeCandidate, Survey};
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::Side;

@@ -1,8 +1,7 @@
 //! Which force of a run moved which of its bodies; without one, which bodies pushed each other.
 
-use super::record::STOPPED;
-use super::series::Fit;
-use super::survey::{Body, ForceCandidate, Survey};
+use super::sources::Fit;
+use super::survey::{Body, ForceCandidate, STOPPED, Survey};
 use crate::study::StudyKind;
 
 /// A node follows an impulse if it leaves less than this share of it.

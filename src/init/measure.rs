@@ -1,14 +1,12 @@
 //! What the chosen histories of a run say in SI: speed, crush, times, masses.
 
-use super::Proposed;
+use super::UserHints;
 use super::agree::Agreed;
-use super::given::UserHints;
-use super::masses::{MassEstimates, is_near};
-use super::propose::Recorded;
-use super::record::{RawMasses, Record};
-use super::sampling::{Times, interval};
-use super::units::Magnitudes;
+use super::proposal::{Evidence, Proposed};
+use super::record::{RawMasses, Record, Recorded};
+use super::units::{Magnitudes, digits, shown_mass, trimmed};
 use crate::curve::contact;
+use crate::curve::recipe::{Filter, Sampling};
 use crate::signal::integral;
 use crate::unit::UnitSystem;
 
@@ -102,4 +100,301 @@ fn in_si((time, force): &(Vec<f64>, Vec<f64>), units: UnitSystem) -> (Vec<f64>, 
         _ => 1.0,
     };
     (time_s, force.iter().map(|f| sign * f * units.force()).collect())
+}
+
+/// Masses by momentum and by kinetic energy that differ by less are one.
+const SAME_BY_ENERGY: f64 = 0.05;
+/// Masses of runs that differ by less are one: so much two runs of one model scatter.
+const SAME_MASS: f64 = 0.03;
+
+/// What a run says of a mass, in kg.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct MassEstimates {
+    pub by_momentum: Option<f64>,
+    /// Whether that was taken behind the contact.
+    pub in_free_flight: bool,
+    pub by_energy: Option<f64>,
+}
+
+impl MassEstimates {
+    /// The mass, and whether it is that by energy.
+    fn kg(&self) -> Option<(f64, bool)> {
+        match (self.by_momentum, self.by_energy) {
+            (Some(momentum), Some(energy)) if is_near(momentum, energy, SAME_BY_ENERGY) => {
+                Some((energy, true))
+            }
+            (Some(momentum), _) => Some((momentum, false)),
+            (None, energy) => Some((energy?, true)),
+        }
+    }
+
+    fn evidence(&self) -> String {
+        let other = |kg: Option<f64>, way: &str| {
+            kg.map_or(String::new(), |kg| format!(" ({way} {})", shown_mass(kg)))
+        };
+        match self.kg() {
+            Some((_, true)) => format!(
+                "kinetic energy of the model at the start over ½v²{}",
+                other(self.by_momentum, "momentum gives")
+            ),
+            _ if self.in_free_flight => format!(
+                "impulse of the force over the change of velocity, behind the contact{}",
+                other(self.by_energy, "kinetic energy at the start gives")
+            ),
+            _ => format!(
+                "impulse of the force over the change of velocity, while loading (good to a few per cent){}",
+                other(self.by_energy, "kinetic energy at the start gives")
+            ),
+        }
+    }
+}
+
+/// The mass of each run: one for all runs that scatter about it.
+///
+/// `why`: why a run has none. Warns where the two ways differ.
+pub(super) fn agree(
+    runs: &[(String, MassEstimates)],
+    why: &str,
+    warnings: &mut Vec<String>,
+) -> Vec<Proposed<f64>> {
+    warnings.extend(runs.iter().filter_map(|(name, weighed)| doubt(name, weighed)));
+    let known: Vec<(usize, f64)> =
+        runs.iter().enumerate().filter_map(|(k, (_, w))| Some((k, w.kg()?.0))).collect();
+    let mut by_mass = known.clone();
+    by_mass.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut found: Vec<Proposed<f64>> = runs.iter().map(|_| Proposed::missing(why)).collect();
+    for one in by_mass.chunk_by(|a, b| is_near(a.1, b.1, SAME_MASS)) {
+        let median = 0.5 * (one[(one.len() - 1) / 2].1 + one[one.len() / 2].1);
+        let (least, most) = (one[0].1, one[one.len() - 1].1);
+        for &(k, _) in one {
+            let mut from = runs[k].1.evidence();
+            if one.len() > 1 {
+                let range = if is_near(least, most, 5e-4) {
+                    "all alike".into()
+                } else {
+                    format!("{} to {} kg", least.round(), most.round())
+                };
+                from = format!("{from}; median of {} runs, {range}", one.len());
+            }
+            found[k] = Proposed::found(rounded(median), Evidence::Computed(from));
+        }
+    }
+    found
+}
+
+/// Where momentum and kinetic energy give two masses.
+fn doubt(name: &str, weighed: &MassEstimates) -> Option<String> {
+    let (momentum, energy) = (weighed.by_momentum?, weighed.by_energy?);
+    (!is_near(momentum, energy, SAME_BY_ENERGY)).then(|| {
+        format!(
+            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on part of what moves, or more moves than the bodies",
+            shown_mass(momentum),
+            shown_mass(energy)
+        )
+    })
+}
+
+pub(super) fn is_near(a: f64, b: f64, share: f64) -> bool {
+    (a - b).abs() <= share * a.abs().max(b.abs())
+}
+
+/// Four significant digits: more is not known.
+fn rounded(kg: f64) -> f64 {
+    format!("{kg:.3e}").parse().unwrap_or(kg)
+}
+
+/// A mass as a study has it.
+pub(super) fn text(kg: f64) -> String {
+    if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
+}
+
+/// Of the masses of a pair whether they are one.
+pub(super) fn are_equal(body: f64, other: f64) -> bool {
+    is_near(body, other, SAME_MASS)
+}
+
+/// That masses of the runs differ, if they do.
+pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
+    let mut all: Vec<f64> = masses.iter().filter_map(|mass| mass.value().copied()).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    (all.len() > 1).then(|| {
+        let shown: Vec<String> = all.iter().map(|kg| digits(kg / 1e3)).collect();
+        format!(
+            "mass: the runs' masses differ ({} t): are they of one vehicle? Models then take the mass as a parameter",
+            shown.join(", ")
+        )
+    })
+}
+
+/// Class that is proposed, that of domain practice for forces of crash structures.
+const CFC: u32 = 60;
+/// Finer records are sampled at this interval: CFC 60 leaves nothing that needs more.
+const FINEST_S: f64 = 1e-4;
+const MOST_STATES: f64 = 20_000.0;
+
+/// The times of a run's record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Times {
+    pub contact_s: f64,
+    pub last_s: f64,
+    /// Usual interval of the states.
+    pub interval_s: f64,
+    pub states: usize,
+}
+
+/// Steps that differ from their median by less than this factor are one rate with jitter.
+const JITTER: f64 = 0.5;
+
+/// The usual interval of rising times: the mean of those near the median, since solvers write the
+/// first cycle behind each multiple. 0 for fewer than two times.
+pub(super) fn interval(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(&median) = steps.get(steps.len() / 2) else { return 0.0 };
+    let usual = steps.iter().filter(|step| is_near(**step, median, JITTER));
+    let (sum, count) = usual.fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0));
+    sum / count
+}
+
+/// `means`: why the forces are means over their intervals, if they are.
+pub(super) fn filter(means: Option<&str>, interval_s: f64) -> Proposed<Filter> {
+    let longest_s = 1.0 / (10.0 * f64::from(CFC));
+    let ms = digits(interval_s * 1e3);
+    match means {
+        Some(why) => Proposed::found(Filter::None, Evidence::Read(why.into())),
+        None if interval_s <= longest_s => Proposed::found(
+            Filter::Cfc(CFC),
+            Evidence::Guessed(format!("the usual class; one force each {ms} ms allows it")),
+        ),
+        None => Proposed::found(
+            Filter::None,
+            Evidence::Computed(format!(
+                "one force each {ms} ms is too coarse for CFC {CFC}, which needs one each {} ms",
+                digits(longest_s * 1e3)
+            )),
+        ),
+    }
+}
+
+/// Common times that cover every record from its contact on; the coarsest interval of all.
+pub(super) fn sampling(runs: &[Times]) -> Option<Proposed<Sampling>> {
+    let coarsest = runs.iter().map(|run| run.interval_s).fold(0.0, f64::max);
+    let longest = runs.iter().map(|run| run.last_s - run.contact_s).fold(0.0, f64::max);
+    if !(coarsest > 0.0 && longest > 0.0) {
+        return None;
+    }
+    let least = coarsest.max(FINEST_S).max(longest / MOST_STATES);
+    let interval_s = rounded_interval(least, longest);
+    let states = (longest / interval_s * (1.0 + 1e-6)).floor() as usize + 1;
+    let alike = runs.iter().all(|run| is_near(run.interval_s, coarsest, 0.01));
+    let ms = |s: f64| digits(s * 1e3);
+    let from = match (alike, least > 1.01 * coarsest) {
+        (_, true) => format!(
+            "the records have a state each {} ms at the coarsest; {} ms is enough",
+            ms(coarsest),
+            ms(interval_s)
+        ),
+        (true, false) => {
+            format!("interval and length of the records, of up to {} states", most(runs))
+        }
+        (false, false) => "interval of the coarsest record, length of the longest".into(),
+    };
+    let sampling = Sampling { states: states.max(2), interval_s };
+    Some(Proposed::found(sampling, Evidence::Computed(from)))
+}
+
+fn most(runs: &[Times]) -> usize {
+    runs.iter().map(|run| run.states).max().unwrap_or(0)
+}
+
+/// The shortest decimal that is off by less than half an interval at the end of the record:
+/// solvers write the first cycle behind each multiple.
+fn rounded_interval(interval_s: f64, longest_s: f64) -> f64 {
+    let ms = interval_s * 1e3;
+    let states = longest_s / interval_s;
+    let decimals = (0..12).map(|digits| trimmed(&format!("{ms:.digits$}")));
+    decimals
+        .filter_map(|text| text.parse::<f64>().ok())
+        .find(|short| *short > 0.0 && (short / ms - 1.0).abs() * states < 0.5)
+        .map_or(interval_s, |short| short * 1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn by_momentum(kg: f64) -> MassEstimates {
+        MassEstimates { by_momentum: Some(kg), in_free_flight: true, by_energy: None }
+    }
+
+    #[test]
+    fn runs_that_scatter_have_one_mass() {
+        let runs =
+            [24_010.0, 23_990.0, 24_004.4, 20_240.0].map(|kg| (format!("{kg}"), by_momentum(kg)));
+        let mut warnings = Vec::new();
+        let found = agree(&runs, "unknown", &mut warnings);
+        let values: Vec<f64> = found.iter().map(|m| *m.value().unwrap()).collect();
+        assert_eq!(values, [24_000.0, 24_000.0, 24_000.0, 20_240.0]);
+        assert_eq!(
+            found[0].to_string(),
+            "computed: impulse of the force over the change of velocity, behind the contact; median of 3 runs, 23990 to 24010 kg"
+        );
+        assert_eq!(warnings, [""; 0]);
+        assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
+    }
+
+    #[test]
+    fn kinetic_energy_is_exact_where_both_agree() {
+        let both = |energy| MassEstimates { by_energy: Some(energy), ..by_momentum(23_500.0) };
+        let mut warnings = Vec::new();
+        let found = agree(&[("a".into(), both(24_000.0))], "", &mut warnings);
+        assert_eq!(found[0].value(), Some(&24_000.0));
+        assert_eq!(warnings, [""; 0]);
+        let found = agree(&[("a".into(), both(48_000.0))], "", &mut warnings);
+        assert_eq!(found[0].value(), Some(&23_500.0));
+        assert!(
+            warnings[0].starts_with("mass: in a momentum gives 23.5 t, the kinetic"),
+            "{warnings:?}"
+        );
+    }
+
+    #[test]
+    fn masses_are_written_with_four_digits() {
+        assert_eq!(
+            [24_003.7, 20_241.2, 812.34].map(|kg| text(rounded(kg))),
+            ["24t", "20.24t", "812.3kg"]
+        );
+    }
+}
+
+#[cfg(test)]
+mod sampling_tests {
+    use super::*;
+
+    fn record(interval_s: f64, contact_s: f64, last_s: f64) -> Times {
+        Times { contact_s, last_s, interval_s, states: (last_s / interval_s) as usize + 1 }
+    }
+
+    fn proposed(runs: &[Times]) -> Sampling {
+        *sampling(runs).unwrap().value().unwrap()
+    }
+
+    #[test]
+    fn the_records_interval_is_taken_without_the_solvers_jitter() {
+        let found = proposed(&[record(0.7500057e-3, 0.0, 0.2992523)]);
+        assert_eq!((found.states, found.interval_s), (400, 0.75e-3));
+        let found = proposed(&[record(1e-5, 0.01, 0.11)]);
+        assert_eq!((found.states, found.interval_s), (1001, 1e-4));
+        let found = proposed(&[record(1e-3, 0.0, 0.1), record(0.5e-3, 0.0, 0.2)]);
+        assert_eq!((found.states, found.interval_s), (201, 1e-3));
+        assert!(sampling(&[]).is_none());
+    }
+
+    #[test]
+    fn the_filter_is_what_the_interval_allows() {
+        assert_eq!(filter(None, 1e-4).value(), Some(&Filter::Cfc(60)));
+        assert_eq!(filter(None, 2e-3).value(), Some(&Filter::None));
+        assert_eq!(filter(Some("a mean"), 1e-4).to_string(), "read: a mean");
+    }
 }

@@ -5,39 +5,31 @@
 
 mod agree;
 mod describe;
-mod describe_runs;
-mod evidence;
 mod explain;
 mod folders;
-mod given;
-mod left_out;
-mod masses;
 mod measure;
 mod proposal;
 mod propose;
 mod record;
-mod sampling;
 mod scenario;
-mod series;
 mod sources;
 mod survey;
-mod text;
 mod units;
 mod write;
 
-use crate::error::{Error, error};
 use std::path::Path;
+use std::str::FromStr;
 
-pub(crate) use evidence::Proposed;
-pub(crate) use given::GivenForce;
-pub use given::UserHints;
-pub use left_out::LeftOut;
+use self::sources::FORCES;
+use crate::error::{Error, error};
+use crate::history::Side;
+use crate::study::StudyKind;
+use crate::unit::UnitSystem;
+pub use folders::LeftOut;
 pub use proposal::Proposal;
-pub(crate) use proposal::ProposedRun;
-pub use propose::Request;
-pub use propose::propose;
-pub(crate) use scenario::ScenarioProposal;
-pub(crate) use scenario::propose_scenario;
+pub(crate) use proposal::{Proposed, ProposedRun};
+pub use propose::{Request, propose};
+pub(crate) use scenario::{ScenarioProposal, propose_scenario};
 
 /// Refuses a file that is there already.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
@@ -51,5 +43,91 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
         ))
     } else {
         Ok(())
+    }
+}
+
+/// What the caller already knows: it stands above what is found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UserHints {
+    /// Units of the solver's files.
+    pub units: Option<UnitSystem>,
+    /// What hits what.
+    pub(crate) kind: Option<StudyKind>,
+    /// The runs are of one body against the symmetry plane of a pair.
+    pub half_model: bool,
+    /// Node of the (moving) body.
+    pub node: Option<i64>,
+    /// Node of the other body of a pair.
+    pub minus_node: Option<i64>,
+    pub(crate) force: Option<GivenForce>,
+    /// Mass of the body, in kg.
+    pub mass_kg: Option<f64>,
+    /// Mass of the other body of a pair, in kg.
+    pub other_mass_kg: Option<f64>,
+    /// Group of the curve database; it says as well that all runs belong to one group.
+    pub group: Option<String>,
+}
+
+/// A force as `FILE:ID[:SIDE][:COMPONENT]`, such as `rcforc:3:surfa`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct GivenForce {
+    /// One of `rwforc`, `rcforc`, `secforc`.
+    pub(crate) file: String,
+    /// Number of the wall, interface or section.
+    pub(crate) id: i64,
+    pub(crate) side: Option<Side>,
+    /// Such as `normal_force`.
+    pub(crate) component: Option<String>,
+}
+
+/// A text that names no force.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
+    FORCES.join(", ")
+)]
+pub(crate) struct ForceSpecError {
+    pub(crate) text: String,
+}
+
+impl FromStr for GivenForce {
+    type Err = ForceSpecError;
+
+    fn from_str(text: &str) -> Result<Self, ForceSpecError> {
+        let wrong = || ForceSpecError { text: text.into() };
+        let mut parts = text.split(':');
+        let file = parts.next().filter(|file| FORCES.contains(file)).ok_or_else(wrong)?;
+        let id = parts.next().and_then(|id| id.parse().ok()).ok_or_else(wrong)?;
+        let mut given = Self { file: file.into(), id, side: None, component: None };
+        for part in parts {
+            match Side::parse(part) {
+                Some(side) if given.side.is_none() && given.component.is_none() => {
+                    given.side = Some(side);
+                }
+                None if given.component.is_none() && part.ends_with("_force") => {
+                    given.component = Some(part.into());
+                }
+                _ => return Err(wrong()),
+            }
+        }
+        Ok(given)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_are_read() {
+        let force: GivenForce = "rcforc:3:slave:x_force".parse().unwrap();
+        assert_eq!((&*force.file, force.id, force.side), ("rcforc", 3, Some(Side::SurfA)));
+        assert_eq!(force.component.as_deref(), Some("x_force"));
+        assert_eq!("rwforc:1".parse::<GivenForce>().unwrap().component, None);
+        for wrong in
+            ["rwforc", "nodout:1", "rcforc:x", "rcforc:3:left", "rcforc:3:x_force:surfa", ""]
+        {
+            assert!(wrong.parse::<GivenForce>().is_err(), "{wrong}");
+        }
     }
 }

@@ -4,30 +4,24 @@
 //! What does not fit is left out with its reason. A study that is complete is tried before it is
 //! given: what a build would refuse is left out as well.
 
-use super::left_out::no_usable_run;
-use crate::error::{Error, error};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use super::agree::Agreed;
-use super::describe;
-use super::folders::{Folders, names, seen_from};
-use super::given::{GivenForce, UserHints};
-use super::left_out::{LeftOut, Reason};
+use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
 use super::measure::{Measured, SiRun};
 use super::proposal::Proposal;
-use super::record::Record;
+use super::record::{Record, Recorded, Surveyed};
 use super::sources::Sources;
 use super::survey::Survey;
-use super::units;
+use super::{GivenForce, UserHints, describe, units};
 use crate::curve::contact::milliseconds;
-use crate::study;
-use crate::study::StudyKind;
+use crate::error::{Error, error};
 use crate::study::extract::is_alike;
+use crate::study::{self, StudyKind};
 use crate::unit::UnitSystem;
-use std::path::Path;
 
 /// What a study is to be proposed for.
 #[derive(Clone, Debug)]
@@ -38,20 +32,6 @@ pub struct Request {
     pub study: PathBuf,
     /// What is known already.
     pub given: UserHints,
-}
-
-/// A run that was looked over.
-pub(super) struct Surveyed {
-    pub path: PathBuf,
-    pub name: String,
-    pub sources: Sources,
-    pub survey: Survey,
-}
-
-/// A run with the histories that the recipe names.
-pub(super) struct Recorded {
-    pub run: Surveyed,
-    pub record: Record,
 }
 
 /// Proposes a study for run folders.

@@ -1,16 +1,29 @@
 //! The histories of a run that the agreed recipe names, in the file's units.
 
+use std::path::PathBuf;
+
 use super::agree::{Agreed, ChosenForce};
-use super::left_out::Reason;
-use super::series::{component, impulse, picked, rising, velocity};
-use super::sources::{Source, Sources};
-use super::survey::bracketed;
+use super::folders::Reason;
+use super::sources::{Source, Sources, component, impulse, picked, rising, velocity};
+use super::survey::{STOPPED, Survey, bracketed};
 use crate::history::{EntityId, History};
 use crate::solver::WantedId;
 use crate::study::StudyKind;
 
-/// Bodies that still close at more than this share of their first speed have not been stopped.
-pub(super) const STOPPED: f64 = 0.05;
+/// A run that was looked over.
+pub(super) struct Surveyed {
+    pub path: PathBuf,
+    pub name: String,
+    pub sources: Sources,
+    pub survey: Survey,
+}
+
+/// A run with the histories that the recipe names.
+pub(super) struct Recorded {
+    pub run: Surveyed,
+    pub record: Record,
+}
+
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
 /// A flight behind the contact that is shorter than this, in states and as a share of the record,

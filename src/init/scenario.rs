@@ -1,19 +1,20 @@
 //! From models to a proposed scenario: vehicles with the models' masses meet at a speed that the
 //! models were trained for.
 
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::evidence::{Evidence, Proposed};
+use serde::Serialize;
+
 use super::folders::seen_from;
-use super::masses;
-use super::text::{Text, inline, quoted, speed_text};
+use super::measure;
+use super::proposal::{Evidence, Proposed};
+use super::write::{Text, inline, quoted, speed_text};
 use crate::curve::Parameter;
+use crate::error::{Error, error};
 use crate::scenario;
 use crate::surrogate::Model;
 use crate::unit::{SpeedKind, km_per_h};
-use serde::Serialize;
 
 /// Vehicles of a train that has a curve between them.
 const VEHICLES: usize = 3;
@@ -243,7 +244,7 @@ impl ScenarioProposal {
         }
         text.line("vehicles = [");
         for vehicle in &train.vehicles {
-            let mass = vehicle.mass_kg.value().map_or(String::new(), |kg| masses::text(*kg));
+            let mass = vehicle.mass_kg.value().map_or(String::new(), |kg| measure::text(*kg));
             text.line(&format!(
                 "    {{ name = {}, mass = {} }},    # {}",
                 quoted(&vehicle.name),

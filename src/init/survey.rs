@@ -8,13 +8,16 @@
 
 use std::collections::HashMap;
 
-use super::left_out::Reason;
-use super::series::{Fit, by_entity, component, impulse, largest, picked, rising, velocity};
-use super::sources::Source;
-use super::sources::{FORCES, Sources};
+use super::folders::Reason;
+use super::sources::{
+    FORCES, Fit, Source, Sources, by_entity, component, impulse, largest, picked, rising, velocity,
+};
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::{EntityId, History, Side};
 use crate::solver::{SolverFile, WantedId};
+
+/// Bodies that still close at more than this share of their first speed have not been stopped.
+pub(super) const STOPPED: f64 = 0.05;
 
 /// Fewest states of a record that can be judged.
 const FEWEST_STATES: usize = 8;

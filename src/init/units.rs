@@ -4,7 +4,7 @@
 //! has a speed, a crush, a time to the largest crush, a mean deceleration and a mass that vehicles
 //! have.
 
-use super::evidence::{Evidence, Proposed};
+use super::proposal::{Evidence, Proposed};
 use crate::unit::{UnitSystem, km_per_h};
 
 /// What of an impact depends on the units, in the file's.

@@ -1,12 +1,58 @@
-//! Which kind of file it is: told by its content, and by its name where that is not enough.
+//! The kinds of files that are read, and which one a file is: told by its content, and by its name where that is not enough.
 
 use std::io::Read;
 use std::path::Path;
 
-use super::format::{FORMATS, Format};
+use super::format::Format;
 use super::source::{self, Source, Stream};
-use super::{SolverFile, lsdyna, unknown_format};
+use super::{SolverFile, lsdyna, openradioss, unknown_format};
 use crate::error::{Error, error};
+use crate::guess;
+
+/// Every file we read, in the order in which their signatures are tried. To add one: write its
+/// module with its `FORMAT`, and add that here.
+pub const FORMATS: &[Format] = &[
+    lsdyna::nodout::FORMAT,
+    lsdyna::rcforc::FORMAT,
+    lsdyna::rwforc::FORMAT,
+    lsdyna::secforc::FORMAT,
+    lsdyna::glstat::FORMAT,
+    lsdyna::matsum::FORMAT,
+    lsdyna::spcforc::FORMAT,
+    lsdyna::bndout::FORMAT,
+    lsdyna::sleout::FORMAT,
+    lsdyna::swforc::FORMAT,
+    lsdyna::abstat::FORMAT,
+    lsdyna::curvout::FORMAT,
+    lsdyna::deforc::FORMAT,
+    lsdyna::jntforc::FORMAT,
+    lsdyna::rbdout::FORMAT,
+    lsdyna::nodfor::FORMAT,
+    // Before elout, whose name begins the same.
+    lsdyna::elout::DETAILS,
+    lsdyna::elout::FORMAT,
+    lsdyna::binout::FORMAT,
+    openradioss::FORMAT,
+];
+
+/// What an id of this format or section counts, for messages.
+pub(crate) fn entity_word(section: &str) -> &'static str {
+    let name = section.strip_suffix("/forces").unwrap_or(section);
+    FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
+}
+
+/// The formats' names, for messages: `nodout, rcforc, …`.
+pub(crate) fn format_names() -> String {
+    FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
+    FORMATS.iter().find(|f| f.name == name).ok_or_else(|| {
+        let known = format_names();
+        let hint = guess::hint(name, &known);
+        error!(SolverFile, "there is no format \"{name}\": the readers take {known}{hint}")
+    })
+}
 
 /// Lines looked at before a file counts as unknown: more than the longest legend seen,
 /// few enough that a large foreign file is refused at once.

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::format::entity_word;
+use super::detect::entity_word;
 use super::{Entity, NoDataReason, Selection, SolverFile};
 use crate::error::{Error, KeyPath, error};
 use crate::guess;

@@ -2,11 +2,8 @@
 
 use std::io;
 
-use super::problem;
 use super::source::Source;
-use super::{Selection, SolverFile, lsdyna, openradioss};
-use crate::error::{Error, error};
-use crate::guess;
+use super::{Selection, SolverFile, problem};
 
 /// One kind of file: its name, how to recognise it, how to read it.
 pub struct Format {
@@ -26,38 +23,6 @@ enum Reader {
     Text { signature: fn(&[u8]) -> bool, read: ReadText },
     /// Bytes, told by the first of them; over one or several files; sections inside.
     Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
-}
-
-/// Every file we read, in the order in which their signatures are tried. To add one: write its
-/// module with its `FORMAT`, and add that here.
-pub const FORMATS: &[Format] = &[
-    lsdyna::nodout::FORMAT,
-    lsdyna::rcforc::FORMAT,
-    lsdyna::rwforc::FORMAT,
-    lsdyna::secforc::FORMAT,
-    lsdyna::glstat::FORMAT,
-    lsdyna::matsum::FORMAT,
-    lsdyna::spcforc::FORMAT,
-    lsdyna::bndout::FORMAT,
-    lsdyna::sleout::FORMAT,
-    lsdyna::swforc::FORMAT,
-    lsdyna::abstat::FORMAT,
-    lsdyna::curvout::FORMAT,
-    lsdyna::deforc::FORMAT,
-    lsdyna::jntforc::FORMAT,
-    lsdyna::rbdout::FORMAT,
-    lsdyna::nodfor::FORMAT,
-    // Before elout, whose name begins the same.
-    lsdyna::elout::DETAILS,
-    lsdyna::elout::FORMAT,
-    lsdyna::binout::FORMAT,
-    openradioss::FORMAT,
-];
-
-/// What an id of this format or section counts, for messages.
-pub(crate) fn entity_word(section: &str) -> &'static str {
-    let name = section.strip_suffix("/forces").unwrap_or(section);
-    FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
 }
 
 impl Format {
@@ -112,17 +77,4 @@ impl Format {
         }
         Ok(sections)
     }
-}
-
-/// The formats' names, for messages: `nodout, rcforc, …`.
-pub(crate) fn format_names() -> String {
-    FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
-}
-
-pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
-    FORMATS.iter().find(|f| f.name == name).ok_or_else(|| {
-        let known = format_names();
-        let hint = guess::hint(name, &known);
-        error!(SolverFile, "there is no format \"{name}\": the readers take {known}{hint}")
-    })
 }

@@ -1,12 +1,12 @@
 //! What a model keeps of its training cases, and their curves by force.
 
-use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 use super::CaseCurve;
 use super::cached::Cached;
 use crate::curve::ForceKind;
 use crate::dataset::{STEPS, TrainingCase, grid};
+use crate::error::Error;
 
 /// Forces beyond this are damage, not measurement.
 const LARGEST_N: f64 = 1e15;

@@ -1,6 +1,5 @@
 //! What the table of models says of each.
 
-use crate::error::{Error, error};
 use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
@@ -11,6 +10,7 @@ use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, CrushLaw, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
+use crate::error::{Error, error};
 
 /// One model: what it is called, what it needs, how it is fitted and read again.
 #[derive(Clone, Copy, Debug)]

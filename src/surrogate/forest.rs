@@ -8,13 +8,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use super::entry::{ModelEntry, loaded};
+pub use super::forest_options::ForestOptions;
 use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 use crate::forest::{ForestError, RegressionForest, Thresholds};
-
-pub use super::forest_options::ForestOptions;
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "forest",

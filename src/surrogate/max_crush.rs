@@ -5,12 +5,12 @@
 //! energy too early (W/E in `db ls`). A model uses the rule with the smallest errors of crush and energy when speeds were
 //! left out, never the spline, which need not be monotone; `--paper` uses the spline.
 
-use crate::error::{Error, error};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
 use crate::curve::Envelope;
+use crate::error::{Error, error};
 
 /// How the maximal crush is found.
 #[derive(

@@ -24,7 +24,29 @@ mod model_file;
 pub(crate) mod models;
 mod nearest;
 pub(crate) mod predict;
-pub(crate) use predict::invalid;
+use std::fmt::Debug;
+
+use serde_json::value::RawValue;
+
+pub use band::{Band, LeftOutSpeeds, ScatterWidths};
+pub use cases::ModelCase;
+pub use crush_law::CrushLaw;
+pub(crate) use curves::CaseCurve;
+pub use entry::ModelEntry;
+pub use forest::{ForestOptions, ForestSurrogate};
+pub use leave_one_out::{
+    BodyScatter, Floor, LeftOut, Means, PeakError, Scatter, SpeedScatter, Validation,
+};
+pub use max_crush::{MaxCrush, MaxCrushRule};
+pub use model::Model;
+pub(crate) use models::MODELS;
+pub use models::ModelKind;
+pub use predict::{Beyond, predict, predict_beyond, predict_driving};
+pub use predicted::PredictedCurve;
+pub(crate) use predicted::invalid;
+pub use predicted::{ForestQuantiles, Provenance, Rebound};
+pub use query::Query;
+pub use warning::{Warning, WarningCode};
 pub(crate) mod predicted;
 mod query;
 mod rate;
@@ -32,40 +54,6 @@ pub(crate) mod recorded;
 mod registered;
 mod spikes;
 pub(crate) mod warning;
-
-use std::fmt::Debug;
-
-use serde_json::value::RawValue;
-
-pub use band::Band;
-pub use band::LeftOutSpeeds;
-pub use band::ScatterWidths;
-pub use cases::ModelCase;
-pub use crush_law::CrushLaw;
-pub(crate) use curves::CaseCurve;
-pub use entry::ModelEntry;
-pub use forest::ForestOptions;
-pub use forest::ForestSurrogate;
-pub use leave_one_out::BodyScatter;
-pub use leave_one_out::Floor;
-pub use leave_one_out::PeakError;
-pub use leave_one_out::SpeedScatter;
-pub use leave_one_out::{LeftOut, Means, Scatter, Validation};
-pub use max_crush::MaxCrush;
-pub use max_crush::MaxCrushRule;
-pub use model::Model;
-pub(crate) use models::MODELS;
-pub use models::ModelKind;
-pub use predict::Beyond;
-pub use predict::PredictedCurve;
-pub use predict::Query;
-pub use predict::predict;
-pub use predict::{predict_beyond, predict_driving};
-pub use predicted::ForestQuantiles;
-pub use predicted::Provenance;
-pub use predicted::Rebound;
-pub use warning::Warning;
-pub use warning::WarningCode;
 
 /// Where a surrogate is asked.
 #[derive(Clone, Copy, Debug)]

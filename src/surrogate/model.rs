@@ -1,6 +1,5 @@
 //! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
 
-use crate::error::{Error, error};
 use std::sync::Arc;
 
 use super::band::{self, Band};
@@ -17,6 +16,7 @@ use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{Feature, TrainingSet, nearest};
+use crate::error::{Error, error};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A nearest training speed further away than this share of the speed causes a warning.

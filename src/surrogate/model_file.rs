@@ -1,7 +1,6 @@
 //! Model files: versioned, self-describing JSON, readable without this program
 //! (`schemas/model.md`).
 
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,6 +16,7 @@ use super::models::ModelKind;
 use super::{Model, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::Feature;
+use crate::error::{Error, error};
 use crate::file::{self, write_whole};
 use crate::unit::{SpeedKind, UnitSystem};
 

@@ -1,6 +1,5 @@
 //! The models that can be trained: one line each in `MODELS`.
 
-use crate::guess;
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -8,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub(crate) use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
 use super::{crush_law_model, extra, forest, linear, nearest, rate, registered};
+use crate::guess;
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
 /// line here.

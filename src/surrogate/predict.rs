@@ -17,18 +17,13 @@
 
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
-pub(crate) use super::predicted::ForestQuantiles;
-pub use super::predicted::PredictedCurve;
-pub(crate) use super::predicted::Provenance;
-pub use super::query::Query;
-use super::query::{ResolvedQuery, over_speed};
+use super::predicted::{ForestQuantiles, PredictedCurve, Provenance, envelope};
+use super::query::{Query, ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
-use crate::curve::Envelope;
-use crate::curve::{ForceCurve, ForceKind};
+use crate::curve::{Envelope, ForceCurve, ForceKind};
 use crate::dataset::{grid, nearest};
-use crate::error::error;
-use crate::error::{Error, ErrorCode};
+use crate::error::{Error, error};
 
 /// Points of a predicted curve besides (0, 0), as in the reference data.
 const POINTS: usize = 400;
@@ -357,13 +352,3 @@ fn evenly(end_m: f64) -> Vec<f64> {
 
 /// Bounds of an energy correction: beyond them level or crush is wrong, not the scale.
 pub(super) const CORRECTION: (f64, f64) = (0.8, 1.25);
-
-/// The envelope of a predicted curve.
-pub(super) fn envelope(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Envelope, Error> {
-    Envelope::new(deflection_m, force_n).map_err(invalid)
-}
-
-/// The error of a predicted curve that is not an envelope.
-pub(crate) fn invalid(error: Error) -> Error {
-    error.coded_as(ErrorCode::Prediction).of("the predicted curve is invalid")
-}

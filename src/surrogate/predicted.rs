@@ -1,7 +1,5 @@
 //! The predicted curve: the master format of exports, and what can be made of it.
 
-use super::predict::envelope;
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -11,6 +9,7 @@ use super::Warning;
 use super::band::Band;
 use super::max_crush::{MaxCrush, MaxCrushRule};
 use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Parameter};
+use crate::error::{Error, ErrorCode, error};
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// A predicted curve: the master format of exports (JSON).
@@ -378,4 +377,14 @@ fn pushing(name: &str, envelope: Envelope) -> Result<Envelope, Error> {
         }
         None => Ok(envelope),
     }
+}
+
+/// The envelope of a predicted curve.
+pub(super) fn envelope(deflection_m: Vec<f64>, force_n: Vec<f64>) -> Result<Envelope, Error> {
+    Envelope::new(deflection_m, force_n).map_err(invalid)
+}
+
+/// The error of a predicted curve that is not an envelope.
+pub(crate) fn invalid(error: Error) -> Error {
+    error.coded_as(ErrorCode::Prediction).of("the predicted curve is invalid")
 }

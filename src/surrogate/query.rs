@@ -1,6 +1,5 @@
 //! Queries: what is asked of a model, and what follows from that alone.
 
-use crate::error::{Error, ErrorCode, KeyPath, error};
 use std::collections::BTreeMap;
 
 use super::cases::ModelCase;
@@ -12,6 +11,7 @@ use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
 use crate::dataset::{MASS, OTHER_MASS, feature_values};
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::unit::Speed;
 
 /// Deviation of the mass from the training runs' that needs no warning.

@@ -1,15 +1,14 @@
 //! A recorded case in the form of a predicted curve, so that it exports like one.
 
-use super::predict::envelope;
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 
 use super::Warning;
 use super::max_crush::MaxCrush;
-use super::predicted::{PredictedCurve, Provenance, Rebound};
+use super::predicted::{PredictedCurve, Provenance, Rebound, envelope};
 use crate::curve::force_curve::ForceCurveError;
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
+use crate::error::{Error, error};
 
 /// The name that stands where a predicted curve has its model's.
 pub(crate) const RECORDED: &str = "recorded";

@@ -1,11 +1,11 @@
 //! Warnings of a prediction: the same codes in text and JSON.
 
-use crate::plural::counted;
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::plural::counted;
 use crate::unit::km_per_h;
 
 /// Something to know before trusting a predicted curve.

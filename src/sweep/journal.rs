@@ -7,8 +7,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::merge::{ShardFile, read_line};
-use super::row::ShardHeader;
+use super::row::{ShardFile, ShardHeader, read_line};
 use super::run::{self, Chunk};
 use super::statistics::Tally;
 use super::to_hdf5::{self, is_hdf5};

@@ -3,8 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::merge::ShardFile;
-use super::row::{FORMAT, LAYOUT, Line, ShardHeader, Status, bad_row};
+use super::row::{FORMAT, LAYOUT, Line, ShardFile, ShardHeader, Status, bad_row};
 use super::statistics::Tally;
 use super::{Shard, damaged, foreign};
 use crate::error::{Error, ErrorCode};
