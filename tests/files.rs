@@ -7,8 +7,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, edited, entries, fixture, python,
-    study_in,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, edited, entries, fixture,
+    python, study_in,
 };
 use hdf5_pure::{AttrValue, File as Hdf5};
 use serde_json::Value;
@@ -720,6 +720,8 @@ fn text_of_files_is_printed_without_control_characters() {
     for line in [
         "db ls curves.h5",
         "db show curves.h5",
+        "db ls curves.h5 --accept-changed",
+        "db show curves.h5 --accept-changed",
         "db check curves.h5",
         "train curves.h5 -o x.model",
         "validate curves.h5 --group none",
@@ -738,7 +740,8 @@ fn text_of_files_is_printed_without_control_characters() {
             assert!(hidden.is_empty(), "{line} printed {hidden:?}:\n{}", text.escape_debug());
         }
     }
-    let shown = crumple_ok(here, &["db", "show", "curves.h5", "--group", WALL, "--case", "36kmh"]);
+    let show = ["db", "show", "curves.h5", "--group", WALL, "--case", "36kmh", "--accept-changed"];
+    let shown = crumple_ok(here, &show);
     assert!(shown.contains("note: \u{fffd}]0;owned\u{fffd}\u{fffd}31m\u{fffd}\n"), "{shown}");
 }
 
@@ -972,4 +975,70 @@ fn the_only_group_needs_no_name() {
         );
     }
     assert!(!here.join("c.model").exists());
+}
+
+/// Changed numbers of a database stop every command that reads them, with the case named;
+/// `--accept-changed` goes on, and what changes or removes the case is let through.
+#[test]
+fn changed_numbers_are_not_read_in_silence() {
+    let folder = demo_folder();
+    let here = folder.path();
+    edited(&here.join("curves.h5"), |file| {
+        let case = file.root().group(WALL).unwrap().group("48kmh").unwrap();
+        let force = case.dataset("force_N").unwrap().read_f64().unwrap();
+        case.delete("force_N").unwrap();
+        let force: Vec<f64> = force.iter().map(|f| 1.1 * f).collect();
+        case.create_dataset("force_N", |dataset| {
+            dataset.with_f64_data(&force);
+        })
+        .unwrap();
+    });
+    let scenario =
+        SCENARIO.to_string() + "{ database = \"curves.h5\", case = \"lead-car-wall/48kmh\" }\n";
+    fs::write(here.join("changed.toml"), scenario).unwrap();
+    for line in [
+        "db ls curves.h5",
+        "db show curves.h5",
+        "db tag curves.h5 --group lead-car-wall --add seen",
+        "train curves.h5 --group lead-car-wall --model linear -o x.model",
+        "validate curves.h5 --group lead-car-wall",
+        "export curves.h5 --group lead-car-wall --case 48kmh --to csv",
+        "plot curves.h5 --group lead-car-wall -o x.svg",
+        "report curves.h5 -o x.html",
+        "simulate changed.toml",
+    ] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let error = crumple_fails(here, 1, &words);
+        assert!(
+            error.contains("the values of case lead-car-wall/48kmh are not"),
+            "{line}: {error}"
+        );
+        if !line.starts_with("validate") && !line.starts_with("report") {
+            crumple_ok(here, &[&words[..], &["--accept-changed"]].concat());
+        }
+    }
+    // What does not change the numbers of the others, or takes the changed ones away.
+    crumple_ok(here, &["db", "show", "curves.h5", "--group", WALL, "--case", "36kmh"]);
+    crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "48kmh"]);
+    crumple_ok(here, &["db", "ls", "curves.h5"]);
+    // Models, by one digit.
+    let text = fs::read_to_string(here.join("lead.model")).unwrap();
+    assert!(text.contains("\"mass_kg\":24000.0"), "{}", &text[..300]);
+    fs::write(here.join("x.model"), text.replacen("\"mass_kg\":24000.0", "\"mass_kg\":24001.0", 1))
+        .unwrap();
+    let predict = ["predict", "x.model", "--speed", "50km/h"];
+    let error = crumple_fails(here, 1, &predict);
+    assert!(error.contains("x.model: the model is not the one that was written"), "{error}");
+    crumple_ok(here, &[&predict[..], &["--accept-changed"]].concat());
+    // A file without a fingerprint, of an earlier program: what its energies show.
+    let (old, _) = text.split_once(",\"fingerprint\"").unwrap();
+    fs::write(here.join("x.model"), format!("{old}}}\n")).unwrap();
+    crumple_ok(here, &predict);
+    let old = old.replacen("\"mass_kg\":24000.0", "\"mass_kg\":12000.0", 1);
+    fs::write(here.join("x.model"), format!("{old}}}\n")).unwrap();
+    let error = crumple_fails(here, 1, &predict);
+    assert!(
+        error.contains("of the impact's energy: a mass, speed or force was changed"),
+        "{error}"
+    );
 }

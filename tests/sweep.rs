@@ -578,11 +578,14 @@ fn a_torn_end_is_cut() {
     folder.write(&sweep, "whole.csv", &options).unwrap();
     let whole = folder.read("whole.csv");
     let part = folder.path().join("out.csv.part");
+    let sum = |line: &[u8]| format!("{}\n", &blake3::hash(line).to_hex()[..16]);
+    let sums: String = whole.split_inclusive(|b| *b == b'\n').skip(8).map(sum).collect();
     let go_on = |left: &[u8]| {
         fs::write(&part, left).unwrap();
+        fs::write(folder.path().join("out.csv.part.sums"), &sums).unwrap();
         let resumed = folder.write(&sweep, "out.csv", &options).unwrap();
         assert!(folder.read("out.csv") == whole, "after {} bytes", left.len());
-        assert!(!part.exists());
+        assert_eq!(folder.names().iter().filter(|name| name.contains(".part")).count(), 0);
         fs::remove_file(folder.path().join("out.csv")).unwrap();
         resumed
     };
@@ -606,6 +609,19 @@ fn a_torn_end_is_cut() {
     let skipped = text.lines().filter(|l| !l.starts_with("5,")).collect::<Vec<_>>().join("\n");
     assert_eq!(go_on(skipped.as_bytes()), 5);
     assert_eq!(go_on(format!("{text}12,rest\n").as_bytes()), 12);
+    // One digit that is another: from its row on all is run again.
+    let row = text.lines().position(|line| line.starts_with("7,")).unwrap();
+    let changed: Vec<String> = text
+        .lines()
+        .enumerate()
+        .map(|(k, line)| {
+            let line = line.to_string();
+            if k == row { line.replacen(",3000000.0,", ",3000001.0,", 1) } else { line }
+        })
+        .collect();
+    let changed = changed.join("\n") + "\n";
+    assert!(changed != text);
+    assert_eq!(go_on(changed.as_bytes()), 7);
 }
 
 #[test]

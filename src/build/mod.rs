@@ -98,7 +98,8 @@ pub fn build(
 ) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
-    let mut database = if path.is_file() { Database::read(path)? } else { Database::default() };
+    let mut database =
+        if path.is_file() { Database::read_as_it_is(path)? } else { Database::default() };
     let located: Vec<Result<LocatedRun<'_>, Error>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
     let previous = previous(&study, &located, &database);

@@ -37,7 +37,7 @@ use std::sync::Arc;
 
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
-use crate::file::is_same;
+use crate::file::{self, is_same};
 use clap::{FromArgMatches, Parser, Subcommand};
 
 #[derive(Parser)]
@@ -67,6 +67,9 @@ pub struct GlobalOptions {
     /// Exit with code 3 if there was damage or a warning
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub strict: bool,
+    /// Read databases, models and unfinished sweeps whose numbers are not those that were written
+    #[arg(long, global = true, help_heading = GLOBAL)]
+    pub accept_changed: bool,
 }
 
 #[derive(Subcommand)]
@@ -214,6 +217,7 @@ pub fn main() -> ExitCode {
         Err(code) => return code,
     };
     let options = cli.options;
+    file::accept_changed(options.accept_changed);
     ExitCode::from(match run(cli.command, options) {
         Ok(Outcome::Clean) => DONE,
         Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,

@@ -16,7 +16,7 @@ pub(crate) fn remove(
     effect: Effect,
 ) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
-    let mut database = Database::read(path)?;
+    let mut database = Database::read_as_it_is(path)?;
     let chosen: Vec<Case> = selection.find(path, &database)?.into_iter().cloned().collect();
     database.remove(&chosen.iter().map(CasePath::of).collect());
     write(&database, path, effect)?;

@@ -36,7 +36,8 @@ use std::path::Path;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
-use crate::file::write_whole;
+use crate::file::{accepts_changed, write_whole};
+use layout::{Content, FoundCase};
 
 /// The cases of one database file.
 ///
@@ -77,8 +78,18 @@ impl Database {
     ///
     /// # Errors
     /// If the file is missing, not HDF5, not a curve database, of
-    /// another layout, or damaged; it names the case and dataset.
+    /// another layout, or damaged, or holds values that are not those that were written; it names the
+    /// case and dataset.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let database = Self::read_as_it_is(path)?;
+        match database.altered.keys().next() {
+            Some(case) if !accepts_changed() => Err(changed(path, case, database.altered.len())),
+            _ => Ok(database),
+        }
+    }
+
+    /// Reads a database file, also with cases whose values are not those that were written.
+    pub(crate) fn read_as_it_is(path: &Path) -> Result<Self, Error> {
         layout::decode(path)
     }
 
@@ -91,7 +102,11 @@ impl Database {
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
-            return Ok(opened.case(&group, case, &found)?.case);
+            let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;
+            if opened.hashes_of(&Content::of(&case)?) != hashes && !accepts_changed() {
+                return Err(changed(path, &CasePath::of(&case), 1));
+            }
+            return Ok(case);
         }
         // What there is instead, for the message; or a database with groups of others in it.
         let all = Self::read(path)?;
@@ -334,7 +349,7 @@ pub(crate) fn remember_origin(case: &mut Case) {
 /// BLAKE3 of the curves of a case and of what they are of: speed, masses, parameters and kinds, and
 /// not of names, notes or where it is from.
 pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
-    Ok(layout::Content::of(case)?.record_hash())
+    Ok(Content::of(case)?.record_hash())
 }
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
@@ -357,6 +372,16 @@ fn sort(cases: &mut [Case]) {
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<_> = names.collect();
     if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+/// The error of cases whose values are not those that were written.
+fn changed(path: &Path, case: &CasePath, count: usize) -> Error {
+    let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
+    error!(
+        Database,
+        "{}: the values of case {case}{more} are not those that were written, by the fingerprint beside them: crumple db check shows which; build the case anew or remove it (crumple db rm), or go on with --accept-changed",
+        path.display()
+    )
 }
 
 /// The error of what a database holds and should not.

@@ -7,6 +7,7 @@ mod write;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use lock::WriterLock;
 pub(crate) use write::not_written;
@@ -14,6 +15,20 @@ pub(crate) use write::write_all_whole;
 pub use write::write_at;
 pub(crate) use write::write_by_path;
 pub(crate) use write::write_whole;
+
+/// Whether content is read that is not what was written, by the fingerprint beside it. The command line
+/// sets it once, as it would a level of logging; a library's caller is refused such content.
+static ACCEPTS_CHANGED: AtomicBool = AtomicBool::new(false);
+
+/// Lets content be read that is not what was written.
+pub(crate) fn accept_changed(is_accepted: bool) {
+    ACCEPTS_CHANGED.store(is_accepted, Ordering::Relaxed);
+}
+
+/// Whether content is read that is not what was written.
+pub(crate) fn accepts_changed() -> bool {
+    ACCEPTS_CHANGED.load(Ordering::Relaxed)
+}
 
 /// What can be read at a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

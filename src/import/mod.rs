@@ -56,8 +56,11 @@ pub(crate) struct Settings {
 /// their cases in the order of the items.
 pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
-    let mut database =
-        if path.try_exists().unwrap_or(true) { Database::read(path)? } else { Database::default() };
+    let mut database = if path.try_exists().unwrap_or(true) {
+        Database::read_as_it_is(path)?
+    } else {
+        Database::default()
+    };
     let mut cases: Vec<Case> = Vec::with_capacity(items.len());
     let now = clock::now_utc();
     for item in items {

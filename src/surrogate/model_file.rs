@@ -14,11 +14,12 @@ use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::ModelKind;
 use super::{Model, Surrogate};
-use crate::curve::ForceKind;
+use crate::curve::energy::POSSIBLE;
+use crate::curve::{Envelope, ForceKind, Masses};
 use crate::dataset::Feature;
 use crate::error::{Error, error};
 use crate::file::{self, write_whole};
-use crate::unit::{SpeedKind, UnitSystem};
+use crate::unit::{Speed, SpeedKind, UnitSystem};
 
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
@@ -65,6 +66,24 @@ struct ModelFile<'a> {
     fitted: &'a RawValue,
     #[serde(borrow, default)]
     fitted_body: Option<&'a RawValue>,
+    /// BLAKE3 of the file without this key; absent in files of earlier versions of the program.
+    #[serde(default, skip_serializing)]
+    fingerprint: Option<String>,
+}
+
+/// The key of the fingerprint, the last of the file, as it is written.
+const FINGERPRINT: &str = ",\"fingerprint\":\"";
+
+/// Whether a file's text is that of its fingerprint.
+fn is_as_written(text: &[u8], fingerprint: &str) -> bool {
+    let end = format!("{FINGERPRINT}{fingerprint}\"}}");
+    let without = text.trim_ascii_end().strip_suffix(end.as_bytes());
+    without.is_some_and(|without| hash(without) == fingerprint)
+}
+
+/// The hash of a model file up to its last brace.
+fn hash(without_brace: &[u8]) -> String {
+    blake3::Hasher::new().update(without_brace).update(b"}").finalize().to_hex().to_string()
 }
 
 impl Model {
@@ -139,7 +158,43 @@ impl Model {
             crush_law: file.crush_law,
         };
         model.check().map_err(damaged)?;
-        Ok(model)
+        match &file.fingerprint {
+            Some(fingerprint) if !is_as_written(text, fingerprint) && !file::accepts_changed() => {
+                Err(error!(
+                    Model,
+                    "{}: the model is not the one that was written, by its fingerprint: train it again with crumple train, or go on with --accept-changed",
+                    path.display()
+                ))
+            }
+            None if !file::accepts_changed() => match model.impossible_case() {
+                Some(found) => Err(error!(
+                    Model,
+                    "{}: {found}: a mass, speed or force was changed in it, and the file has no fingerprint that would say so: train the model again with crumple train, or go on with --accept-changed",
+                    path.display()
+                )),
+                None => Ok(model),
+            },
+            _ => Ok(model),
+        }
+    }
+
+    /// The first case whose work cannot be that of its impact, in words.
+    fn impossible_case(&self) -> Option<String> {
+        let masses = Masses { body_kg: self.mass_kg, other_kg: self.other_mass_kg };
+        self.cases.iter().filter(|case| !case.truncated && case.features.is_empty()).find_map(
+            |case| {
+                let curve = Envelope::new(case.deflection_m.clone(), case.force_n.clone()).ok()?;
+                let speed = Speed { m_per_s: case.speed_m_per_s, kind: self.speed_kind };
+                let ratio = curve.work() / masses.kinetic_energy_j(speed);
+                let (least, most) = POSSIBLE;
+                (!(least..=most).contains(&ratio)).then(|| {
+                    format!(
+                        "the work of its case \"{}\" is {ratio:.3} of the impact's energy",
+                        case.name
+                    )
+                })
+            },
+        )
     }
 
     /// What a fitted model guarantees and a file might not.
@@ -225,9 +280,12 @@ impl Model {
             crush_law: self.crush_law.clone(),
             fitted: &fitted,
             fitted_body: fitted_body.as_deref(),
+            fingerprint: None,
         };
         let mut bytes = serde_json::to_vec(&file)?;
-        bytes.push(b'\n');
+        bytes.pop();
+        let fingerprint = hash(&bytes);
+        bytes.extend(format!("{FINGERPRINT}{fingerprint}\"}}\n").into_bytes());
         Ok(bytes)
     }
 

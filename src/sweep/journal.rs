@@ -13,7 +13,7 @@ use super::statistics::Tally;
 use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, Sweep, foreign};
 use crate::error::Error;
-use crate::file::{WriterLock, not_written};
+use crate::file::{WriterLock, accepts_changed, not_written};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,8 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 /// `.hdf5`, else CSV.
 ///
 /// Rows go to `OUTPUT.part` first. If that is there from an earlier run of the same sweep, its
-/// whole rows are kept and the run goes on after them; if `output` itself is there and is this
+/// rows are kept as far as they are whole and the sums in `OUTPUT.part.sums` are theirs, and the run goes
+/// on after them; if `output` itself is there and is this
 /// sweep's, nothing is run. `progress` is told the number of rows there are, before the first
 /// run and after each chunk, and may break: then `OUTPUT.part` stays for the next time.
 ///
@@ -59,21 +60,24 @@ pub fn write(
     let output = &fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf());
     let _lock = WriterLock::take(output)?;
     let head = ShardHeader::of(sweep, options.shard);
-    let part = beside(output, ".part");
+    let (part, sums) = (beside(output, ".part"), beside(output, ".part.sums"));
     let mut tally = Tally::new(&head);
     if options.restart {
-        match fs::remove_file(&part) {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(&part)(e)),
-            _ => {}
+        for left in [&part, &sums] {
+            match fs::remove_file(left) {
+                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(left)(e)),
+                _ => {}
+            }
         }
     } else if output.exists() {
         complete(output, &head, &mut tally)?;
-        // Left if a kill came just before its removal; it holds nothing more.
+        // Left if a kill came just before their removal; they hold nothing more.
         let _ = fs::remove_file(&part);
+        let _ = fs::remove_file(&sums);
         tally.resumed = tally.done;
         return Ok(tally.close());
     }
-    let mut file = resume(&part, &head, &mut tally)?;
+    let (mut file, mut of_rows) = resume(&part, &sums, &head, &mut tally)?;
     tally.resumed = tally.done;
     let write_failed = failed(output);
     let mut flow = progress(tally.done);
@@ -82,6 +86,8 @@ pub fn write(
         run::rows(sweep, rows, options.chunk, |chunk| {
             let bytes: Vec<u8> = chunk.iter().flat_map(|w| w.line.iter().copied()).collect();
             file.write_all(&bytes).map_err(&write_failed)?;
+            let sums: String = chunk.iter().map(|w| sum(&w.line)).collect();
+            of_rows.write_all(sums.as_bytes()).map_err(&write_failed)?;
             chunk.iter().for_each(|written| tally.see(written));
             flow = progress(tally.done);
             Ok(flow)
@@ -98,6 +104,7 @@ pub fn write(
         } else {
             fs::rename(&part, output).map_err(&write_failed)?;
         }
+        let _ = fs::remove_file(&sums);
     }
     Ok(tally.close())
 }
@@ -132,11 +139,31 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> Error + '_ {
     move |source| not_written(path, source)
 }
 
-/// Opens the file under work behind its last whole row; makes it if it is not there.
-fn resume(part: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<File, Error> {
+/// The checksum of a row as a line of its own: a digit that a bad block or an editor has changed is run
+/// again, not taken for a result.
+fn sum(line: &[u8]) -> String {
+    format!("{}\n", &blake3::hash(line).to_hex()[..SUM - 1])
+}
+
+/// Bytes of a checksum with its line feed.
+const SUM: usize = 17;
+
+/// Opens the file under work behind the last row that is whole and as it was written, and that of the
+/// sums; makes them if they are not there.
+fn resume(
+    part: &Path,
+    sums: &Path,
+    head: &ShardHeader,
+    tally: &mut Tally,
+) -> Result<(File, File), Error> {
     let io = |source| Error::io(part, source);
-    let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(part);
-    let mut file = open.map_err(failed(part))?;
+    let open = |path: &Path| {
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create(true).truncate(false).open(path).map_err(failed(path))
+    };
+    let mut file = open(part)?;
+    let mut of_rows = open(sums)?;
+    let mut written = BufReader::new(&of_rows);
     let wanted = head.text();
     let mut reader = BufReader::new(&file);
     let end = match ShardHeader::read(&mut reader).map_err(io)? {
@@ -146,7 +173,12 @@ fn resume(part: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<File, Er
             let mut line = Vec::new();
             loop {
                 let read = read_line(&mut reader, &mut line).map_err(io)?;
-                if read == 0 || !tally.see_line(&line) {
+                let mut sum_there = [0; SUM];
+                let is_as_written = read > 0
+                    && (accepts_changed()
+                        || written.read_exact(&mut sum_there).is_ok()
+                            && sum_there == sum(&line).as_bytes());
+                if !is_as_written || !tally.see_line(&line) {
                     break end;
                 }
                 end += read as u64;
@@ -167,7 +199,10 @@ fn resume(part: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<File, Er
     if end == 0 {
         file.write_all(wanted.as_bytes()).map_err(failed(part))?;
     }
-    Ok(file)
+    let end = tally.done * SUM as u64;
+    let at_end = of_rows.set_len(end).and_then(|()| of_rows.seek(SeekFrom::Start(end)));
+    at_end.map_err(failed(sums))?;
+    Ok((file, of_rows))
 }
 
 /// Checks an output that is there: this sweep's, with all its rows.

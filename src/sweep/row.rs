@@ -122,7 +122,7 @@ impl<'a> Line<'a> {
         if field.is_empty() {
             return Some(f64::NAN);
         }
-        fast_float2::parse(field).ok()
+        fast_float2::parse(field).ok().filter(|number: &f64| !number.is_nan())
     }
 }
 
