@@ -538,7 +538,7 @@ fn warnings_and_errors_name_the_interface() {
     let deflection_m = run.interfaces[0].max_deflection_m;
     assert!(deflection_m > 0.2);
     let beyond = format!(
-        "interface nose|wall is crushed {deflection_m:.4} m, beyond the end of its curve at 0.2000 m"
+        "interface nose|wall is crushed {deflection_m:.4} m, beyond the end of its curve's data at 0.2000 m: the force there is an assumption"
     );
     assert_eq!(run.warnings.len(), 2, "{:?}", run.warnings);
     assert_eq!(run.warnings[0], beyond);
@@ -558,7 +558,7 @@ fn warnings_and_errors_name_the_interface() {
         let error = simulate(&with(EnvelopeEnd::Error), &settings).unwrap_err().to_string();
         let words: Vec<&str> = error.split(' ').collect();
         assert_eq!(words[..4], ["interface", "nose|wall", "is", "crushed"], "{error}");
-        assert!(error.contains("s, beyond the end of its curve (0.2000 m)"), "{error}");
+        assert!(error.contains("s, beyond the end of its curve's data (0.2000 m)"), "{error}");
         let (deflection_m, time_s): (f64, f64) =
             (words[4].parse().unwrap(), words[7].parse().unwrap());
         // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.

@@ -465,12 +465,15 @@ fn items_that_fail_are_rows_with_their_reason() {
         &text.replace("unloading = \"200MN/m\" }", "unloading = \"200MN/m\", end = \"error\" }"),
     );
     folder.ok("sweep s.toml -q -o out.csv");
-    assert!(folder.text("out.csv").contains("beyond the end of its curve (0.6000 m)"));
+    assert!(folder.text("out.csv").contains("beyond the end of its curve's data (0.6000 m)"));
     // The crush beyond the end of a curve that is held is a warning.
     folder.put("s.toml", &text);
     folder.ok("sweep s.toml -q -o held.csv");
     let text = folder.text("held.csv");
-    assert!(text.contains(",warned,") && text.contains("beyond the end of its curve at 0.6000 m"));
+    assert!(
+        text.contains(",warned,")
+            && text.contains("beyond the end of its curve's data at 0.6000 m")
+    );
 }
 
 #[test]

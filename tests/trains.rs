@@ -54,7 +54,7 @@ fn shipped_scenarios_run() {
             let over = result["summary"]["limits"]["over"].as_array().unwrap();
             assert!(over.iter().all(|name| name != "O1" && name != "W1"), "{name}: {over:?}");
             let warnings = result["warnings"].to_string();
-            assert!(!warnings.contains("beyond the end of its curve"), "{name}: {warnings}");
+            assert!(!warnings.contains("beyond the end of its curve's data"), "{name}: {warnings}");
         }
         run += 1;
     }
@@ -479,4 +479,53 @@ fn a_curve_file_of_any_format_drives_an_interface() {
     std::fs::write(here.join("t.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();
     let (found, warnings) = crush("t.csv", "");
     assert!(found > 0.5 && warnings.contains("record over time"), "{found} {warnings}");
+}
+
+/// A train crushes its noses further than any FE run: the moment an interface leaves the data of its
+/// curve is a warning, `end = "error"` stops there, and limits are not judged.
+#[test]
+fn leaving_the_data_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let tail = ["export", "lead50.json", "--tail", "bottom", "--to", "csv", "-o", "tail.csv"];
+    crumple_ok(here, &tail);
+    let largest = {
+        let model: Value = json(&std::fs::read_to_string(here.join("lead.model")).unwrap());
+        let cases = model["cases"].as_array().unwrap().clone();
+        cases.iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).fold(0.0, f64::max)
+    };
+    let lead: Value = json(&std::fs::read_to_string(here.join("lead50.json")).unwrap());
+    let crush_m = lead["max_deflection_m"].as_f64().unwrap();
+    let limits = "[limits]\nstandard = \"EN 15227\"\nedition = \"2020\"\nmean_deceleration_g = 5.0";
+    let text = |curve: &str, mass: &str| {
+        let vehicles = format!("vehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]");
+        scenario(&format!("nose = {{ {curve} }}"), &vehicles, &format!("[wall]\n{limits}"))
+    };
+    let simulate = |curve: &str, mass: &str| -> Value {
+        std::fs::write(here.join("far.toml"), text(curve, mass)).unwrap();
+        json(&crumple_ok(here, &["simulate", "far.toml", "--json", "-q"]))
+    };
+    for (curve, end_m) in
+        [("model = \"lead.model\"", largest), ("file = \"tail.csv\", force = \"body\"", crush_m)]
+    {
+        let run = simulate(curve, "200t");
+        let nose = &run["summary"]["interfaces"][0];
+        assert!((nose["data_end_m"].as_f64().unwrap() / end_m - 1.0).abs() < 1e-6, "{nose}");
+        assert!(nose["max_deflection_m"].as_f64().unwrap() > end_m, "{nose}");
+        let said = format!("beyond the end of its curve's data at {end_m:.4} m");
+        assert!(run["warnings"].to_string().contains(&said), "{}", run["warnings"]);
+        assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!(["A1|wall"]));
+        let printed = crumple_ok(here, &["simulate", "far.toml"]);
+        assert!(
+            printed.contains("cannot be told: A1|wall left the data of the curve"),
+            "{printed}"
+        );
+        let stops = text(&format!("{curve}, end = \"error\""), "200t");
+        std::fs::write(here.join("far.toml"), stops).unwrap();
+        let error = crumple_fails(here, 1, &["simulate", "far.toml"]);
+        assert!(error.contains("end = \"hold\"") && error.contains(&format!("({end_m:.4} m)")));
+    }
+    let run = simulate("model = \"lead.model\"", "20t");
+    assert!(!run["warnings"].to_string().contains("beyond the end"), "{}", run["warnings"]);
+    assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!([]));
 }

@@ -50,6 +50,8 @@ struct Limits {
     trains: Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     over: Vec<String>,
+    /// Interfaces that were crushed beyond the data of their curves: then `over` is not a verdict.
+    beyond_data: Vec<String>,
     statement: String,
 }
 
@@ -86,6 +88,8 @@ struct InterfaceSummary {
     curve: String,
     curve_force: Option<&'static str>,
     curve_speed_m_per_s: Option<f64>,
+    /// Deflection up to which the curve has data: beyond it the force is an assumption.
+    data_end_m: f64,
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
@@ -232,6 +236,7 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
             curve: used.curve.clone(),
             curve_force: used.force,
             curve_speed_m_per_s: used.speed_m_per_s,
+            data_end_m: history.data_end_m,
         })
         .collect();
     let bodies: Vec<BodySummary> = prepared.order.iter().map(body).collect();
@@ -249,6 +254,10 @@ fn summary(prepared: &Prepared, run: &Run) -> Summary {
                 over && prepared.limited.contains(i)
             })
             .map(|(_, b)| b.name.clone())
+            .collect(),
+        beyond_data: run
+            .beyond_data()
+            .map(|k| prepared.chain.interfaces()[k].name.clone())
             .collect(),
         statement: format!(
             "mean decelerations come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
@@ -324,7 +333,13 @@ fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
 }
 
 fn print_limits(out: &mut dyn Write, limits: &Limits) -> io::Result<()> {
-    let over = if limits.over.is_empty() { "no vehicle".into() } else { limits.over.join(", ") };
+    let over = if !limits.beyond_data.is_empty() {
+        format!("cannot be told: {} left the data of the curve", limits.beyond_data.join(", "))
+    } else if limits.over.is_empty() {
+        "no vehicle".into()
+    } else {
+        limits.over.join(", ")
+    };
     let of = match &limits.trains {
         Some(trains) => format!(", of train {}", trains.join(", ")),
         None => String::new(),

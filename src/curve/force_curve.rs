@@ -22,6 +22,8 @@ pub struct ForceCurve {
     pub speed_kind: Option<SpeedKind>,
     /// Speed that it belongs to.
     pub speed_m_per_s: Option<f64>,
+    /// Deflection up to which its source has data, in m, where the loading branch goes on behind it.
+    pub data_end_m: Option<f64>,
 }
 
 /// What is known of a curve's unloading from its largest deflection.
@@ -63,6 +65,7 @@ impl ForceCurve {
             kind: None,
             speed_kind: None,
             speed_m_per_s: None,
+            data_end_m: None,
         }
     }
 

@@ -55,6 +55,9 @@ const AT_END_M: f64 = 1e-4;
 pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
     let grid = Grid::new(chain, settings)?;
     let mut run = Run::new(chain, &grid, settings.record);
+    for (history, interface) in run.interfaces.iter_mut().zip(chain.interfaces()) {
+        history.data_end_m = interface.law.end_m();
+    }
     run.warnings.extend(shortened_step(chain, settings, grid.step_s));
     match settings.method {
         Method::Reference => reference::run(chain, settings, &grid, &mut run)?,
@@ -112,7 +115,7 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
         for (what, deflection_m, end_m) in reached {
             if deflection_m > end_m + AT_END_M {
                 warnings.push(format!(
-                    "interface {} is {what} {deflection_m:.4} m, beyond the end of its curve at {end_m:.4} m",
+                    "interface {} is {what} {deflection_m:.4} m, beyond the end of its curve's data at {end_m:.4} m: the force there is an assumption",
                     interface.name
                 ));
             }

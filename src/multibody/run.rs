@@ -144,6 +144,8 @@ pub struct InterfaceHistory {
     pub max_extension_m: f64,
     /// Largest deflection in m.
     pub max_deflection_m: f64,
+    /// Deflection up to which the curve has data, in m: beyond it the force is an assumption.
+    pub data_end_m: f64,
     /// Time of the largest deflection in s.
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
@@ -251,6 +253,12 @@ impl Run {
         run
     }
 
+    /// Interfaces, counted from back to front, that were crushed beyond the data of their curves.
+    pub fn beyond_data(&self) -> impl Iterator<Item = usize> {
+        let is_beyond = |i: &InterfaceHistory| i.max_deflection_m > i.data_end_m + super::AT_END_M;
+        self.interfaces.iter().enumerate().filter(move |(_, i)| is_beyond(i)).map(|(k, _)| k)
+    }
+
     /// All that a user must know, as text.
     pub fn all_warnings(&self) -> Vec<String> {
         let mut warnings = self.ledger.warnings();
@@ -297,7 +305,7 @@ pub(super) fn curve_ended(
     let (name, end_m) = (&interface.name, law.end_m());
     error!(
         Simulation,
-        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve ({end_m:.4} m): give a longer curve, or end = \"hold\""
+        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve's data ({end_m:.4} m): give a longer curve, or end = \"hold\""
     )
     .at(KeyPath::of("interfaces").item(k))
 }

@@ -144,7 +144,15 @@ fn limits(prepared: &Prepared, run: &Run) -> Option<String> {
         .filter(is_over)
         .map(|i| prepared.chain.bodies()[*i].name.as_str())
         .collect();
-    let over = if over.is_empty() { "no vehicle".into() } else { over.join(", ") };
+    let beyond = run.beyond_data().map(|k| prepared.chain.interfaces()[k].name.as_str());
+    let beyond: Vec<&str> = beyond.collect();
+    let over = if !beyond.is_empty() {
+        format!("cannot be told, because {} left the data of the curve", beyond.join(", "))
+    } else if over.is_empty() {
+        "no vehicle".into()
+    } else {
+        over.join(", ")
+    };
     Some(format!(
         "Mean deceleration over {} g ({}:{}): {over}. They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
         limits.mean_deceleration_g, limits.standard, limits.edition

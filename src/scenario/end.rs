@@ -96,7 +96,11 @@ pub(super) fn crush_end(
         );
     }
     Ok(Crush {
-        curve: ForceCurve { unloading, ..ForceCurve::bare(loading) },
+        curve: ForceCurve {
+            unloading,
+            data_end_m: Some(model.largest_crush_m() / coordinates.deflection),
+            ..ForceCurve::bare(loading)
+        },
         rate: RateFactor {
             sensitivity_sqrt_s_per_m: law.sensitivity,
             share: coordinates.speed,
@@ -134,7 +138,7 @@ pub(super) fn crush_between(
     let curve = ForceCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
     let sensitivity_sqrt_s_per_m = law.sensitivity;
     Ok(Crush {
-        curve: ForceCurve { unloading, ..curve },
+        curve: ForceCurve { unloading, data_end_m: Some(model.largest_crush_m()), ..curve },
         rate: RateFactor { sensitivity_sqrt_s_per_m, share: 1.0, behind, ahead },
         stopping: None,
         speed_m_per_s,

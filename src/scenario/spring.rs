@@ -114,7 +114,8 @@ fn of_model(
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) =
         predict_driving(model, &query, force, table.band).map_err(predict_error)?;
-    let curve = curve.continued().map_err(|e| predict_error(invalid(e)))?;
+    let mut curve = curve.continued().map_err(|e| predict_error(invalid(e)))?;
+    curve.data_end_m = Some(model.largest_crush_m());
     Ok(Spring { curve, warnings: texts(&warnings) })
 }
 

@@ -177,6 +177,11 @@ impl Model {
         self.fitted.forest()
     }
 
+    /// The largest crush of its runs, in m.
+    pub(crate) fn largest_crush_m(&self) -> f64 {
+        self.cases.iter().map(|case| case.max_deflection_m).fold(0.0, f64::max)
+    }
+
     /// Lowest and highest training speed, in m/s.
     pub fn range_m_per_s(&self) -> (f64, f64) {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)

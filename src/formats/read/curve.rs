@@ -168,6 +168,7 @@ impl Metadata {
             kind: self.force,
             speed_kind: self.speed_kind,
             speed_m_per_s: self.speed_m_per_s,
+            data_end_m: self.max_deflection_m,
             ..ForceCurve::bare(loading)
         }
     }

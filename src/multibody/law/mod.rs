@@ -64,6 +64,8 @@ pub struct ForceLaw {
     envelope: Envelope,
     shape: UnloadingShape,
     end: EnvelopeEnd,
+    /// Deflection up to which the envelope rests on data, in m: its end if nothing else is known.
+    data_end_m: f64,
     /// Slope of the piece from each point of the envelope on; the last one beyond the end.
     slope_n_per_m: Vec<f64>,
     /// Integral of the work over the deflection at each point of the envelope.
@@ -150,7 +152,8 @@ impl ForceLaw {
                 Some(Memory::new(stiffness_n_per_m, steepest, share, stored_by, points))
             }
         };
-        Self { envelope, shape, end, slope_n_per_m, sum_jm, memory }
+        let data_end_m = envelope.end_m();
+        Self { envelope, shape, end, data_end_m, slope_n_per_m, sum_jm, memory }
     }
 
     /// Whether the largest deflection changes the force.
@@ -160,12 +163,18 @@ impl ForceLaw {
 
     /// Whether the run may not go to this deflection.
     pub(super) fn is_beyond_end(&self, deflection_m: f64) -> bool {
-        self.end == EnvelopeEnd::Error && deflection_m > self.envelope.end_m()
+        self.end == EnvelopeEnd::Error && deflection_m > self.end_m()
     }
 
-    /// Deflection at which the envelope's table ends, in m.
-    pub(super) fn end_m(&self) -> f64 {
-        self.envelope.end_m()
+    /// Deflection at which the envelope's data end, in m.
+    pub(crate) fn end_m(&self) -> f64 {
+        self.data_end_m
+    }
+
+    /// The same with data up to this deflection only, in m.
+    fn with_data_to(self, data_end_m: Option<f64>) -> Self {
+        let end_m = self.envelope.end_m();
+        Self { data_end_m: data_end_m.map_or(end_m, |m| m.min(end_m)), ..self }
     }
 
     /// Largest stiffness that an integrator meets, in N/m.

@@ -202,6 +202,10 @@ pub enum UnloadingChoice {
 impl ForceLaw {
     /// The law that follows a curve.
     pub fn of_curve(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+        Self::along(curve, unloading, end).with_data_to(curve.data_end_m)
+    }
+
+    fn along(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
         let memory = |stiffness_n_per_m: f64| {
             if stiffness_n_per_m > 0.0 {
