@@ -529,3 +529,33 @@ fn leaving_the_data_is_said() {
     assert!(!run["warnings"].to_string().contains("beyond the end"), "{}", run["warnings"]);
     assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!([]));
 }
+
+/// A recorded curve that drives an impact of another speed or mass is warned of, as a model out of its
+/// range is.
+#[test]
+fn a_curve_of_another_impact_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    crumple_ok(here, &["export", "lead50.json", "--to", "csv", "-o", "lead50.csv"]);
+    let warnings = |curve: &str, speed: &str, mass: &str| -> String {
+        let vehicles = format!("vehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]");
+        let text = scenario(&format!("nose = {{ {curve} }}"), &vehicles, "[wall]");
+        std::fs::write(here.join("other.toml"), text.replace("36km/h", speed)).unwrap();
+        json(&crumple_ok(here, &["simulate", "other.toml", "--json", "-q"]))["warnings"].to_string()
+    };
+    let case = "database = \"curves.h5\", case = \"lead-car-wall/48kmh\"";
+    for (curve, own) in [
+        ("file = \"lead50.csv\"", "50km/h"),
+        ("file = \"lead50.json\"", "50km/h"),
+        (case, "48km/h"),
+    ] {
+        let shown = own.replace("km/h", " km/h");
+        let said = format!("it is of {shown}, and A1|wall meets at 36 km/h");
+        assert!(warnings(curve, "36km/h", "24t").contains(&said), "{curve}");
+        assert!(!warnings(curve, own, "24t").contains("it is of "), "{curve}");
+        if !curve.contains(".csv") {
+            let heavy = warnings(curve, own, "30t");
+            assert!(heavy.contains("it is of 24.00 t, and A1|wall moves 30.00 t"), "{heavy}");
+        }
+    }
+}

@@ -158,6 +158,11 @@ impl Masses {
         }
     }
 
+    /// The mass of a body against a wall, or of each of two equal ones with the same reduced mass.
+    pub(crate) fn equal_kg(&self) -> f64 {
+        self.other_kg.map_or(self.body_kg, |_| 2.0 * self.effective_kg())
+    }
+
     /// Kinetic energy that a stop at a common velocity takes up, in J.
     pub(crate) fn kinetic_energy_j(&self, speed: Speed) -> f64 {
         0.5 * self.effective_kg() * speed.m_per_s * speed.m_per_s

@@ -4,13 +4,12 @@ use super::Options;
 use super::tail::{Tail, with_tail};
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use crate::curve::{Envelope, ForceCurve, ForceKind, Parameter};
-use crate::dataset::OTHER_MASS;
+use crate::curve::{Envelope, ForceCurve, ForceKind};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::Beyond;
 use crate::surrogate::{PredictedCurve, Warning};
-use crate::unit::{SpeedKind, km_per_h};
+use crate::unit::km_per_h;
 
 /// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
 #[derive(Clone, Debug)]
@@ -193,11 +192,7 @@ impl ExportCurve {
 
     /// Mass of the other body of a pair, in kg; `None` against a wall.
     pub fn other_mass_kg(&self) -> Option<f64> {
-        match (self.predicted.speed_kind, self.predicted.provenance.parameters.get(OTHER_MASS)) {
-            (SpeedKind::Wall, _) => None,
-            (SpeedKind::Closing, Some(Parameter::Number(other))) => Some(*other),
-            (SpeedKind::Closing, _) => Some(self.predicted.mass_kg),
-        }
+        self.predicted.other_mass_kg()
     }
 
     /// Mass that moves along the deflection, in kg: the reduced one of a pair.

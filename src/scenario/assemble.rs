@@ -8,10 +8,11 @@ use super::layout::{Connection, ConnectionKind, End, Layout, Role, layout};
 use super::place::{self, Origin};
 use super::spring::{Spring, scale_error, spring};
 use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
+use crate::curve::Masses;
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::multibody::{Chain, Damping, ForceLaw, Interface, RunSettings, Tension};
 use crate::surrogate::Model;
-use crate::unit::SpeedKind;
+use crate::unit::{Shown, SpeedKind, km_per_h};
 
 /// Puts a scenario together with what its files hold, with curves for given speeds of the
 /// interfaces, in the order of the chain; `path` is for messages.
@@ -108,6 +109,49 @@ fn no_chain(
 ) -> Error {
     let place = |key: &KeyPath| scenario.place(path, &scenario.chain_key(key, layout));
     error.coded(ErrorCode::Scenario).placed(place)
+}
+
+/// Share by which the speed or mass of a recorded curve may differ from those of the impact unsaid: peaks
+/// of neighbouring runs differ by some per cent.
+const SAME_RUN: f64 = 0.05;
+
+/// Warns of a curve that is of another speed or mass than the impact it drives, as a model does that is
+/// asked out of its range.
+fn of_another_run(
+    curve: &str,
+    slot: &Connection<'_>,
+    spring: &Spring,
+    source: &CurveSource,
+    meeting_m_per_s: f64,
+) -> Vec<String> {
+    let differs = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_RUN;
+    let mut warnings = Vec::new();
+    if let Some(own) = spring.curve.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
+        warnings.push(format!(
+            "curve \"{curve}\": it is of {}, and {} meets at {}: forces follow the impact speed; give the curve of this speed, or a model (crumple train)",
+            km_per_h(own),
+            slot.name,
+            km_per_h(meeting_m_per_s)
+        ));
+    }
+    let own_kg = match source {
+        CurveSource::Case(case) => Some(case.conditions.masses.equal_kg()),
+        CurveSource::Predicted(curve) => {
+            let other_kg = curve.other_mass_kg();
+            Some(Masses { body_kg: curve.mass_kg, other_kg }.equal_kg())
+        }
+        _ => None,
+    };
+    if let Some(own_kg) = own_kg.filter(|own_kg| differs(*own_kg, slot.mass_kg)) {
+        let shown = Shown::mass(own_kg.max(slot.mass_kg));
+        warnings.push(format!(
+            "curve \"{curve}\": it is of {}, and {} moves {}: give the curve of this mass, or a model (crumple train)",
+            shown.text(own_kg),
+            slot.name,
+            shown.text(slot.mass_kg)
+        ));
+    }
+    warnings
 }
 
 /// What results name as the curve where plates meet.
@@ -296,6 +340,10 @@ impl<'a> Builder<'a> {
             spring(source, table, slot, speed).map_err(|error| self.no_spring(curve, error))?;
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
+        if !is_model && matches!(slot.role, Role::Wall | Role::Noses) {
+            let meeting = self.scenario.meeting_m_per_s();
+            self.warnings.extend(of_another_run(curve, slot, &spring, source, meeting));
+        }
         let force = spring.curve.kind.map(super::super::curve::ForceKind::name);
         let (law, said) =
             spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;

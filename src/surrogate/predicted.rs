@@ -9,6 +9,7 @@ use super::Warning;
 use super::band::Band;
 use super::max_crush::{MaxCrush, MaxCrushRule};
 use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Parameter};
+use crate::dataset::OTHER_MASS;
 use crate::error::{Error, ErrorCode, error};
 use crate::unit::{SpeedKind, UnitSystem};
 
@@ -160,6 +161,15 @@ impl Provenance {
 }
 
 impl PredictedCurve {
+    /// Mass of the other body of a pair, in kg; `None` against a wall.
+    pub(crate) fn other_mass_kg(&self) -> Option<f64> {
+        match (self.speed_kind, self.provenance.parameters.get(OTHER_MASS)) {
+            (SpeedKind::Wall, _) => None,
+            (SpeedKind::Closing, Some(Parameter::Number(other))) => Some(*other),
+            (SpeedKind::Closing, _) => Some(self.mass_kg),
+        }
+    }
+
     /// The loading branch as a function.
     pub(crate) fn envelope(&self) -> Result<Envelope, Error> {
         let stiffness = self.unloading_stiffness_n_per_m;
