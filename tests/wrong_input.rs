@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, python, shared,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, python,
+    shared,
 };
 
 /// The run of each group that is studied.
@@ -306,4 +307,47 @@ fn histories_replace_no_other_hdf5_file() {
     assert_ne!(fs::read(&database).unwrap(), before);
     // A file of histories is replaced, as any other output.
     crumple_ok(folder.path(), &arguments);
+}
+
+/// What is not the command's own kind of output is not replaced by a name that was mistyped.
+#[test]
+fn outputs_replace_no_other_kind_of_file() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
+    fs::copy(nodout, here.join("kept")).unwrap();
+    let before = |name: &str| fs::read(here.join(name)).unwrap();
+    for (line, name, what) in [
+        (
+            "train curves.h5 --group lead-car-wall --model linear -o scenario.toml",
+            "scenario.toml",
+            "a manifest",
+        ),
+        ("train curves.h5 --group lead-car-wall --model linear -o kept", "kept", "a solver's file"),
+        ("predict lead.model --speed 50km/h --to csv -o pair.model", "pair.model", "a model"),
+        ("export lead50.json --to csv -o curves.h5", "curves.h5", "an HDF5 file"),
+        ("export lead.model --to table -o curves.h5", "curves.h5", "an HDF5 file"),
+        ("export lead50.json --to lsdyna --units mm-t-s -o kept", "kept", "a solver's file"),
+        ("report curves.h5 -o lead.model", "lead.model", "a model"),
+    ] {
+        let old = before(name);
+        let words: Vec<&str> = line.split(' ').collect();
+        let error = crumple_fails(here, 2, &words);
+        let expected = format!("-o {name} exists and is {what}");
+        assert!(error.contains(&expected) && error.contains("--overwrite"), "{line}: {error}");
+        assert!(before(name) == old, "{line}");
+        if name == "kept" {
+            crumple_ok(here, &[&words[..], &["--overwrite"]].concat());
+            fs::write(here.join(name), old).unwrap();
+        }
+    }
+    // Its own kind is replaced as before.
+    let train = ["train", "curves.h5", "--group", "lead-car-wall", "--model", "linear", "-o"];
+    crumple_ok(here, &[&train[..], &["lead.model"]].concat());
+    // A demo keeps scenarios that were edited.
+    let elsewhere = tempfile::tempdir().unwrap();
+    fs::create_dir(elsewhere.path().join("crumple-demo")).unwrap();
+    fs::write(elsewhere.path().join("crumple-demo/scenario.toml"), "# mine\n").unwrap();
+    let error = crumple_fails(elsewhere.path(), 2, &["demo"]);
+    assert!(error.contains("scenario.toml exists and is not the demo's"), "{error}");
 }

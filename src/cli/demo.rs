@@ -10,7 +10,7 @@ use crate::assess::validate::{train_chosen, validate};
 use crate::build::{self, BuiltRun, RunOutcome};
 use crate::curve::Case;
 use crate::database::Database;
-use crate::file::{not_written, write_at, write_whole};
+use crate::file::{self, not_written, write_at, write_whole};
 use crate::formats::{self, ExportInput};
 use crate::multibody::Run;
 use crate::report::{MethodSpeeds, ReportSettings, report};
@@ -100,6 +100,12 @@ struct Flow<'a> {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
+    if let Some(edited) = edited_scenario(&args.output).filter(|_| !options.overwrite) {
+        return Err(Failure::Usage(format!(
+            "{} exists and is not the demo's, as if it had been edited: name another folder with -o, or replace it with --overwrite",
+            edited.display()
+        )));
+    }
     let mut flow = Flow {
         folder: &args.output,
         bar: progress::Bar::new(options, "writing the FE runs"),
@@ -255,6 +261,17 @@ impl Flow<'_> {
 }
 
 /// Writes the bundled files of a folder and all below it.
+/// Most bytes of a scenario that is held against the bundled one.
+const MAX_SCENARIO: u64 = 1 << 20;
+
+/// A scenario of an earlier demo in `folder` that is not as it was written.
+fn edited_scenario(folder: &Path) -> Option<PathBuf> {
+    let paths = SCENARIOS.files().map(|file| (folder.join(file.path()), file.contents()));
+    let mut there =
+        paths.filter_map(|(path, own)| Some((file::read(&path, MAX_SCENARIO).ok()?, path, own)));
+    there.find(|(found, _, own)| found != own).map(|(_, path, _)| path)
+}
+
 fn extract(bundled: &Dir, target: &Path) -> Result<(), Error> {
     let folder = target.join(bundled.path());
     std::fs::create_dir_all(&folder).map_err(|e| not_written(&folder, e))?;

@@ -8,6 +8,7 @@ use crate::file::{not_written, write_all_whole};
 use crate::formats::{Exported, Format};
 use serde::Serialize;
 
+use super::file_kind::FileKind;
 use super::output;
 use super::{Failure, GlobalOptions};
 
@@ -50,6 +51,9 @@ impl Destination<'_> {
             return self.print(&exported, options);
         };
         let files = self.paths(path, &exported)?;
+        // A table of a model is HDF5.
+        let own = if self.format.name == "table" { FileKind::Database } else { FileKind::Curve };
+        files.iter().try_for_each(|file| options.keep_others(file, own))?;
         if files != [path] {
             make_folders(&files)?;
         }

@@ -35,10 +35,13 @@ use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
+use crate::database;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
+use crate::solver;
 use clap::{FromArgMatches, Parser, Subcommand};
+use file_kind::FileKind;
 
 #[derive(Parser)]
 #[command(name = "crumple", version, about, propagate_version = true)]
@@ -70,6 +73,9 @@ pub struct GlobalOptions {
     /// Read databases, models and unfinished sweeps whose numbers are not those that were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
+    /// Replace an output that is a file of another kind: a database, a model, a manifest, a solver's file
+    #[arg(long, global = true, help_heading = GLOBAL)]
+    pub overwrite: bool,
 }
 
 #[derive(Subcommand)]
@@ -133,6 +139,32 @@ fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
         )))
     } else {
         Ok(())
+    }
+}
+
+impl GlobalOptions {
+    /// Refuses to write over a file of a kind that cannot be made again by the same command: what is
+    /// worth keeping may stand under a name that was mistyped. `own` is the kind that the command writes.
+    fn keep_others(self, output: &Path, own: FileKind) -> Result<(), Failure> {
+        let is_there = std::fs::metadata(output).is_ok_and(|m| m.is_file() && m.len() > 0);
+        if self.overwrite || is_stdout(output) || !is_there {
+            return Ok(());
+        }
+        let kind = FileKind::of(output)?;
+        let what = match kind {
+            FileKind::Scenario => "a manifest or scenario",
+            FileKind::Solver if solver::is_output(output) => "a solver's file",
+            FileKind::Database => "an HDF5 file",
+            FileKind::Model => "a model",
+            FileKind::Solver | FileKind::Curve | FileKind::Result => return Ok(()),
+        };
+        if kind == own && !(kind == FileKind::Database && database::is_database(output)) {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "-o {} exists and is {what}: name another file, or replace it with --overwrite",
+            output.display()
+        )))
     }
 }
 

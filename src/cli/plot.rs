@@ -140,6 +140,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let pictures =
         args.output.iter().map(|path| Picture::of(path)).collect::<Result<Vec<_>, _>>()?;
     args.output.iter().try_for_each(|output| keep_input(&args.file, output))?;
+    args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
         return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));

@@ -15,6 +15,7 @@ use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
+use super::file_kind::FileKind;
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
 
@@ -68,6 +69,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
     }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
+    args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let model = Model::read(&args.model)?;
     let query = Query {
         speed_m_per_s: args.speed,

@@ -9,6 +9,7 @@ use crate::report::{MethodSpeeds, ReportSettings, report};
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
+use super::file_kind::FileKind;
 use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input, keep_inputs};
@@ -64,6 +65,7 @@ struct Document {
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     keep_input(&args.database, &args.output)?;
     args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
+    options.keep_others(&args.output, FileKind::Curve)?;
     if is_stdout(&args.output) && options.json {
         return Err(Failure::Usage("standard output takes one of: \"-o -\", or --json".into()));
     }

@@ -10,6 +10,7 @@ use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::file_kind::FileKind;
 use super::output;
 use super::run_channels;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inputs};
@@ -95,6 +96,7 @@ struct InterfaceSummary {
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(output) = &args.output {
         keep_inputs(&args.scenario, output)?;
+        options.keep_others(output, FileKind::Result)?;
         let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));
         if !is_stdout(output) && !is_csv && !is_mme(output) {
             return Err(Failure::Usage(format!(

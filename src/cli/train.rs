@@ -18,6 +18,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 
 use super::arguments::one_of;
+use super::file_kind::FileKind;
 use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
@@ -166,6 +167,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let choice = args.choice()?;
     keep_input(&args.database, &args.output)?;
+    options.keep_others(&args.output, FileKind::Model)?;
     let database = Database::read(&args.database)?;
     let (group, cases) = database.group_or_only(&args.database, args.group.as_deref())?;
     let bar = Bar::new(options, "training");

@@ -358,6 +358,11 @@ pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
     Ok((!items.is_empty()).then(|| foreign::listed(&items)))
 }
 
+/// Whether the file at `path` is a curve database.
+pub(crate) fn is_database(path: &Path) -> bool {
+    layout::open(path).is_ok()
+}
+
 /// Puts the cases of a group into their order: by speed, then name.
 fn sort(cases: &mut [Case]) {
     cases.sort_by(|a, b| {

@@ -186,6 +186,12 @@ fn open(
     Ok((format, parts))
 }
 
+/// Whether a solver has written the file at `path`, by its content.
+pub(crate) fn is_output(path: &Path) -> bool {
+    let source = source::open(path, Access::Plain);
+    source.is_ok_and(|source| detect(path, &*source).is_ok())
+}
+
 /// Opens the file at `path` for reading state by state, if it is a nodout without damage
 /// that is laid out evenly; [`read`] takes any other.
 ///
