@@ -1125,3 +1125,23 @@ fn a_texts_header_does_not_hide_the_binary_file() {
     crumple_ok(&here, &["init"]);
     crumple_ok(&here, &["build", "-q"]);
 }
+
+/// A link that leads out of the folder is followed to a run, not through a whole disk.
+#[cfg(unix)]
+#[test]
+fn links_out_of_the_folder_are_followed_to_runs_only() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::create_dir(here.join("runs")).unwrap();
+    for run in ["25kmh", "36kmh"] {
+        symlink(fixture(&format!("fe/lead-car-wall/{run}")), here.join("runs").join(run)).unwrap();
+    }
+    symlink("/", here.join("runs/root")).unwrap();
+    let output = crumple_in(here, &["init", "runs", "-o", "-"]);
+    let (text, said) =
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert!(text.contains("36kmh"), "{text}{said}");
+    let why = "runs/root: it is a link to /, which is not a run and lies outside";
+    assert!(format!("{text}{said}").contains(why), "{text}{said}");
+}

@@ -335,4 +335,8 @@ fn a_mistyped_duration_does_not_run_for_days() {
     let settings = RunSettings::new(1e9, 0.75e-3);
     let error = simulate(&wall, &settings).unwrap_err().to_string();
     assert!(error.contains("shorten the duration or lengthen step"), "{error}");
+    let masses = vec![(24.0 * TONNES, 10.0); 200_000];
+    let laws: Vec<_> = masses.iter().map(|_| elastic(linear(MEGA))).collect();
+    let error = simulate(&chain(&masses, &laws), &RunSettings::new(0.4, 0.75e-3)).unwrap_err();
+    assert!(error.to_string().contains("of 200000 bodies at 533 outputs"), "{error}");
 }

@@ -204,9 +204,12 @@ fn table_within(
             to += 1;
         }
         for row in std::iter::once(&heading).chain(&rows) {
-            let mut line = row.first().map_or(String::new(), |cell| format!("{cell:<first$}"));
-            for (cell, width) in row.iter().zip(&widths).take(to).skip(from) {
-                line.push_str(&format!("{GAP}{cell:>width$}"));
+            // Not by a width in the format, which has 16 bits.
+            let blanks = |cell: &str, width: usize| " ".repeat(width - cell.chars().count());
+            let mut line =
+                row.first().map_or(String::new(), |cell| format!("{cell}{}", blanks(cell, first)));
+            for (cell, &width) in row.iter().zip(&widths).take(to).skip(from) {
+                line.push_str(&format!("{GAP}{}{cell}", blanks(cell, width)));
             }
             writeln!(out, "{}", line.trim_end())?;
         }

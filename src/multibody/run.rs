@@ -185,6 +185,8 @@ pub(super) struct Grid {
 /// Bounds that no real scenario reaches; they keep a mistyped duration from running for days.
 const MAX_STEPS: f64 = 1e8;
 const MAX_OUTPUTS: f64 = 1e6;
+/// Most values that histories keep: 4 GB.
+const MAX_VALUES: f64 = 5e8;
 
 impl Grid {
     /// The longest step that divides the output interval and keeps to the step rule.
@@ -217,6 +219,14 @@ impl Grid {
             return Err(error!(
                 Simulation at "run.duration",
                 "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
+            ));
+        }
+        let (bodies, interfaces) = (chain.bodies().len(), chain.interfaces().len());
+        let values = outputs * (3 * bodies + 5 * interfaces) as f64;
+        if settings.record == Record::Histories && values > MAX_VALUES {
+            return Err(error!(
+                Simulation at "run.output_interval",
+                "the run would keep {values:.1e} values of {bodies} bodies at {outputs} outputs, more than {MAX_VALUES:.0e}: lengthen output_interval or shorten the train"
             ));
         }
         Ok(Self {

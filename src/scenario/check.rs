@@ -46,6 +46,7 @@ impl Scenario {
         check_names(self)?;
         check_contact(self)?;
         for (name, table) in &self.curves {
+            check_length(name).map_err(|e| e.at_key("curves"))?;
             check_keys(name, table)?;
         }
         let checked = check_values(self)?;
@@ -252,8 +253,21 @@ fn check_contact(scenario: &Scenario) -> Result<(), Error> {
     }
 }
 
+/// Longest name, in bytes: it stands in the columns of results and tables.
+const MAX_NAME: usize = 200;
+
+fn check_length(name: &str) -> Result<(), Error> {
+    if name.len() <= MAX_NAME {
+        return Ok(());
+    }
+    let begin: String = name.chars().take(20).collect();
+    let (begin, found) = (begin.escape_debug(), name.len());
+    Err(error!(Scenario, "the name \"{begin}…\" has {found} bytes: expected at most {MAX_NAME}"))
+}
+
 /// Names stand in the columns of the result.
 fn check_name(name: &str) -> Result<(), Error> {
+    check_length(name)?;
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);
     if name.is_empty() || name.contains(breaks) {
         let name = name.escape_debug();

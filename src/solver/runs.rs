@@ -29,14 +29,16 @@ pub(crate) struct RunFolders {
 
 /// The run folders at or below `root`: itself if it holds solver files, else all below that do.
 ///
-/// Hidden folders are passed over; a folder that is reached by several links counts once.
+/// Hidden folders are passed over; a folder that is reached by several links counts once. A link out of
+/// `root` may lead to a run, but what lies below its target is not searched: it may be a whole disk.
 pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
     if !fs::metadata(root)?.is_dir() {
         let message = "this is not a folder: give a run's folder, or one above runs";
         return Err(io::Error::new(io::ErrorKind::NotADirectory, message));
     }
     root.read_dir()?;
-    let mut walk = Walk { found: RunFolders::default(), seen: HashSet::new() };
+    let real = fs::canonicalize(root)?;
+    let mut walk = Walk { root: real, found: RunFolders::default(), seen: HashSet::new() };
     walk.scan_folder(root, 0);
     Ok(walk.found)
 }
@@ -83,6 +85,8 @@ pub(crate) fn renamed_file(folder: &Path) -> Option<(PathBuf, &'static str)> {
 }
 
 struct Walk {
+    /// The real place of the folder that was given.
+    root: PathBuf,
     found: RunFolders,
     /// Real places of the folders that were looked into: links may lead in circles.
     seen: HashSet<PathBuf>,
@@ -91,7 +95,8 @@ struct Walk {
 impl Walk {
     fn scan_folder(&mut self, folder: &Path, depth: usize) {
         let place = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
-        if self.seen.len() >= MOST_FOLDERS || !self.seen.insert(place) {
+        let leads_out = !place.starts_with(&self.root);
+        if self.seen.len() >= MOST_FOLDERS || !self.seen.insert(place.clone()) {
             return;
         }
         let files = output_files(folder).and_then(|files| Ok((files, folders_in(folder)?)));
@@ -100,6 +105,13 @@ impl Walk {
             Ok((files, _)) if !files.is_empty() => self.found.runs.push(folder.into()),
             Ok((_, below)) if below.is_empty() || depth == DEEPEST => {
                 self.found.without_files.push(folder.into());
+            }
+            Ok(_) if leads_out => {
+                let why = format!(
+                    "it is a link to {}, which is not a run and lies outside: name that folder, if runs are below it",
+                    place.display()
+                );
+                self.found.unreadable.push((folder.into(), why));
             }
             Ok((_, below)) => below.iter().for_each(|path| self.scan_folder(path, depth + 1)),
         }
