@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, entries, fixture};
 use crumple::curve::Masses;
 use crumple::curve::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
 use crumple::curve::{Recipe, RecordedMotion};
@@ -18,6 +18,7 @@ struct Run {
     speed_m_per_s: f64,
     /// That the study says.
     units: &'static str,
+    mass_kg: f64,
     displacement: History,
     velocity: History,
     acceleration: History,
@@ -33,6 +34,7 @@ impl Run {
         Self {
             speed_m_per_s: f64::from(km_per_h) / 3.6,
             units: "mm-t-s",
+            mass_kg: 24e3,
             displacement: node("x_displacement").clone(),
             velocity: node("x_velocity").clone(),
             acceleration: node("x_acceleration").clone(),
@@ -112,9 +114,10 @@ impl Run {
             sampling: recipe.sampling,
             kind: SpeedKind::Wall,
             half_model: false,
-            masses: Masses { body_kg: 24e3, other_kg: None },
+            masses: Masses { body_kg: self.mass_kg, other_kg: None },
             manifest_speed_m_per_s: Some(self.speed_m_per_s),
             deck_speed: None,
+            contact_threshold: recipe.contact_threshold.unwrap_or(0.005),
             stated,
             others: &[],
         };
@@ -311,7 +314,7 @@ fn a_run_states_contact_gap_offset_end_and_sign() {
     let error = fails("offset = \"-3m\"");
     assert!(error.contains("offset = -3000 mm is never made up for"), "{error}");
     let error = fails("sign = -1");
-    assert!(error.contains("the force never exceeds"), "{error}");
+    assert!(error.contains("the force is never positive"), "{error}");
     let error = fails("sign = 2");
     assert!(error.contains("sign = 2: expected 1 or -1"), "{error}");
     let error = fails("gap = \"3mm\"\ncontact_time = \"1ms\"");
@@ -401,4 +404,253 @@ fn the_recorded_speed_outranks_the_decks() {
     );
     let list = crumple_ok(folder.path(), &["db", "ls", "c.h5"]);
     assert!(list.contains("60 km/h (wall)"), "{list}");
+}
+
+/// Changes the values of a history by their times.
+fn each(history: &mut History, value: impl Fn(f64, f64) -> f64) {
+    for (t, v) in history.time.iter().zip(&mut history.values) {
+        *v = value(*t, *v);
+    }
+}
+
+/// Each kind of damage that leaves a plausible curve, and what is said of it.
+#[test]
+fn histories_that_contradict_each_other_are_said() {
+    type Damage = fn(&mut Run);
+    fn clock(run: &mut Run, at: fn(f64) -> f64) {
+        run.force.time = run.force.time.iter().map(|&t| at(t)).collect();
+    }
+    let damages: [(&str, Damage, &str); 12] = [
+        ("force 10 ms early", |run| clock(run, |t| t - 0.010), "times: the force begins at -10 ms"),
+        ("force 5 ms early", |run| clock(run, |t| t - 0.005), "times: the force begins at -5 ms"),
+        (
+            "force 3 ms late",
+            |run| clock(run, |t| t + 0.003),
+            "the first 40.0 mm of the crush (4.6 %)",
+        ),
+        ("force stretched", |run| clock(run, |t| 1.1 * t), "impulse: from"),
+        (
+            "displacement 0.95",
+            |run| each(&mut run.displacement, |_, d| 0.95 * d),
+            "displacement: from",
+        ),
+        (
+            "displacement glitch",
+            |run| run.displacement.values[60] += 300.0,
+            "displacement: from 45.002 ms on it is not the integral of the velocity, by up to 34.3 %",
+        ),
+        (
+            "velocity 1.05",
+            |run| each(&mut run.velocity, |t, v| if t > 0.05 { 1.05 * v } else { v }),
+            "displacement: from",
+        ),
+        (
+            "force on a body in flight",
+            |run| each(&mut run.force, |t, f| if (0.15..0.195).contains(&t) { 5e6 } else { f }),
+            "after the contact, it gives 225.035 kN·s, and the momentum changes by -1.467 kN·s",
+        ),
+        (
+            "force long after the contact",
+            |run| {
+                each(&mut run.force, |t, f| {
+                    if t > 0.2 && t < 0.22 {
+                        1e6
+                    } else if t > 0.17 {
+                        0.0
+                    } else {
+                        f
+                    }
+                })
+            },
+            "after the contact, it gives 20.250",
+        ),
+        (
+            "first states missing",
+            |run| {
+                for history in [&mut run.displacement, &mut run.velocity, &mut run.force] {
+                    history.time = history.time.iter().copied().skip(3).collect();
+                    history.values.drain(..3);
+                }
+            },
+            "contact: the record begins at 2.254 ms, in contact: the first 30.1 mm of the crush (3.4 %) are missing",
+        ),
+        (
+            "output each 6 ms",
+            |run| {
+                for history in [&mut run.displacement, &mut run.velocity, &mut run.force] {
+                    history.time = history.time.iter().copied().step_by(8).collect();
+                    history.values = history.values.iter().copied().step_by(8).collect();
+                }
+            },
+            "sampling: the record has 21 states up to the largest crush",
+        ),
+        (
+            "a fall",
+            |run| {
+                *run = Run::read(48).after_flight(80);
+                let (start, g) = (80.0 * INTERVAL_S, 30_000.0);
+                each(&mut run.velocity, |t, v| v + g * (start - t).max(0.0));
+                each(&mut run.displacement, |t, d| d - 0.5 * g * (start - t).max(0.0).powi(2));
+            },
+            "free flight: before contact the speed changes by 30.",
+        ),
+    ];
+    for (name, damage, expected) in damages {
+        let mut run = Run::read(48);
+        damage(&mut run);
+        let warnings = run.extract().quality.warnings;
+        assert!(warnings.iter().any(|w| w.contains(expected)), "{name}: {warnings:?}");
+    }
+    for speed in [12, 18, 25, 36, 48, 60, 72] {
+        assert_eq!(Run::read(speed).extract().quality.warnings, [""; 0], "{speed} km/h");
+    }
+}
+
+#[test]
+fn a_record_that_is_not_one_impact_is_refused() {
+    let refused = |run: &Run, recipe: &str, stated: Stated| {
+        run.extract_with(recipe, stated).unwrap_err().to_string()
+    };
+    let mut pushed = Run::read(48);
+    let v = pushed.velocity.values[0];
+    each(&mut pushed.velocity, |_, _| v);
+    each(&mut pushed.displacement, |t, _| v * t);
+    each(&mut pushed.force, |_, _| 2e6);
+    let accepted = Stated { accept_energy: true, ..Stated::default() };
+    for stated in [Stated::default(), accepted] {
+        let said = refused(&pushed, CONTACT_RECIPE, stated);
+        assert!(said.starts_with("the motion is prescribed: the body keeps its 48 km/h"), "{said}");
+    }
+    let mut other = Run::read(48);
+    each(&mut other.velocity, |_, v| 0.3 * v);
+    let said = refused(&other, CONTACT_RECIPE, Stated::default());
+    assert!(said.contains("displacement: from") && said.contains("another node"), "{said}");
+    let taken = other.extract_with(CONTACT_RECIPE, accepted).unwrap().quality.warnings;
+    assert!(taken.iter().any(|w| w.starts_with("accept_energy: displacement: from")), "{taken:?}");
+    let window = format!("{CONTACT_RECIPE}\nsampling = {{ states = 100, interval_ms = 0.75 }}");
+    let said = refused(&Run::read(48), &window, Stated::default());
+    assert!(
+        said.contains("ends 74.25 ms after contact, before the largest crush at 126.")
+            && said.contains("raise states to 171 or more"),
+        "{said}"
+    );
+    let until = Stated { truncate_s: Some(0.07), ..Stated::default() };
+    Run::read(48).extract_with(&window, until).unwrap();
+    let coarse = format!("{CONTACT_RECIPE}\nsampling = {{ states = 50, interval_ms = 6.0 }}");
+    let said = Run::read(48).extract_with(&coarse, Stated::default()).unwrap().quality.warnings;
+    assert!(
+        said.iter().any(|w| w
+            .starts_with("sampling: the recipe's times, one each 6.000 ms, change the curve by")),
+        "{said:?}"
+    );
+}
+
+/// Mass times acceleration is in balance with every mass: the contact force knows better.
+#[test]
+fn the_mass_of_a_body_force_is_held_against_the_contact() {
+    let recipe = r#"
+        deflection = { file = "nodout", node = 900001, component = "x_displacement" }
+        force = { file = "nodout", node = 900001, component = "x_acceleration", times = "mass" }
+        contact = { file = "rwforc", id = 1, component = "normal_force" }
+        filter = "none"
+    "#;
+    let of =
+        |mass_kg: f64| Run { mass_kg, ..Run::read(48) }.extract_with(recipe, Stated::default());
+    let said = of(12e3).unwrap_err().to_string();
+    assert!(
+        said.contains("2.000 times the momentum that 12.0000 t lose; it asks for 24.00"),
+        "{said}"
+    );
+    assert_eq!(of(24e3).unwrap().quality.warnings, [""; 0]);
+    for (mass_kg, or) in
+        [(20e3, "the mass of the run is wrong"), (40e3, "more acts than this contact")]
+    {
+        let said = of(mass_kg).unwrap().quality.warnings;
+        assert!(said.iter().any(|w| w.starts_with("mass: ") && w.contains(or)), "{said:?}");
+    }
+}
+
+/// A light specimen is no other structure: forces and mass of a millionth give a millionth.
+#[test]
+fn the_contact_is_relative_to_the_peak() {
+    let whole = Run::read(36).after_flight(20).extract();
+    let mut light = Run::read(36).after_flight(20);
+    light.mass_kg *= 1e-6;
+    each(&mut light.force, |_, f| 1e-6 * f);
+    let light = light.extract();
+    assert_eq!(light.curves.original.deflection_m(), whole.curves.original.deflection_m());
+    assert_eq!(light.curves.contact_time_s, whole.curves.contact_time_s);
+    for (a, b) in light.curves.original.force_n().iter().zip(whole.curves.original.force_n()) {
+        assert!((a * 1e6 - b).abs() <= 1e-12 * b.abs(), "{a} for {b}");
+    }
+    assert_eq!(light.quality.warnings, whole.quality.warnings);
+    let late = format!("{CONTACT_RECIPE}\ncontact_threshold = 0.5");
+    let late = Run::read(36).after_flight(20).extract_with(&late, Stated::default()).unwrap();
+    assert!(crush(&late) < crush(&whole), "{} and {}", crush(&late), crush(&whole));
+}
+
+/// The group knows more of a run than the run itself: a force of 0.95, a run of another design, and
+/// copies that would count as repetitions.
+#[test]
+fn what_the_group_shows_of_a_run_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = fixture("fe/lead-car-wall");
+    let run = |name: &str| folder.path().join(name);
+    for name in entries(&source).iter().filter(|name| source.join(name).is_dir()) {
+        fs::create_dir_all(run(name)).unwrap();
+        for file in ["nodout", "rwforc"] {
+            fs::copy(source.join(name).join(file), run(name).join(file)).unwrap();
+        }
+    }
+    let study = run("study.toml");
+    fs::copy(source.join("study.toml"), &study).unwrap();
+    let build = |expected: &[&str]| {
+        let (study, path) = (study.to_str().unwrap(), folder.path().join("c.h5"));
+        let output = crumple_in(folder.path(), &["build", study, "-o", path.to_str().unwrap()]);
+        let said = String::from_utf8_lossy(&output.stderr).to_string();
+        let warnings: Vec<&str> = said.lines().filter(|l| l.starts_with("warning: ")).collect();
+        assert_eq!(warnings.len(), expected.len(), "{said}");
+        for expected in expected {
+            assert!(warnings.iter().any(|w| w.contains(expected)), "{expected} is not in {said}");
+        }
+        let checked = crumple_in(folder.path(), &["db", "check", "c.h5"]);
+        let found = String::from_utf8_lossy(&checked.stdout).to_string();
+        assert!(expected.iter().all(|e| found.contains(e)), "{found}");
+    };
+    build(&[]);
+    let force = run("48kmh/rwforc");
+    let whole = fs::read_to_string(&force).unwrap();
+    let scaled = whole.lines().map(|line| {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        match fields.get(2).and_then(|f| f.parse::<f64>().ok()) {
+            Some(f) if fields.len() == 6 && f != 0.0 => {
+                let written = format!("{:.6E}", 0.95 * f);
+                let (digits, power) = written.split_once('E').unwrap();
+                let power: i32 = power.parse().unwrap();
+                line.replacen(fields[2], &format!("{digits}E{power:+03}"), 1)
+            }
+            _ => line.into(),
+        }
+    });
+    fs::write(&force, scaled.map(|l| l + "\n").collect::<String>()).unwrap();
+    build(&["48kmh: W/E is 0.978", "48kmh: impulse over momentum is 0.9"]);
+    for name in ["nodout", "rwforc"] {
+        let other = fixture("fe/lead-car-b-wall/48kmh").join(name);
+        fs::copy(other, run("48kmh").join(name)).unwrap();
+    }
+    build(&[
+        "48kmh: the title of its files is \"second lead car design to rigid wall 48 km/h\"",
+        "60kmh: over the 1.084 m that both are crushed, its mean force is 1.36 times that of 48kmh",
+    ]);
+    for name in ["nodout", "rwforc"] {
+        let own = fixture("fe/lead-car-wall/48kmh").join(name);
+        fs::copy(own, run("48kmh").join(name)).unwrap();
+        fs::create_dir_all(run("copy")).unwrap();
+        fs::copy(run("48kmh").join(name), run("copy").join(name)).unwrap();
+    }
+    let text = fs::read_to_string(&study).unwrap();
+    fs::write(&study, text + "\n[[run]]\npath = 'copy'\nspeed = '48km/h'\nmass = '24t'\n").unwrap();
+    build(&["copy: is a copy of 48kmh: the same values at every state"]);
+    let said = crumple_ok(folder.path(), &["validate", "c.h5"]);
+    assert!(!said.contains("scatter"), "{said}");
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
+use crate::curve::group as siblings;
 use crate::database::CasePath;
 use crate::plural::counted;
 use crate::unit::Shown;
@@ -58,6 +59,9 @@ struct Document {
     database: String,
     group: String,
     runs: Vec<RunReport>,
+    /// What is odd in a run beside the others of its group.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    group_warnings: Vec<String>,
     removed: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     moved: Vec<Moved>,
@@ -114,17 +118,31 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             }
         }
     }
+    let of_group = siblings::remarks(report.database.cases(&report.group));
+    let of_group: Vec<String> =
+        of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
+    for warning in &of_group {
+        options.warn(warning);
+        if outcome == Outcome::Clean {
+            outcome = Outcome::Warned;
+        }
+    }
     let database = output.display().to_string();
     if options.json {
-        output::print_json(&Document::of(report, database, runs))?;
+        output::print_json(&Document::of(report, database, runs, of_group))?;
     } else {
-        options.print(|out| print(out, &Document::of(report, database, runs)))?;
+        options.print(|out| print(out, &Document::of(report, database, runs, of_group)))?;
     }
     Ok(outcome)
 }
 
 impl Document {
-    fn of(report: BuildReport, database: String, runs: Vec<RunReport>) -> Self {
+    fn of(
+        report: BuildReport,
+        database: String,
+        runs: Vec<RunReport>,
+        group_warnings: Vec<String>,
+    ) -> Self {
         let shown = |path: &CasePath| {
             if path.group == report.group { path.name.clone() } else { path.to_string() }
         };
@@ -136,6 +154,7 @@ impl Document {
         Self {
             database,
             runs,
+            group_warnings,
             removed: report.removed.iter().map(shown).collect(),
             moved: report.moved.iter().map(moved).collect(),
             earlier_groups: report.earlier,
@@ -145,7 +164,7 @@ impl Document {
 }
 
 fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    let Document { database, group, runs, removed, moved, earlier_groups } = document;
+    let Document { database, group, runs, removed, moved, earlier_groups, .. } = document;
     let heading: Vec<&str> = ["run"].into_iter().chain(CaseRow::HEADING).collect();
     let units = CaseRow::units(runs.iter().filter_map(|run| run.case.as_ref()));
     output::table(out, &heading, &runs.iter().map(|run| row(run, units)).collect::<Vec<_>>())?;

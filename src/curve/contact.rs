@@ -5,9 +5,10 @@
 //! wrong state does not turn. A body slows down two to four milliseconds after its nose has touched, so a body force takes the
 //! contact from a contact force that the recipe names (`contact`), or says that it cannot.
 
-/// A contact force is above the larger of these two.
-const FORCE_N: f64 = 1e3;
-const SHARE_OF_LARGEST: f64 = 0.005;
+/// A contact force is above this share of the largest, unless the recipe says otherwise.
+pub(crate) const THRESHOLD: f64 = 0.005;
+/// Before the crossing the force is gone where it is below this share of the threshold.
+const GONE: f64 = 0.1;
 /// Spells of force closer than this belong together: a nose plate may bounce.
 const PAUSE_S: f64 = 0.010;
 /// A first piece of the contact with less than this share of its impulse may be noise.
@@ -15,9 +16,9 @@ const SMALL_SHARE: f64 = 1e-3;
 /// Spells before the contact that are named one by one.
 const NAMED: usize = 3;
 
-/// The force above which a record is in contact: 1 kN, or 0.5 % of its largest force.
-pub(crate) fn threshold_n(force_n: &[f64]) -> f64 {
-    FORCE_N.max(SHARE_OF_LARGEST * force_n.iter().copied().fold(0.0, f64::max))
+/// The force above which a record is in contact: a share of its largest.
+pub(crate) fn threshold_n(force_n: &[f64], share: f64) -> f64 {
+    share * force_n.iter().copied().fold(0.0, f64::max)
 }
 
 /// When contact begins, found from a force that is positive in compression.
@@ -25,7 +26,7 @@ pub(crate) fn threshold_n(force_n: &[f64]) -> f64 {
 pub(crate) struct Onset {
     /// Where the force crosses the threshold, in s, between two states.
     pub time_s: f64,
-    /// Length of the output interval that holds the crossing, in s; `None` if the record
+    /// From the last state without force to the first in contact, in s; `None` if the record
     /// begins in contact.
     pub interval_s: Option<f64>,
     /// What the user should look at: spells before the contact, and a doubtful beginning.
@@ -61,8 +62,9 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         0 => (time_s[0], None),
         i => {
             let share = (threshold_n - force_n[i - 1]) / (force_n[i] - force_n[i - 1]);
-            let interval = time_s[i] - time_s[i - 1];
-            (time_s[i - 1] + share.clamp(0.0, 1.0) * interval, Some(interval))
+            let crossing_s = time_s[i - 1] + share.clamp(0.0, 1.0) * (time_s[i] - time_s[i - 1]);
+            let gone = (0..i).rev().find(|&k| force_n[k] <= GONE * threshold_n).unwrap_or(0);
+            (crossing_s, Some(time_s[i] - time_s[gone]))
         }
     };
     let mut warnings: Vec<String> = spells[..main]
@@ -151,7 +153,7 @@ mod tests {
     }
 
     fn of((time_s, force_n): &(Vec<f64>, Vec<f64>)) -> Onset {
-        onset(time_s, force_n, threshold_n(force_n)).unwrap()
+        onset(time_s, force_n, threshold_n(force_n, THRESHOLD)).unwrap()
     }
 
     #[test]

@@ -23,6 +23,9 @@ fn work_to_end(curve: &Curve) -> f64 {
 
 /// Energy or impulse outside these shares of what the impact asks for is an error of the input.
 pub(crate) const POSSIBLE: (f64, f64) = (0.67, 1.5);
+/// Two quantities of a record that should be one differ by less than this share of their range
+/// at any time, or the record is not one.
+pub(crate) const IMPOSSIBLE_ALONG_TIME: f64 = 0.5;
 /// Impulse that differs from the change of momentum by more than this deserves a warning.
 pub(crate) const IMPULSE_TOLERANCE: f64 = 0.05;
 /// No vehicle is faster, in m/s, is crushed by more, in m, or in less time, in s.
@@ -76,6 +79,11 @@ pub struct ImpossibleRun {
 }
 
 impl ImpossibleRun {
+    /// Histories that cannot be one run's.
+    pub(crate) fn of_histories(found: String, cause: &'static str) -> Self {
+        Self { found, cause: Cause::Histories(cause) }
+    }
+
     /// What was found, without its cause.
     pub(crate) fn found(&self) -> &str {
         &self.found
@@ -102,6 +110,8 @@ enum Cause {
     Half(String),
     /// A factor of four, likewise.
     OneBody(String),
+    /// Histories that do not belong together.
+    Histories(&'static str),
     /// Nothing that its size tells, likewise.
     Unknown(String),
 }
@@ -124,6 +134,7 @@ impl Cause {
             Self::OneBody(mass) => format!(
                 "likely the speed of one body taken for the closing speed of two (half_model), or the mass{mass}"
             ),
+            Self::Histories(cause) => (*cause).into(),
             Self::Unknown(mass) => {
                 format!("look at units, speed and mass{mass}, and at node and force of the recipe")
             }
@@ -143,7 +154,10 @@ impl Cause {
             Self::Unknown(mass) => format!(
                 "look at units, speed and mass{mass}; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body"
             ),
-            Self::FittingUnits(_) | Self::RecordedSpeed(_) | Self::OtherRun(_) => self.of_run(),
+            Self::FittingUnits(_)
+            | Self::RecordedSpeed(_)
+            | Self::OtherRun(_)
+            | Self::Histories(_) => self.of_run(),
         }
     }
 }

@@ -31,9 +31,9 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
 fn of_table(error: ExtractError) -> Error {
     match error {
         ExtractError::ImpossibleRun(found) => impossible_table(found),
-        ExtractError::NoContact { largest_n, .. } => error!(
+        ExtractError::NoContact => error!(
             Other,
-            "the largest force of the record is {largest_n} N, which is not a contact: look at the column and the unit of the force"
+            "the force of the record is never positive, which is not a contact: look at its column"
         ),
         ExtractError::NoDeflection => error!(
             Other,
@@ -149,14 +149,17 @@ fn recorded(
         notes.push("contact: the record begins with it".into());
         StatedContact::Time { s: time_s[0] }
     });
+    let common = Sampling::default();
+    let states = ((time_s[time_s.len() - 1] - time_s[0]) / common.interval_s) as usize + 1;
     let setup = Setup {
         filter: Filter::None,
-        sampling: Sampling::default(),
+        sampling: Sampling { states: states.clamp(common.states, MOST_STATES), ..common },
         kind: impact.speed.kind,
         half_model: false,
         masses: impact.masses,
         manifest_speed_m_per_s: Some(impact.speed.m_per_s),
         deck_speed: None,
+        contact_threshold: contact::THRESHOLD,
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
         others: &[],
     };
@@ -226,7 +229,7 @@ fn begins_in_contact(time_s: &[f64], force_n: &[f64]) -> bool {
         .map(|i| (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
         .sum();
     let positive: Vec<f64> = force_n.iter().map(|f| f * impulse.signum()).collect();
-    let threshold_n = contact::threshold_n(&positive);
+    let threshold_n = contact::threshold_n(&positive, contact::THRESHOLD);
     positive.iter().take(2).any(|f| *f > threshold_n)
 }
 

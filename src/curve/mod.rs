@@ -9,6 +9,7 @@ pub(crate) mod envelope;
 pub(crate) mod extract;
 pub(crate) mod force_curve;
 pub(crate) mod from_table;
+pub(crate) mod group;
 pub(crate) mod loading;
 pub(crate) mod recipe;
 pub(crate) mod replicates;

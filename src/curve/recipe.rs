@@ -17,6 +17,9 @@ pub struct Recipe {
     /// slows down some milliseconds after the first touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ForceSource>,
+    /// Share of the largest force above which a record is in contact: 0.005 where it is not given; above 0, below 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_threshold: Option<f64>,
     /// Filter of the force.
     #[serde(default)]
     pub filter: Filter,

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
 use super::{group, listed};
 use crate::curve::body::body_force_n;
-use crate::curve::{Case, Curve, EnergyAudit, energy, loading};
+use crate::curve::{Case, Curve, EnergyAudit, energy, group as siblings, loading};
 use crate::error::Error;
 use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
@@ -377,6 +377,9 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
             );
             add(&case.id.name, "speed_kinds", message);
         }
+    }
+    for (case, code, message) in siblings::remarks(cases) {
+        add(&case, code, message);
     }
     let in_list: Vec<&str> = found.listed.iter().flatten().map(String::as_str).collect();
     let there: Vec<&str> = found.cases.iter().map(|(name, _)| name.as_str()).collect();

@@ -1,7 +1,7 @@
 //! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
 use linfa::Dataset;
@@ -9,6 +9,7 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 use crate::curve::body::{BodyMotion, body_motion};
+use crate::curve::group::key_of;
 use crate::curve::loading::loading_branch;
 use crate::curve::replicates::mean_of;
 use crate::curve::stopped_mass::{LoadingRun, StoppedMass};
@@ -384,6 +385,10 @@ impl TrainingCase {
                 name = runs[0].id.name
             )
         };
+        // A copy of a run is no repetition of it.
+        let mut known = HashSet::new();
+        let of_own = |run: &&&Case| known.insert(key_of(&run.curves.original));
+        let runs: Vec<&Case> = runs.iter().filter(of_own).copied().collect();
         let case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
         let named = |source| {
             error!(Dataset, "case \"{name}\": {source}", name = case.id.name).caused_by(source)

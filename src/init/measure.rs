@@ -56,7 +56,7 @@ impl<'a> SiRun<'a> {
         let time_s: Vec<f64> = record.time.iter().map(|t| t * units.time_s).collect();
         let force = record.force.as_ref().map(|force| in_si(force, units));
         let contact_s = force.as_ref().and_then(|(time_s, force_n)| {
-            let threshold_n = contact::threshold_n(force_n);
+            let threshold_n = contact::threshold_n(force_n, contact::THRESHOLD);
             Some(contact::onset(time_s, force_n, threshold_n)?.time_s)
         });
         let contact_s = contact_s.unwrap_or(time_s[0]).max(time_s[0]);

@@ -62,6 +62,12 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
 }
 
 fn check_contact(recipe: &Recipe) -> Result<(), Error> {
+    if let Some(share) = recipe.contact_threshold.filter(|share| !(*share > 0.0 && *share < 1.0)) {
+        return Err(error!(
+            Study at "recipe.contact_threshold",
+            "recipe.contact_threshold = {share} is not a share of the largest force: write a number above 0 and below 1, such as 0.005"
+        ));
+    }
     match (&recipe.contact, &recipe.force) {
         (Some(ForceSource::Body { .. }), _) => Err(error!(
             Study at "recipe.contact",

@@ -4,7 +4,8 @@ use super::absolute;
 use super::files::{Located, shown_name};
 use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
-use crate::curve::extract::{DeckSpeed, Extracted, Notes, Setup, extract};
+use crate::curve::contact::THRESHOLD;
+use crate::curve::extract::{DeckSpeed, ExtractError, Extracted, Notes, Setup, extract};
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::error::{Error, ErrorCode, KeyPath, error};
@@ -26,6 +27,7 @@ impl LocatedRun<'_> {
         remarks.notes.extend_from_slice(&extracted.quality.notes);
         remarks.warnings.extend_from_slice(&extracted.quality.warnings);
         remarks.append(self.of_files(&files)?);
+        remarks.warnings.extend(self.mass_by_energy(&files, units));
         Ok(self.case(&files, units, extracted, remarks))
     }
 
@@ -85,14 +87,53 @@ impl LocatedRun<'_> {
             masses: study.masses(entry),
             manifest_speed_m_per_s: entry.speed.map(|s| s.0),
             deck_speed: self.deck_speed(units),
+            contact_threshold: study.manifest.recipe.contact_threshold.unwrap_or(THRESHOLD),
             stated: study.stated(entry),
             others: &others,
         };
         extract(&files.measured(units)?, &setup).map_err(|source| {
+            if let ExtractError::Curve(error) = &source
+                && error.is_about("sampling")
+            {
+                return error.clone().at(KeyPath::of("recipe").key("sampling"));
+            }
             let read = if source.is_of_force() { &files.force } else { &files.motion };
             Error::below(ErrorCode::Run, source)
                 .of(read.located.path.display())
                 .at(study.run_key(entry).key("path"))
+        })
+    }
+
+    /// That the kinetic energy at the start, in a glstat beside the run, asks for another mass: a
+    /// body force is in balance with every mass.
+    fn mass_by_energy(&self, files: &RunFiles<'_>, units: UnitSystem) -> Option<String> {
+        let folder = self.study.folder.join(&self.entry.path);
+        if !self.study.manifest.recipe.force_is_body() || !folder.join("glstat").is_file() {
+            return None;
+        }
+        let measured = files.measured(units).ok()?;
+        let first = |history: &History| history.values.first().map(|v| v * units.speed());
+        let moves = [measured.velocity, measured.minus_velocity].map(|v| v.and_then(first));
+        let masses = self.study.masses(self.entry);
+        let other = masses.other_kg.unwrap_or(0.0) * moves[1].unwrap_or(0.0).powi(2);
+        let stated_j = 0.5 * (masses.body_kg * moves[0]?.powi(2) + other);
+        let wanted = Selection {
+            ids: None,
+            components: Some(vec!["kinetic_energy".into()]),
+            ..Selection::all()
+        };
+        let energy = solver::read(&folder.join("glstat"), None, &wanted).ok()?;
+        let found_j = units.force()
+            * units.length_m
+            * energy.history(None, "kinetic_energy")?.values.first()?;
+        let ratio = found_j / stated_j;
+        ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
+            format!(
+                "mass: glstat has {:.4} MJ at the start, the masses of the manifest have {:.4} MJ: the mass of the run is wrong ({:.4} t would agree), or more moves than its bodies",
+                found_j / 1e6,
+                stated_j / 1e6,
+                ratio * masses.body_kg / 1e3
+            )
         })
     }
 
@@ -227,6 +268,9 @@ impl LocatedRun<'_> {
         }
     }
 }
+
+/// Kinetic energies of a run and of its masses that differ by less are one.
+const SAME_ENERGY: f64 = 0.05;
 
 /// Text and binary of one run agree up to the text's digits.
 const SAME_VALUE: f64 = 1e-5;

@@ -12,7 +12,7 @@ use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, Selection};
 
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
-const EXTRACTION_VERSION: u32 = 3;
+const EXTRACTION_VERSION: u32 = 4;
 
 /// Most bytes of a run's case.json, which has some hundred.
 const MAX_CASE_BYTES: u64 = 1 << 20;

@@ -34,14 +34,9 @@ pub enum ExtractError {
     },
     /// The force never exceeds what counts as contact.
     #[error(
-        "the force never exceeds {threshold_n:.0} N (its largest is {largest_n} N): there is no contact in this record; look at id, component, sign and units"
+        "the force is never positive: there is no contact in this record; look at id, component, sign and units"
     )]
-    NoContact {
-        /// What counts as contact, in N.
-        threshold_n: f64,
-        /// Largest force of the record, in N.
-        largest_n: f64,
-    },
+    NoContact,
     /// Deflection and force have no common times.
     #[error("the histories of deflection and force have no time in common")]
     NoOverlap,
@@ -114,7 +109,7 @@ impl ExtractError {
             Self::TooShort { origin, .. } | Self::NotFinite { origin, .. } => {
                 *origin == Origin::Force
             }
-            Self::NoContact { .. } | Self::Filter(_) | Self::ImpossibleRun(_) => true,
+            Self::NoContact | Self::Filter(_) | Self::ImpossibleRun(_) => true,
             _ => false,
         }
     }

@@ -49,6 +49,8 @@ pub struct Setup<'a> {
     pub manifest_speed_m_per_s: Option<f64>,
     /// Of the run, if its deck gives it.
     pub deck_speed: Option<DeckSpeed>,
+    /// Share of the largest force above which a record is in contact.
+    pub contact_threshold: f64,
     /// What the run's entry says of its record.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.

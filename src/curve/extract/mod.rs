@@ -7,6 +7,7 @@
 //! The sign of the deflection is the direction of motion at contact, not of the largest value: at low speeds the rebound
 //! travels further than the crush.
 
+mod consistency;
 pub(crate) mod error;
 mod from_contact;
 pub(crate) mod input;
@@ -20,6 +21,7 @@ use super::{Curve, EnergyAudit, ForceKind, Quality, RecordedCurves, energy, load
 use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::Speed;
+use consistency::Motion;
 pub use error::ExtractError;
 use from_contact::FromContact;
 pub(crate) use input::{DeckSpeed, StatedContact};
@@ -63,11 +65,24 @@ pub(crate) fn curve_of(
 ) -> Result<Extracted, ExtractError> {
     // Before the filter, which without phase shift begins ahead of the contact.
     let start = remarks.take(Start::find(setup, &record)?);
+    let accepted = |checked: Result<Notes, energy::ImpossibleRun>| match checked {
+        Err(impossible) if setup.stated.accept_energy => {
+            Ok(Notes::warning(format!("accept_energy: {}", impossible.found())))
+        }
+        checked => checked,
+    };
+    remarks.append(accepted(consistency::displacement(&record))?);
+    let recorded_n = record.force_n.clone();
     if let Filter::Cfc(class) = setup.filter {
         remarks.append(filter(class, &mut record)?);
     }
     let contact = remarks.take(FromContact::of(&record, start.time_s, setup.stated.offset_m)?);
-    remarks.append(start.uncertainty(&contact));
+    remarks.append(start.uncertainty(&contact, setup));
+    remarks.append(start.force_before(&record.time_s, &recorded_n, &contact));
+    let motion = Motion::of(&contact, setup.masses);
+    motion.is_free()?;
+    remarks.append(motion.flight(&record));
+    let (along_time, mass) = (motion.momentum(), motion.mass(&record));
     let FromContact { curve: original, closing_m_per_s: closing, .. } = contact;
     let before = contact.before;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
@@ -90,7 +105,10 @@ pub(crate) fn curve_of(
         }
         Err(impossible) => return Err(impossible.into()),
     };
+    remarks.append(accepted(along_time)?);
+    remarks.append(accepted(mass)?);
     let (sampled, closing_speed_m_per_s) = remarks.take(sample(&original, &closing, setup)?);
+    remarks.append(consistency::sampling(&original, &sampled));
     remarks.append(audited(&original, balance));
     Ok(Extracted {
         speed,

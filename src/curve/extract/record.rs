@@ -5,7 +5,8 @@ use super::input::{Measured, MeasuredForce, Setup};
 use super::remarks::Notes;
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
-use crate::curve::{Curve, ForceKind};
+use crate::curve::{Curve, ForceKind, loading};
+use crate::error::error;
 use crate::history::History;
 use crate::plural::counted;
 use crate::signal::{derivative, interpolate};
@@ -13,6 +14,10 @@ use crate::unit::UnitSystem;
 
 /// Times of two files count as equal up to the six digits that solvers print.
 const SAME_TIME: f64 = 1e-5;
+/// Share of the impulse before the common times that deserves a warning.
+const LEFT_OUT: f64 = 0.001;
+/// Share of the recipe's states that a record may lack without a warning.
+const SHORT: f64 = 0.02;
 
 /// Motion and force at the same times, the force positive in compression: of a run, or of a file with times.
 pub(crate) struct Record {
@@ -49,12 +54,14 @@ impl Record {
             remarks.note(record.truncate(until_s)?);
         }
         remarks.append(record.turn_force(setup.stated.force_sign));
-        if let (None, Some(contact)) = (setup.stated.contact, measured.contact) {
+        if let Some(contact) = measured.contact {
             let signal = Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
             let mut signal = remarks.take(signal);
             let sign = sign_of_impulse(&signal.time_s, &signal.values);
             signal.values.iter_mut().for_each(|f| *f *= sign);
-            remarks.note(format!("contact: found by {}", contact.label()));
+            if setup.stated.contact.is_none() {
+                remarks.note(format!("contact: found by {}", contact.label()));
+            }
             record.contact = Some(signal);
         }
         Ok((record, remarks))
@@ -114,6 +121,17 @@ impl Record {
             record.force_n = force.values;
             return Ok((record, remarks));
         }
+        let lead = force.time_s.partition_point(|&t| t < from);
+        let whole = impulse(&force.time_s, &force.values);
+        let lost = impulse(&force.time_s[..lead], &force.values[..lead]);
+        if lost.abs() > LEFT_OUT * whole.abs() {
+            remarks.warn(format!(
+                "times: the force begins at {}, the motion at {}: {:.1} % of the force's impulse lie before it and are left out; the clocks of the two files differ, or the first states of the motion are missing",
+                milliseconds(force.time_s[0]),
+                milliseconds(from),
+                100.0 * lost / whole
+            ));
+        }
         let states = force.time_s.iter().copied().zip(force.values);
         let (time_s, force_n): (Vec<f64>, Vec<f64>) =
             states.filter(|(t, _)| (from..=to).contains(t)).unzip();
@@ -169,12 +187,15 @@ impl Record {
     }
 }
 
+/// `∫F dt` by the trapezoidal rule.
+pub(super) fn impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
+    let step = |i| 0.5 * (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]);
+    (1..time_s.len()).map(step).sum()
+}
+
 /// The sign of `∫F dt`: a single state that is wrong does not turn it.
 fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
-    let impulse: f64 = (1..time_s.len())
-        .map(|i| 0.5 * (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
-        .sum();
-    if impulse < 0.0 { -1.0 } else { 1.0 }
+    if impulse(time_s, force_n) < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// A history in SI with strictly increasing times.
@@ -338,11 +359,24 @@ pub(super) fn sample(
             times.len(),
             sampling.states
         );
-        // A record that was cut on purpose is as short as was asked for.
+        // A record that was cut on purpose is as short as was asked for, and one that begins with
+        // some states of flight ends as much earlier.
+        let missing = sampling.states - times.len();
         match setup.stated.truncate_s {
-            Some(_) => remarks.note(short),
-            None => remarks.warn(short),
+            None if missing as f64 > SHORT * sampling.states as f64 => remarks.warn(short),
+            _ => remarks.note(short),
         }
+    }
+    let (end_s, window_s) = (at[loading::loading_end(original)], times[times.len() - 1]);
+    if window_s < end_s && times.len() == sampling.states && setup.stated.truncate_s.is_none() {
+        return Err(error!(
+            Run at "sampling",
+            "recipe.sampling has {sampling}, which ends {} after contact, before the largest crush at {}: raise states to {:.0} or more, or say truncate in the run",
+            milliseconds(window_s),
+            milliseconds(end_s),
+            (end_s / sampling.interval_s).ceil() + 1.0
+        )
+        .into());
     }
     let at_times =
         |values: &[f64]| interpolate(at, values, &times).map_err(|_| ExtractError::NoOverlap);

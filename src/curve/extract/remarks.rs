@@ -10,6 +10,11 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
+    /// A single warning.
+    pub(crate) fn warning(warning: String) -> Self {
+        Self { notes: Vec::new(), warnings: vec![warning] }
+    }
+
     /// Adds a note.
     pub(crate) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());

@@ -3,7 +3,7 @@
 use super::error::ExtractError;
 use super::from_contact::FromContact;
 use super::input::{Setup, StatedContact};
-use super::record::Record;
+use super::record::{Record, impulse};
 use super::remarks::Notes;
 use crate::curve::contact::{self, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
@@ -13,6 +13,10 @@ use crate::curve::{Curve, ForceKind, loading};
 const BEGINNING: (f64, f64) = (0.15, 0.003);
 /// A contact found within a step that closes more than this share of the crush is uncertain.
 const CERTAIN_SHARE: f64 = 0.01;
+/// Crush before the record's first state, as a share of the rest, that deserves a warning.
+const MISSING_SHARE: f64 = 0.005;
+/// Impulse before the contact that the manifest states, as a share of the loading branch's, likewise.
+const EARLY_SHARE: f64 = 0.001;
 
 /// Where contact begins, and how sure that is.
 pub(super) struct Start {
@@ -23,8 +27,8 @@ pub(super) struct Start {
 enum StartBy {
     /// The manifest's contact time or gap.
     Manifest,
-    /// The first state, which is in contact already.
-    FirstState,
+    /// The first state, which is in contact already; the crush before it.
+    FirstState { missing_m: f64 },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64 },
     /// The body's slowing down, which is later: said where it is found.
@@ -40,26 +44,26 @@ impl Start {
                     return Err(record.outside("contact_time", time_s));
                 }
                 let mut remarks = Notes::default();
-                remarks.notes.extend(found_elsewhere(record, time_s));
+                remarks.notes.extend(found_elsewhere(record, time_s, setup));
                 Ok((Self { time_s, by: StartBy::Manifest }, remarks))
             }
             Some(StatedContact::Gap { m }) => {
                 let mut remarks = Notes::default();
                 let time_s = closing_time(record, m)?;
                 remarks.note(format!("contact: the gap is closed at {}", milliseconds(time_s)));
-                remarks.notes.extend(found_elsewhere(record, time_s));
+                remarks.notes.extend(found_elsewhere(record, time_s, setup));
                 Ok((Self { time_s, by: StartBy::Manifest }, remarks))
             }
-            None => Self::in_force(record),
+            None => Self::in_force(record, setup),
         }
     }
 
     /// Where the contact force begins, if the recipe names one; else the record's.
-    fn in_force(record: &Record) -> Result<(Self, Notes), ExtractError> {
+    fn in_force(record: &Record, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
-        let onset = match &record.contact {
-            Some(contact) => onset(&contact.time_s, &contact.values)?,
-            None => onset(&record.time_s, &record.force_n)?,
+        let onset = match record.contact.as_ref() {
+            Some(contact) => onset(&contact.time_s, &contact.values, setup)?,
+            None => onset(&record.time_s, &record.force_n, setup)?,
         };
         let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
@@ -75,19 +79,19 @@ impl Start {
         let by = match onset.interval_s {
             _ if of_body => StartBy::Body,
             Some(interval_s) => StartBy::Crossing { interval_s },
-            None => StartBy::FirstState,
+            None => StartBy::FirstState { missing_m: missing_m(record) },
         };
         Ok((Self { time_s: onset.time_s, by }, remarks))
     }
 
     /// By how much the crush may be off because contact lies somewhere in a step.
-    pub(crate) fn uncertainty(&self, contact: &FromContact) -> Notes {
+    pub(crate) fn uncertainty(&self, contact: &FromContact, setup: &Setup<'_>) -> Notes {
         let mut remarks = Notes::default();
         let curve = &contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
         match self.by {
-            StartBy::Crossing { .. } | StartBy::FirstState | StartBy::Body
+            StartBy::Crossing { .. } | StartBy::FirstState { .. } | StartBy::Body
                 if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
             {
                 remarks.warn(format!(
@@ -104,18 +108,65 @@ impl Start {
                     100.0 * step_m(interval_s) / crush_m
                 ));
             }
-            StartBy::FirstState => remarks.note(
+            StartBy::FirstState { missing_m }
+                if missing_m > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
+            {
+                remarks.warn(format!(
+                    "contact: the record begins at {}, in contact: the first {:.1} mm of the crush ({:.1} %) are missing; say offset = \"{:.1}mm\" in the run, or give its first states",
+                    milliseconds(self.time_s),
+                    missing_m * 1e3,
+                    100.0 * missing_m / (crush_m + missing_m),
+                    missing_m * 1e3
+                ));
+            }
+            StartBy::FirstState { .. } => remarks.note(
                 "contact: the record begins in contact, so the deflection counts from its first state",
             ),
             StartBy::Crossing { .. } | StartBy::Manifest | StartBy::Body => {}
         }
         remarks
     }
+
+    /// Force before the contact, gap or offset that the manifest states.
+    pub(crate) fn force_before(
+        &self,
+        time_s: &[f64],
+        force_n: &[f64],
+        contact: &FromContact,
+    ) -> Notes {
+        let mut remarks = Notes::default();
+        if !matches!(self.by, StartBy::Manifest) && contact.time_s <= self.time_s {
+            return remarks;
+        }
+        let before = time_s.partition_point(|&t| t <= contact.time_s);
+        let early_ns = impulse(&time_s[..before], &force_n[..before]);
+        let end = loading::loading_end(&contact.curve);
+        let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);
+        if early_ns > EARLY_SHARE * (early_ns + rest_ns) {
+            remarks.warn(format!(
+                "contact: before {}, where the manifest has it begin, the force is up to {:.3} MN and gives {:.3} kN·s, {:.1} % of the impulse up to the largest crush: the curve leaves it out; look at contact_time, gap and offset",
+                milliseconds(contact.time_s),
+                force_n[..before].iter().copied().fold(0.0, f64::max) / 1e6,
+                early_ns / 1e3,
+                100.0 * early_ns / (early_ns + rest_ns)
+            ));
+        }
+        remarks
+    }
+}
+
+/// The crush before a record that begins in contact: its first displacement, or, where that counts
+/// from the first state, what the body travels until then.
+fn missing_m(record: &Record) -> f64 {
+    match record.deflection_m[0].abs() {
+        0.0 => (record.rate_m_per_s[0] * record.time_s[0]).abs(),
+        displacement_m => displacement_m,
+    }
 }
 
 /// When the force begins, if the manifest states another contact.
-fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
-    let found = onset(&record.time_s, &record.force_n).ok()?;
+fn found_elsewhere(record: &Record, stated_s: f64, setup: &Setup<'_>) -> Option<String> {
+    let found = onset(&record.time_s, &record.force_n, setup).ok()?;
     let is_elsewhere = (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0);
     is_elsewhere.then(|| {
         format!(
@@ -126,12 +177,13 @@ fn found_elsewhere(record: &Record, stated_s: f64) -> Option<String> {
     })
 }
 
-fn onset(time_s: &[f64], force_n: &[f64]) -> Result<contact::Onset, ExtractError> {
-    let threshold_n = contact::threshold_n(force_n);
-    contact::onset(time_s, force_n, threshold_n).ok_or_else(|| {
-        let largest_n = force_n.iter().copied().fold(0.0, f64::max);
-        ExtractError::NoContact { threshold_n, largest_n }
-    })
+fn onset(
+    time_s: &[f64],
+    force_n: &[f64],
+    setup: &Setup<'_>,
+) -> Result<contact::Onset, ExtractError> {
+    let threshold_n = contact::threshold_n(force_n, setup.contact_threshold);
+    contact::onset(time_s, force_n, threshold_n).ok_or(ExtractError::NoContact)
 }
 
 /// When the bodies have moved towards each other by `gap_m` from the first state, in the

@@ -3,7 +3,7 @@
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
-use crate::curve::contact::{onset, threshold_n};
+use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::loading_branch;
 use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};
 use crate::unit::{SpeedKind, UnitSystem};
@@ -51,7 +51,7 @@ impl ReadCurve {
                     .map(|(t, f)| (t[1] - t[0]) * (f[0] + f[1]))
                     .sum();
                 f.iter_mut().for_each(|f| *f *= impulse.signum());
-                let onset = onset(&time_s, &f, threshold_n(&f)).ok_or_else(|| {
+                let onset = onset(&time_s, &f, threshold_n(&f, THRESHOLD)).ok_or_else(|| {
                     error!(CurveFile, "its force never rises: there is no contact in this record")
                 })?;
                 let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);

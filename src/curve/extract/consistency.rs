@@ -1,0 +1,306 @@
+//! What the histories of one record say of each other along time: impulse against momentum, displacement against velocity,
+//! force against motion, the output interval against the curve.
+
+use super::error::ExtractError;
+use super::from_contact::FromContact;
+use super::record::Record;
+use super::remarks::Notes;
+use crate::curve::contact::milliseconds;
+use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
+use crate::curve::{Curve, Masses, loading};
+use crate::error::error;
+use crate::signal::interpolate;
+use crate::unit::km_per_h;
+
+/// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
+/// time; a clock that is 10 ms off makes it 11 to 45 %.
+const IMPULSE: f64 = 0.08;
+/// Displacement and the integral of the velocity differ by 0.02 % of the range in clean runs, by
+/// 0.07 % where only each 6 ms are written.
+const DISPLACEMENT: f64 = 0.005;
+/// A force after the contact counts from this share of the peak on, and from this share of the
+/// momentum.
+const LATE_FORCE: (f64, f64) = (0.15, 0.02);
+/// A body that has lost less than this share of its speed, under an impulse of half its momentum,
+/// does not move by that force.
+const SLOWED: f64 = 0.05;
+/// Fewer output intervals up to the largest crush than this may cut peaks.
+const STATES: usize = 100;
+/// Effect of the sampling on the curve, as a share of its mean force, that deserves a warning.
+const SAMPLED_OFF: f64 = 0.02;
+/// Where two histories of one record cannot be one run's.
+const OTHER_FILES: &str =
+    "likely files of two runs, another node or wall, or a clock that was changed";
+/// Free flight in fewer states says nothing of gravity.
+const FLIGHT: usize = 5;
+/// Work of another force, as a share of the kinetic energy, that deserves a warning.
+const OTHER_WORK: f64 = 0.01;
+
+/// Where two quantities that should be one differ along time.
+#[derive(Default)]
+struct Difference {
+    /// The largest, as a share.
+    largest: f64,
+    /// When it first exceeds its limit.
+    since_s: Option<f64>,
+}
+
+impl Difference {
+    fn of(shares: impl Iterator<Item = (f64, f64)>, limit: f64) -> Self {
+        let mut difference = Self::default();
+        for (time_s, share) in shares {
+            if share > limit && difference.since_s.is_none() {
+                difference.since_s = Some(time_s);
+            }
+            difference.largest = difference.largest.max(share);
+        }
+        difference
+    }
+}
+
+/// Integral from the first state on, by the trapezoidal rule.
+fn integral(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let step = |i: usize| 0.5 * (values[i] + values[i - 1]) * (time_s[i] - time_s[i - 1]);
+    let steps = (1..time_s.len()).map(|i| {
+        sum += step(i);
+        sum
+    });
+    std::iter::once(0.0).chain(steps).collect()
+}
+
+/// The displacement against the integral of the velocity, over the whole record.
+pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
+    let mut remarks = Notes::default();
+    let (t, d) = (&record.time_s, &record.deflection_m);
+    let range = |values: &[f64]| {
+        let ends = |(low, high): (f64, f64), &v: &f64| (low.min(v), high.max(v));
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+        high - low
+    };
+    let travelled = integral(t, &record.rate_m_per_s);
+    let range_m = range(d).max(range(&travelled));
+    if record.missing_velocity.is_some() || range_m <= 0.0 {
+        return Ok(remarks);
+    }
+    let off = |i: usize| (t[i], (d[i] - d[0] - travelled[i]).abs() / range_m);
+    let Difference { largest, since_s } = Difference::of((0..t.len()).map(off), DISPLACEMENT);
+    let Some(since_s) = since_s else { return Ok(remarks) };
+    let found = format!(
+        "displacement: from {} on it is not the integral of the velocity, by up to {:.1} % of its range",
+        milliseconds(since_s),
+        largest * 100.0
+    );
+    if largest > IMPOSSIBLE_ALONG_TIME {
+        return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
+    }
+    remarks.warn(format!("{found}: one of the two is damaged, scaled or of another node"));
+    Ok(remarks)
+}
+
+/// A curve from contact on, with the closing speeds at its states.
+pub(super) struct Motion<'a> {
+    pub contact: &'a FromContact,
+    pub masses: Masses,
+    /// First state after the largest deflection at which the force is gone.
+    pub end: usize,
+}
+
+impl<'a> Motion<'a> {
+    pub(super) fn of(contact: &'a FromContact, masses: Masses) -> Self {
+        let force_n = contact.curve.force_n();
+        let from = loading::loading_end(&contact.curve);
+        let peak_n = force_n[..=from].iter().copied().fold(0.0, f64::max);
+        let gone = (from..force_n.len()).find(|&i| force_n[i] <= LATE_FORCE.0 * peak_n);
+        Self { contact, masses, end: gone.unwrap_or(force_n.len() - 1) }
+    }
+
+    fn momentum_ns(&self) -> f64 {
+        self.masses.effective_kg() * self.contact.closing_m_per_s[0]
+    }
+
+    fn at(&self, i: usize) -> f64 {
+        self.contact.time_s + self.contact.curve.time_s()[i]
+    }
+
+    fn lost_ns(&self, from: usize, to: usize) -> f64 {
+        let closing = &self.contact.closing_m_per_s;
+        self.masses.effective_kg() * (closing[from] - closing[to])
+    }
+
+    /// Refuses a body that the force does not slow down.
+    pub(super) fn is_free(&self) -> Result<(), ExtractError> {
+        let curve = &self.contact.curve;
+        let last = loading::loading_end(curve);
+        let closing = &self.contact.closing_m_per_s;
+        let slowest = closing[..last].iter().copied().fold(f64::INFINITY, f64::min);
+        let impulse = integral(curve.time_s(), curve.force_n())[last];
+        if slowest < (1.0 - SLOWED) * closing[0] || impulse < 0.5 * self.momentum_ns() {
+            return Ok(());
+        }
+        Err(error!(
+            Run,
+            "the motion is prescribed: the body keeps its {} up to the largest deflection, though the force would have stopped it {:.1} times. Such a curve belongs to no impact of this mass and speed; crumple histories gives its force and displacement",
+            km_per_h(closing[0]),
+            impulse / self.momentum_ns()
+        )
+        .into())
+    }
+
+    /// The impulse of the force against the lost momentum, at every state of the contact, and of
+    /// each spell of force after it.
+    pub(super) fn momentum(&self) -> Result<Notes, ImpossibleRun> {
+        let mut remarks = Notes::default();
+        let (time_s, force_n) = (self.contact.curve.time_s(), self.contact.curve.force_n());
+        let whole_ns = self.momentum_ns();
+        if whole_ns <= 0.0 {
+            return Ok(remarks);
+        }
+        let impulse = integral(time_s, force_n);
+        let off = |i: usize| (self.at(i), (impulse[i] - self.lost_ns(0, i)).abs() / whole_ns);
+        let Difference { largest, since_s } = Difference::of((0..=self.end).map(off), IMPULSE);
+        if let Some(since_s) = since_s {
+            let found = format!(
+                "impulse: from {} on the force does not give the body's change of momentum, by up to {:.1} % of the impact's",
+                milliseconds(since_s),
+                largest * 100.0
+            );
+            if largest > IMPOSSIBLE_ALONG_TIME {
+                return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
+            }
+            remarks.warn(format!(
+                "{found}: the times of force and motion differ, the force is another body's, or not all of it is in the recipe"
+            ));
+        }
+        let peak_n = force_n[..=self.end].iter().copied().fold(0.0, f64::max);
+        let is_late = |i: &usize| force_n[*i] > LATE_FORCE.0 * peak_n;
+        let mut from = self.end + 1;
+        while let Some(first) = (from..force_n.len()).find(is_late) {
+            let past = (first..force_n.len()).find(|i| !is_late(i));
+            let last = past.unwrap_or(force_n.len() - 1);
+            let given_ns = impulse[last] - impulse[first - 1];
+            let lost_ns = self.lost_ns(first - 1, last);
+            if given_ns > LATE_FORCE.1 * whole_ns && (given_ns - lost_ns).abs() > 0.5 * given_ns {
+                remarks.warn(format!(
+                    "force: between {} and {}, after the contact, it gives {:.3} kN·s, and the momentum changes by {lost:.3} kN·s: this force, of up to {:.3} MN, does not act on this body",
+                    milliseconds(self.at(first)),
+                    milliseconds(self.at(last)),
+                    given_ns / 1e3,
+                    force_n[first..=last].iter().copied().fold(0.0, f64::max) / 1e6,
+                    lost = lost_ns / 1e3,
+                ));
+            }
+            from = last + 1;
+        }
+        Ok(remarks)
+    }
+
+    /// The mass that the contact force beside a body force asks for: mass times acceleration is in
+    /// balance with every mass.
+    pub(super) fn mass(&self, record: &Record) -> Result<Notes, ImpossibleRun> {
+        let mut remarks = Notes::default();
+        let Some(contact) = &record.contact else { return Ok(remarks) };
+        let end = loading::loading_end(&self.contact.curve);
+        let (from_s, to_s) = (self.at(0), self.at(end));
+        let within = |t: f64| t > from_s && t < to_s;
+        let inner = contact.time_s.iter().copied().filter(|&t| within(t));
+        let times: Vec<f64> = std::iter::once(from_s).chain(inner).chain([to_s]).collect();
+        let lost_ns = self.lost_ns(0, end);
+        let Ok(force_n) = interpolate(&contact.time_s, &contact.values, &times) else {
+            return Ok(remarks);
+        };
+        if lost_ns < 0.1 * self.momentum_ns() {
+            return Ok(remarks);
+        }
+        let ratio = integral(&times, &force_n)[times.len() - 1] / lost_ns;
+        let found = format!(
+            "mass: up to the largest crush the contact force gives {ratio:.3} times the momentum that {:.4} t lose; it asks for {:.4} t",
+            self.masses.body_kg / 1e3,
+            ratio * self.masses.body_kg / 1e3
+        );
+        // Other contacts may act as well, but none pulls.
+        if ratio > POSSIBLE.1 {
+            return Err(ImpossibleRun::of_histories(
+                found,
+                "likely the mass of the run, or the node of the force",
+            ));
+        }
+        if (ratio - 1.0).abs() > IMPULSE {
+            let or = if ratio < 1.0 { ", or more acts than this contact" } else { "" };
+            remarks.warn(format!("{found}: the mass of the run is wrong{or}"));
+        }
+        Ok(remarks)
+    }
+
+    /// What another force than the recipe's does to the body, seen in its flight before contact.
+    pub(super) fn flight(&self, record: &Record) -> Notes {
+        let mut remarks = Notes::default();
+        let states = record.time_s.partition_point(|&t| t < self.contact.time_s);
+        let curve = &self.contact.curve;
+        let crush_m = curve.deflection_m()[loading::loading_end(curve)];
+        if states < FLIGHT || record.missing_velocity.is_some() {
+            return remarks;
+        }
+        let (first, last) = (record.rate_m_per_s[0].abs(), record.rate_m_per_s[states - 1].abs());
+        let rate = (last - first) / (record.time_s[states - 1] - record.time_s[0]);
+        let energy = 0.5 * self.contact.closing_m_per_s[0].powi(2);
+        let share = rate * crush_m / energy;
+        if share.abs() > OTHER_WORK {
+            remarks.warn(format!(
+                "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass leave this force out, whose work over the crush is {:.1} % of the kinetic energy",
+                share * 100.0
+            ));
+        }
+        remarks
+    }
+}
+
+/// Whether the output interval is short enough for the curve, by what it would be without each second
+/// state; and what the recipe's common times make of it.
+pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
+    let mut remarks = Notes::default();
+    let end = loading::loading_end(original);
+    let interval_ms = |t: &[f64], n: usize| 1e3 * (t[n] - t[0]) / n.max(1) as f64;
+    let halved: Vec<f64> = original.time_s().iter().copied().step_by(2).collect();
+    let halved = off_at(original, &halved).unwrap_or(0.0);
+    if end < STATES && end > 0 {
+        let found = format!(
+            "sampling: the record has {end} states up to the largest crush, one each {:.3} ms; without each second of them the curve changes by {:.1} % of its mean force",
+            interval_ms(original.time_s(), end),
+            halved * 100.0
+        );
+        if halved > SAMPLED_OFF {
+            remarks.warn(format!("{found}: about as much may lie between those that were written, and peaks are cut; write histories more often"));
+        } else {
+            remarks.note(found);
+        }
+    }
+    if let Some(off) = off_at(original, sampled.time_s()).filter(|&off| off > SAMPLED_OFF) {
+        remarks.warn(format!(
+            "sampling: the recipe's times, one each {:.3} ms, change the curve by {:.1} % of its mean force: shorten interval_ms",
+            interval_ms(sampled.time_s(), sampled.time_s().len() - 1),
+            off * 100.0
+        ));
+    }
+    remarks
+}
+
+/// Difference of a curve and of its states at other times, joined by lines, over the loading
+/// branch: mean over the deflection, as a share of the mean force.
+fn off_at(curve: &Curve, times_s: &[f64]) -> Option<f64> {
+    let (t, d, f) = (curve.time_s(), curve.deflection_m(), curve.force_n());
+    let end = loading::loading_end(curve);
+    if times_s.len() < 2 || end == 0 {
+        return None;
+    }
+    let force = interpolate(t, f, times_s).ok()?;
+    let reached = times_s[times_s.len() - 1];
+    let inner: Vec<f64> = t[..=end].iter().copied().filter(|&t| t <= reached).collect();
+    let lines = interpolate(times_s, &force, &inner).ok()?;
+    let width = |i: usize| 0.5 * (d[(i + 1).min(end)] - d[i.saturating_sub(1)]).abs();
+    let over = |value: &dyn Fn(usize) -> f64| -> f64 {
+        (0..inner.len()).map(|i| value(i).abs() * width(i)).sum()
+    };
+    let whole = over(&|i| f[i]);
+    (whole > 0.0).then(|| over(&|i| lines[i] - f[i]) / whole)
+}

@@ -1,0 +1,227 @@
+//! What the cases of one group say of each other: copies, another design, energy or impulse unlike the others'.
+
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::from_table::IMPORTED;
+use super::{Case, Curve, loading};
+
+/// Energy and impulse ratios of clean runs follow a line over the speed within 1 %.
+const UNLIKE: f64 = 0.03;
+/// And a ratio that is unlike them lies outside of theirs by more than this.
+const OUTSIDE: f64 = 0.015;
+/// Runs by whose ratios that of another is judged: those nearest in speed.
+const NEIGHBOURS: usize = 8;
+/// Parts of the common deflection over which two curves are compared.
+const PARTS: usize = 12;
+/// Mean force of the faster of two neighbours over that of the slower: of one design 0.99 to 1.17.
+const LEAST_RATIO: f64 = 0.9;
+const MOST_RATIO: f64 = 1.25;
+/// Rate effects grow with the speed: the bound is multiplied by the ratio of the speeds to this power.
+const RATE_POWER: f64 = 0.15;
+/// Correlation of the two curves: of one design 0.74 and more.
+const LEAST_CORRELATION: f64 = 0.5;
+
+/// Something to look at in a case, seen beside the others: its name, a code and words.
+pub(crate) type Remark = (String, &'static str, String);
+
+/// What is odd in a group. `cases`: readable, of one group, by speed.
+pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
+    let mut all = copies(cases);
+    all.extend(titles(cases));
+    let runs: Vec<&Case> =
+        cases.iter().filter(|c| c.id.study != IMPORTED && !c.is_truncated()).collect();
+    let measures: [(&'static str, &str, fn(&Case) -> f64); 2] = [
+        ("group_energy", "W/E", |case| case.quality.audit.ratio()),
+        ("group_impulse", "impulse over momentum", impulse_ratio),
+    ];
+    for (code, what, ratio) in measures {
+        let points: Vec<(f64, f64)> =
+            runs.iter().map(|c| (c.conditions.speed.m_per_s, ratio(c))).collect();
+        for (i, case) in runs.iter().enumerate() {
+            let Some(expected) = expected(&points, i) else { continue };
+            let found = points[i].1;
+            let others = || points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| p.1);
+            let (low, high) =
+                (others().fold(f64::INFINITY, f64::min), others().fold(0.0, f64::max));
+            // A line through few runs is not trusted beyond them.
+            let is_outside = !(low - OUTSIDE..=high + OUTSIDE).contains(&found);
+            if is_outside && (found / expected - 1.0).abs() > UNLIKE {
+                all.push((
+                    case.id.name.clone(),
+                    code,
+                    format!(
+                        "{what} is {found:.3}, that of the group's other runs is {expected:.3} at this speed: force, mass or speed may be off by {:+.1} %",
+                        (found / expected - 1.0) * 100.0
+                    ),
+                ));
+            }
+        }
+    }
+    all.extend(designs(&runs));
+    all
+}
+
+/// Impulse up to the largest deflection over mass times speed.
+fn impulse_ratio(case: &Case) -> f64 {
+    let (t, f) = (case.curves.original.time_s(), case.curves.original.force_n());
+    let end = case.loading_end();
+    let impulse: f64 = (1..=end).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1])).sum();
+    impulse / (case.conditions.masses.effective_kg() * case.conditions.speed.m_per_s)
+}
+
+/// What the others say at the speed of point `i`: by the median slope and level of those nearest
+/// in speed, or their median where they are few. One wrong run among them does not move it.
+fn expected(points: &[(f64, f64)], i: usize) -> Option<f64> {
+    let mut others: Vec<(f64, f64)> =
+        points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| *p).collect();
+    let at = points[i].0;
+    others.sort_by(|a, b| (a.0 - at).abs().total_cmp(&(b.0 - at).abs()));
+    others.truncate(NEIGHBOURS);
+    let slopes = others.iter().enumerate().flat_map(|(k, a)| {
+        let later = others[k + 1..].iter();
+        later.filter(|b| b.0 != a.0).map(|b| (b.1 - a.1) / (b.0 - a.0))
+    });
+    let slope = if others.len() < 3 { 0.0 } else { median(slopes.collect()).unwrap_or(0.0) };
+    median(others.iter().map(|(v, ratio)| ratio + slope * (at - v)).collect())
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}
+
+/// Equal for curves of the same values, whatever files they come from.
+pub(crate) fn key_of(curve: &Curve) -> u64 {
+    let mut hash = DefaultHasher::new();
+    for column in [curve.time_s(), curve.deflection_m(), curve.force_n()] {
+        column.iter().for_each(|value| value.to_bits().hash(&mut hash));
+    }
+    hash.finish()
+}
+
+fn copies(cases: &[Case]) -> Vec<Remark> {
+    let mut first: HashMap<u64, &Case> = HashMap::new();
+    let mut found = Vec::new();
+    for case in cases {
+        let key = key_of(&case.curves.original);
+        match first.get(&key) {
+            Some(one) => found.push((
+                case.id.name.clone(),
+                "copy",
+                format!(
+                    "is a copy of {}: the same values at every state, no repetition of the run; scatter counts them once",
+                    one.id.name
+                ),
+            )),
+            None => {
+                first.insert(key, case);
+            }
+        }
+    }
+    found
+}
+
+/// A title without the words that have numbers: those are speeds, dates and names of runs.
+fn wording(title: &str) -> String {
+    let words = title.split_whitespace().filter(|word| !word.contains(|c: char| c.is_numeric()));
+    words.collect::<Vec<_>>().join(" ").to_lowercase()
+}
+
+/// Titles of the solver's files that differ by more than numbers from those of most cases.
+fn titles(cases: &[Case]) -> Vec<Remark> {
+    let title = |case: &Case| case.provenance.sources.iter().find_map(|s| s.title.clone());
+    let titled: Vec<(&Case, String)> =
+        cases.iter().filter_map(|case| Some((case, title(case)?))).collect();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for (_, title) in &titled {
+        *counts.entry(wording(title)).or_default() += 1;
+    }
+    let most = counts.values().copied().max().unwrap_or(0);
+    let usual = titled.iter().find(|(_, title)| counts[&wording(title)] == most);
+    let Some((_, usual)) = usual else { return Vec::new() };
+    let others = titled.iter().filter(|(_, title)| wording(title) != wording(usual));
+    let remark = |(case, title): &(&Case, String)| {
+        let words = format!(
+            "the title of its files is \"{}\", that of others in the group \"{}\": it may be another design",
+            title.trim().escape_debug(),
+            usual.trim().escape_debug()
+        );
+        (case.id.name.clone(), "title_differs", words)
+    };
+    others.map(remark).collect()
+}
+
+/// Mean forces over equal parts of the deflection, up to `end_m`.
+fn parts(curve: &Curve, end_m: f64) -> Vec<f64> {
+    let (d, f) = (curve.deflection_m(), curve.force_n());
+    let mut work = vec![0.0; PARTS];
+    let mut reached = d[0];
+    for i in 1..=loading::loading_end(curve) {
+        let from = reached.max(d[i - 1]);
+        let to = d[i].min(end_m);
+        if to <= from {
+            continue;
+        }
+        let force = 0.5 * (f[i] + f[i - 1]);
+        let part = |m: f64| ((m / end_m * PARTS as f64) as usize).min(PARTS - 1);
+        for (k, work) in work.iter_mut().enumerate().take(part(to) + 1).skip(part(from)) {
+            let ends = (end_m * k as f64 / PARTS as f64, end_m * (k + 1) as f64 / PARTS as f64);
+            *work += force * (to.min(ends.1) - from.max(ends.0)).max(0.0);
+        }
+        reached = to;
+    }
+    work
+}
+
+/// Neighbours in speed whose curves are unlike those of one design.
+fn designs(runs: &[&Case]) -> Vec<Remark> {
+    let mut found = Vec::new();
+    for pair in runs.windows(2) {
+        let (slow, fast) = (pair[0], pair[1]);
+        let (one, other) = (&slow.conditions, &fast.conditions);
+        if one.parameters != other.parameters || slow.curves.force_kind != fast.curves.force_kind {
+            continue;
+        }
+        let end_m = slow.max_deflection_m().min(fast.max_deflection_m());
+        let (a, b) = (parts(&slow.curves.original, end_m), parts(&fast.curves.original, end_m));
+        let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
+        let most = MOST_RATIO * (other.speed.m_per_s / one.speed.m_per_s).powf(RATE_POWER);
+        let likeness = correlation(&a, &b);
+        let why = if !(LEAST_RATIO..=most).contains(&ratio) {
+            format!("its mean force is {ratio:.2} times that of {}", slow.id.name)
+        } else if likeness < LEAST_CORRELATION {
+            format!("its peaks come in another order than those of {}", slow.id.name)
+        } else {
+            continue;
+        };
+        found.push((
+            fast.id.name.clone(),
+            "design_differs",
+            format!(
+                "over the {:.3} m that both are crushed, {why}: one of the two may be another design",
+                end_m
+            ),
+        ));
+    }
+    found
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in a.iter().zip(b) {
+        ab += (x - ma) * (y - mb);
+        aa += (x - ma).powi(2);
+        bb += (y - mb).powi(2);
+    }
+    // Flat curves have no peaks to compare.
+    let flat = |s: f64, m: f64| s <= 0.01 * a.len() as f64 * m * m;
+    if flat(aa, ma) || flat(bb, mb) { 1.0 } else { ab / (aa * bb).sqrt() }
+}
