@@ -197,11 +197,10 @@ fn energy_audits_of_all_groups() {
     }
     assert_eq!(cases, 20);
     let check = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
-    // At 3 km/h a step is a good part of the crush, and the record begins before the contact.
+    // At 3 km/h a step is a good part of the crush.
     let findings: Vec<&str> = check.lines().collect();
     assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies in a step of 0.63 mm"));
-    assert!(findings[1].starts_with("vehicle-pair/3kmh: short: the record holds 399 of 400"));
-    assert_eq!(findings[2..], ["20 cases checked, 2 findings"], "{check}");
+    assert_eq!(findings[1..], ["20 cases checked, 1 finding"], "{check}");
 }
 
 /// The full runs give the curves of the thinned ones, bit for bit.

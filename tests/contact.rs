@@ -519,7 +519,10 @@ fn a_record_that_is_not_one_impact_is_refused() {
     let accepted = Stated { accept_energy: true, ..Stated::default() };
     for stated in [Stated::default(), accepted] {
         let said = refused(&pushed, CONTACT_RECIPE, stated);
-        assert!(said.starts_with("the motion is prescribed: the body keeps its 48 km/h"), "{said}");
+        assert!(
+            said.starts_with("the motion is prescribed: the body keeps its 13.3333 m/s"),
+            "{said}"
+        );
     }
     let mut other = Run::read(48);
     each(&mut other.velocity, |_, v| 0.3 * v);

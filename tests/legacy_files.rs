@@ -527,10 +527,55 @@ fn a_slow_test_is_taken_without_its_times() {
         1,
         &[&["db", "add", "new.h5", "slow.csv", "--group", "g"][..], &impact].concat(),
     );
-    assert!(error.contains("the test was slow (--time-column none takes"), "{error}");
+    assert!(
+        error.contains(
+            "the test was slow, or the times are in another unit. --time-column none takes"
+        ),
+        "{error}"
+    );
     let said = added(here, "slow.csv", &[&impact[..], &["--time-column", "none"]].concat());
     let ratio = said["cases"][0]["work_over_energy"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 1e-6, "{said}");
+}
+
+/// A table without times is its own body force: a motion that its energy does not fit, and that is
+/// made of the table itself, changes no force of an export.
+#[test]
+fn a_table_without_times_is_exported_as_it_is() {
+    for factor in [0.83, 1.06] {
+        let folder = file(&format!("Weg;Kraft\nmm;kN\n{}", rows(1e-3, 1e3, ";", ",")), "nose.csv");
+        let here = folder.path();
+        let v = format!("{}m/s", factor * speed());
+        let impact = [&WALL[..], &["--speed", &v, "--accept-energy"]].concat();
+        let said = added(here, "nose.csv", &impact);
+        let ratio = said["cases"][0]["work_over_energy"].as_f64().unwrap();
+        assert!((ratio * factor * factor - 1.0).abs() < 1e-6, "{said}");
+        for arguments in
+            ["train new.h5 --model nearest -o m.model", "export new.h5 --to json -o case.json"]
+        {
+            crumple_in(here, &arguments.split(' ').collect::<Vec<_>>());
+        }
+        crumple_in(here, &["predict", "m.model", "--speed", &v, "-o", "model.json"]);
+        for name in ["case.json", "model.json"] {
+            let text = fs::read_to_string(here.join(name)).unwrap();
+            let curve: Value = serde_json::from_str(&text).unwrap();
+            let column = |key: &str| -> Vec<f64> {
+                let values = curve[key].as_array().unwrap_or_else(|| panic!("{key}: {text}"));
+                values.iter().map(|v| v.as_f64().unwrap()).collect()
+            };
+            let (d, f) = (column("deflection_m"), column(if curve["body_force_N"].is_array() { "body_force_N" } else { "force_N" }));
+            for (at, force) in
+                POINTS.iter().filter(|(at, _)| *at > 0.0 && *at < 0.9 * d[d.len() - 1])
+            {
+                let i = d.partition_point(|d| d < at).max(1);
+                let found = f[i - 1] + (f[i] - f[i - 1]) * (at - d[i - 1]) / (d[i] - d[i - 1]);
+                assert!(
+                    (found / force - 1.0).abs() < 0.01,
+                    "{name} at {at} m: {found} for {force}"
+                );
+            }
+        }
+    }
 }
 
 /// A legacy curve is exported without a database, with what its file does not say.

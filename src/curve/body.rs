@@ -31,9 +31,13 @@ pub(crate) fn rebound_stiffness_n_per_m(
 }
 
 /// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, with the case's
-/// effective mass, as [`body_motion`] filters it.
+/// effective mass, as [`body_motion`] filters it; of a table without times its own force.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let time_s = case.curves.sampled.time_s();
+    // A motion that was made of a force says no more of it than the force itself.
+    if case.moves_by_its_force() {
+        return case.curves.sampled.force_n().to_vec();
+    }
     let mass = case.conditions.masses.effective_kg();
     let accelerations = derivative(time_s, &case.curves.closing_speed_m_per_s);
     let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
@@ -61,9 +65,13 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     let rebound = (end + 1..speeds.len())
         .find(|&i| force_n[i] <= 0.0)
         .map(|i| separation_m_per_s(sampled.time_s(), speeds, i));
+    let force = match case.moves_by_its_force() {
+        true => case.loading().ok()?.envelope,
+        false => over_deflection(force_n)?.pushing(),
+    };
     Some(BodyMotion {
         closing_speed: over_deflection(speeds.clone())?,
-        force: over_deflection(force_n)?.pushing(),
+        force,
         rebound_speed_m_per_s: rebound.filter(|&v| v > 0.0),
     })
 }

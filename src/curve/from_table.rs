@@ -31,6 +31,10 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
 fn of_table(error: ExtractError) -> Error {
     match error {
         ExtractError::ImpossibleRun(found) => impossible_table(found),
+        ExtractError::Prescribed(found) => error!(
+            Other,
+            "{found}: the test was slow, or the times are in another unit. --time-column none takes its force over deflection without the times"
+        ),
         ExtractError::NoContact => error!(
             Other,
             "the force of the record is never positive, which is not a contact: look at its column"

@@ -81,7 +81,11 @@ pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
         let is_as_written = raw.is_of_this_program()?
             && readable.len() == group.cases.len()
             && !checked.findings[before..].iter().any(is_altered);
+        let is_altered = checked.findings[before..].iter().any(is_altered);
         of_group(&group, &readable, &mut checked.findings);
+        if !is_altered {
+            beside_each_other(&group.name, &readable, &mut checked.findings);
+        }
         if is_as_written {
             of_stopped_mass(&raw, &group.name, &readable, &mut checked.findings)?;
         }
@@ -378,9 +382,6 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
             add(&case.id.name, "speed_kinds", message);
         }
     }
-    for (case, code, message) in siblings::remarks(cases) {
-        add(&case, code, message);
-    }
     let in_list: Vec<&str> = found.listed.iter().flatten().map(String::as_str).collect();
     let there: Vec<&str> = found.cases.iter().map(|(name, _)| name.as_str()).collect();
     let (is_listed, is_there): (HashSet<&str>, HashSet<&str>) =
@@ -399,6 +400,13 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
             listed(by_speed.iter().copied())
         );
         add(by_speed[0], "case_order", message);
+    }
+}
+
+/// What cases show beside the others of their group.
+fn beside_each_other(group: &str, cases: &[Case], list: &mut Vec<Finding>) {
+    for (case, code, message) in siblings::remarks(cases) {
+        Findings { group, case: &case, list }.add(code, None, None, message);
     }
 }
 

@@ -8,9 +8,7 @@ use super::remarks::Notes;
 use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, loading};
-use crate::error::error;
 use crate::signal::interpolate;
-use crate::unit::km_per_h;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
 /// time; a clock that is 10 ms off makes it 11 to 45 %.
@@ -138,13 +136,11 @@ impl<'a> Motion<'a> {
         if slowest < (1.0 - SLOWED) * closing[0] || impulse < 0.5 * self.momentum_ns() {
             return Ok(());
         }
-        Err(error!(
-            Run,
-            "the motion is prescribed: the body keeps its {} up to the largest deflection, though the force would have stopped it {:.1} times. Such a curve belongs to no impact of this mass and speed; crumple histories gives its force and displacement",
-            km_per_h(closing[0]),
+        Err(ExtractError::Prescribed(format!(
+            "the motion is prescribed: the body keeps its {:.4} m/s up to the largest deflection, though the force would have stopped it {:.1} times",
+            closing[0],
             impulse / self.momentum_ns()
-        )
-        .into())
+        )))
     }
 
     /// The impulse of the force against the lost momentum, at every state of the contact, and of

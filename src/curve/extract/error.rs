@@ -80,6 +80,11 @@ pub enum ExtractError {
     /// No crash can have such a curve.
     #[error("{0}")]
     ImpossibleRun(#[from] energy::ImpossibleRun),
+    /// The body moves as it was told to, whatever the force.
+    #[error(
+        "{0}. Such a curve belongs to no impact of this mass and speed; crumple histories gives its force and displacement"
+    )]
+    Prescribed(String),
     /// The deflection does not grow after contact.
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
