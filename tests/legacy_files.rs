@@ -563,7 +563,10 @@ fn a_table_without_times_is_exported_as_it_is() {
                 let values = curve[key].as_array().unwrap_or_else(|| panic!("{key}: {text}"));
                 values.iter().map(|v| v.as_f64().unwrap()).collect()
             };
-            let (d, f) = (column("deflection_m"), column(if curve["body_force_N"].is_array() { "body_force_N" } else { "force_N" }));
+            let (d, f) = (
+                column("deflection_m"),
+                column(if curve["body_force_N"].is_array() { "body_force_N" } else { "force_N" }),
+            );
             for (at, force) in
                 POINTS.iter().filter(|(at, _)| *at > 0.0 && *at < 0.9 * d[d.len() - 1])
             {

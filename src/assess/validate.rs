@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::choose::{NextRun, Purpose, Selection, choose};
 use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
-use crate::curve::{Case, ForceKind};
+use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
 use crate::plural::counted;
@@ -137,6 +137,13 @@ pub(crate) fn train_chosen(
     let mut model = Model::fit(&set, kind)?;
     if let Some(means) = validation.means.iter().find(|m| m.model == kind.name()) {
         model.max_crush_rule = means.max_crush_rule;
+    }
+    for (name, _, words) in group::remarks(cases) {
+        // Of several runs at one speed, the case is their mean.
+        let of = set.cases.iter().position(|case| case.runs.contains(&name));
+        if let Some(case) = of.and_then(|k| model.cases.get_mut(k)) {
+            case.warnings.push(words);
+        }
     }
     model.leave_one_out = Some(validation);
     Ok(model)

@@ -12,7 +12,7 @@ use crate::forest::{StopRule, Thresholds};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind};
+use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
@@ -189,7 +189,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             counted(model.cases.len(), "curve")
         ));
     }
-    let warned = !truncated.is_empty() || model.cases.len() < 3;
+    let of_cases = model.case_warnings();
+    let of_cases = of_cases.iter().filter(|w| w.code == WarningCode::CaseWarning);
+    of_cases.clone().for_each(|warning| options.warn(&warning.message));
+    let warned = !truncated.is_empty() || model.cases.len() < 3 || of_cases.count() > 0;
     print(&args.output, group, &model, options)?;
     Ok(if warned { Outcome::Warned } else { Outcome::Clean })
 }

@@ -66,7 +66,11 @@ pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, Error> {
     of.provenance.sources = runs.iter().flat_map(|run| run.provenance.sources.clone()).collect();
     of.quality.notes =
         vec![format!("mean of {}: {}", counted(runs.len(), "run"), names.join(", "))];
-    of.quality.warnings = runs.iter().flat_map(|run| run.quality.warnings.clone()).collect();
+    let named = |run: &&Case| {
+        let name = run.id.name.clone();
+        run.quality.warnings.clone().into_iter().map(move |w| format!("{name}: {w}"))
+    };
+    of.quality.warnings = runs.iter().flat_map(named).collect();
     (of.provenance.origin, of.provenance.tags, of.provenance.user_notes) =
         (None, Vec::new(), Vec::new());
     Ok(of)

@@ -15,9 +15,6 @@ pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, 
     for (key, value) in curve.facts() {
         lines.add(format_args!("# {key}: {}", value.replace('\n', " ")));
     }
-    for warning in curve.warnings() {
-        lines.add(format_args!("# warning: {}", warning.message.replace('\n', " ")));
-    }
     let edges = if curve.band.is_some() { ",lo,hi" } else { "" };
     lines.add(format_args!("d_{length},force_{force}{edges}"));
     let shown = |force_n: f64| nine_digits(force_n / units.force());

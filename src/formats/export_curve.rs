@@ -7,8 +7,8 @@ use super::thin::{Softened, from_origin, softened};
 use crate::curve::{Envelope, ForceCurve, ForceKind};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
+use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::Beyond;
-use crate::surrogate::{PredictedCurve, Warning};
 use crate::unit::km_per_h;
 
 /// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
@@ -265,10 +265,12 @@ impl ExportCurve {
     /// What the curve is, in one line, for headers and titles.
     pub fn headline(&self) -> String {
         let group = self.predicted.provenance.group.replace(char::is_control, " ");
+        let run = own_name(&self.predicted).map_or(String::new(), |name| format!(", {name}"));
         format!(
-            "{group} {} ({})",
+            "{group} {} ({}){}",
             km_per_h(self.predicted.speed_m_per_s),
-            self.predicted.speed_kind.name()
+            self.predicted.speed_kind.name(),
+            run.replace(char::is_control, " ")
         )
     }
 
@@ -309,12 +311,11 @@ impl ExportCurve {
         if let Some(other) = self.other_mass_kg() {
             facts.insert(7, ("other_mass_kg", other.to_string()));
         }
+        if let Some(case) = &curve.provenance.case {
+            facts.insert(1, ("case", case.replace(char::is_control, " ")));
+        }
+        facts.extend(curve.warnings.iter().flat_map(|warning| in_lines(&warning.message)));
         facts
-    }
-
-    /// The warnings of the prediction.
-    pub fn warnings(&self) -> &[Warning] {
-        &self.predicted.warnings
     }
 
     /// What the unloading stiffness gives.
@@ -349,9 +350,38 @@ impl ExportCurve {
 
 /// Group and speed of a curve as a file's name without its extension.
 pub(super) fn file_stem(curve: &PredictedCurve) -> String {
-    let speed = km_per_h(curve.speed_m_per_s).replace([' ', '/'], "");
     let group: String = curve.provenance.group.chars().map(plain).collect();
-    format!("{group}-{speed}")
+    let name = own_name(curve).map(|name| name.chars().map(plain).collect());
+    format!("{group}-{}", name.unwrap_or_else(|| speed_name(curve)))
+}
+
+/// The speed as runs are named by it: `48kmh`.
+fn speed_name(curve: &PredictedCurve) -> String {
+    km_per_h(curve.speed_m_per_s).replace([' ', '/'], "")
+}
+
+/// The name of a recorded case, where it says more than the speed: one of several runs.
+fn own_name(curve: &PredictedCurve) -> Option<&str> {
+    curve.provenance.case.as_deref().filter(|name| *name != speed_name(curve))
+}
+
+/// Most characters of a line of a header.
+const LINE: usize = 180;
+
+/// A warning as lines of a header, which some tools read up to a width only.
+pub(super) fn in_lines(warning: &str) -> Vec<(&'static str, String)> {
+    let mut lines = vec![String::new()];
+    for word in warning.split(|c: char| c.is_control() || c == ' ').filter(|w| !w.is_empty()) {
+        let last = lines.len() - 1;
+        let line = &mut lines[last];
+        if !line.is_empty() && line.len() + 1 + word.len() > LINE {
+            lines.push(word.into());
+        } else {
+            *line += if line.is_empty() { "" } else { " " };
+            *line += word;
+        }
+    }
+    lines.into_iter().map(|line| ("warning", line)).collect()
 }
 
 /// A name as an identifier of letters, digits and underscores that begins with a letter.

@@ -2,6 +2,7 @@
 //!
 //! Each speed's curve goes on beyond its maximal crush as a tail that is held, so that the table is a full rectangle.
 
+use super::export_curve::in_lines;
 use super::tail::Tail;
 use super::text::{Lines, nine_digits};
 use super::{ExportCurve, ExportInput, Exported, Options};
@@ -219,7 +220,7 @@ impl Table {
 
 fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
     let (low, high) = model.range_m_per_s();
-    vec![
+    let mut facts = vec![
         ("group", model.group.clone()),
         ("force_kind", force.name().into()),
         ("drives", force.drives().into()),
@@ -230,5 +231,7 @@ fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         ("model", model.name().into()),
         ("training_hash", model.training_hash.clone()),
         ("written_by", concat!("crumple ", env!("CARGO_PKG_VERSION")).into()),
-    ]
+    ];
+    facts.extend(model.case_warnings().iter().flat_map(|warning| in_lines(&warning.message)));
+    facts
 }

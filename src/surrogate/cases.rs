@@ -32,6 +32,9 @@ pub struct ModelCase {
     /// Speed of separation after the body force has first fallen to zero.
     #[serde(default)]
     pub rebound_speed_m_per_s: Option<f64>,
+    /// What its build said of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Empty in files of version 1.
     #[serde(default)]
     pub deflection_m: Vec<f64>,
@@ -56,6 +59,7 @@ impl ModelCase {
             features: case.features.clone(),
             max_deflection_m: case.envelope.end_m(),
             truncated: case.truncated,
+            warnings: case.case.quality.warnings.clone(),
             unloading_stiffness_n_per_m: case.unloading_stiffness_n_per_m,
             rebound_speed_m_per_s: case.motion.rebound_speed_m_per_s,
             force_n: over(&|d| case.envelope.force_at(d)),

@@ -12,13 +12,15 @@ use super::landmarks::Landmarks;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::{MODELS, ModelKind};
-use super::{CaseCurve, QueryPoint, Surrogate, Warning};
+use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{Feature, TrainingSet, nearest};
 use crate::error::{Error, error};
 use crate::unit::{SpeedKind, UnitSystem};
 
+/// Warnings of training runs that a prediction repeats.
+const MOST_NAMED: usize = 8;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR_OUTSIDE_SHARE: f64 = 0.25;
 
@@ -332,8 +334,23 @@ impl Model {
             }
         }
         warnings.extend(self.fitted.warnings(&self.curves.declared, at));
-        let truncated = self.cases.iter().filter(|c| c.truncated);
-        warnings.extend(truncated.map(|c| Warning::truncated_training_run(&c.name)));
+        warnings.extend(self.case_warnings());
+        warnings
+    }
+
+    /// What is said of the training runs: of a few of them if it is said of many.
+    pub(crate) fn case_warnings(&self) -> Vec<Warning> {
+        let of_case = |c: &ModelCase| Warning::of_case(&c.name, c.truncated, &c.warnings);
+        let mut warnings: Vec<Warning> = self.cases.iter().flat_map(of_case).collect();
+        if let Some(more) = warnings.len().checked_sub(MOST_NAMED).filter(|&more| more > 1) {
+            warnings.truncate(MOST_NAMED);
+            warnings.push(Warning {
+                code: WarningCode::CaseWarning,
+                message: format!(
+                    "and {more} more warnings of training runs: crumple db ls has them"
+                ),
+            });
+        }
         warnings
     }
 }

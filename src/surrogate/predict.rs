@@ -323,6 +323,7 @@ fn provenance(
     let mut parameters = asked.parameters.clone();
     parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
     Provenance {
+        case: None,
         written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
         group: model.group.clone(),
         force_kind: model.force_kind,

@@ -113,6 +113,9 @@ pub struct Provenance {
     pub written_by: String,
     /// Group of cases that the model was trained on.
     pub group: String,
+    /// Name of the recorded case; absent for a predicted curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub case: Option<String>,
     /// Which force the recipe declares.
     pub force_kind: ForceKind,
     /// Hash over the training cases.

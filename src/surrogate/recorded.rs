@@ -70,11 +70,7 @@ impl PredictedCurve {
             mass_kg: case.conditions.masses.body_kg,
             energy_j: loading.work(),
             model: RECORDED.into(),
-            warnings: case
-                .is_truncated()
-                .then(|| Warning::truncated_training_run(&case.id.name))
-                .into_iter()
-                .collect(),
+            warnings: Warning::of_case(&case.id.name, case.is_truncated(), &case.quality.warnings),
             provenance: provenance(case, loading.work(), body.as_ref().map(|b| b.loading.work())),
             deflection_m,
             force_n,
@@ -125,6 +121,7 @@ fn provenance(case: &Case, work_j: f64, body_work_j: Option<f64>) -> Provenance 
     Provenance {
         written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
         group: case.id.group.clone(),
+        case: Some(case.id.name.clone()),
         force_kind: case.curves.force_kind,
         training_hash: case.provenance.fingerprint.clone(),
         study_units: case.units(),

@@ -43,6 +43,8 @@ pub enum WarningCode {
     EnergyCorrected,
     /// Nothing that was left out tells how far FE may lie from this curve.
     NoBand,
+    /// What the build said of a training run, or of the recorded one.
+    CaseWarning,
 }
 
 /// Speeds further outside the training speeds than this share of their range are not answered
@@ -86,6 +88,7 @@ impl WarningCode {
             Self::TooFewCurves => "too_few_curves",
             Self::EnergyCorrected => "energy_corrected",
             Self::NoBand => "no_band",
+            Self::CaseWarning => "case_warning",
         }
     }
 }
@@ -190,7 +193,17 @@ impl Warning {
         }
     }
 
-    pub(crate) fn truncated_training_run(name: &str) -> Self {
+    /// What is said of a recorded case: that it ended while loading, and what its build warned of.
+    pub(crate) fn of_case(name: &str, truncated: bool, warnings: &[String]) -> Vec<Self> {
+        let own = warnings.iter().filter(|w| !truncated || !w.starts_with("truncated:"));
+        let own = own.map(|warning| Self {
+            code: WarningCode::CaseWarning,
+            message: format!("run \"{name}\": {warning}"),
+        });
+        truncated.then(|| Self::truncated_training_run(name)).into_iter().chain(own).collect()
+    }
+
+    fn truncated_training_run(name: &str) -> Self {
         Self {
             code: WarningCode::TruncatedTrainingRun,
             message: format!(

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crate::curve::{Case, StoppedMass};
+use crate::curve::{Case, StoppedMass, group as siblings};
 use crate::database::Database;
 use crate::dataset::of_one_kind;
 use serde::Serialize;
@@ -49,13 +49,27 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let mixed =
         |g: &String| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
-    let warnings: Vec<String> = groups.keys().filter_map(mixed).collect();
-    for warning in &warnings {
+    let mut warnings: Vec<String> = groups.keys().filter_map(mixed).collect();
+    let mut of_cases = Vec::new();
+    for (group, rows) in &groups {
+        let is_listed = |name: &String| rows.iter().any(|row| row.name == *name);
+        let beside = siblings::remarks(database.cases(group)).into_iter();
+        let beside = beside.filter(|(name, ..)| is_listed(name));
+        warnings.extend(beside.map(|(name, _, words)| format!("{group}/{name}: {words}")));
+        // What the builds said, which the rows of the document have.
+        let of_row = |row: &CaseRow| {
+            let name = row.name.clone();
+            row.warnings.clone().into_iter().map(move |w| format!("{group}/{name}: {w}"))
+        };
+        of_cases.extend(rows.iter().flat_map(of_row));
+    }
+    for warning in warnings.iter().chain(&of_cases) {
         options.warn(warning);
     }
     let of_group = |group: &String| Some((group.clone(), database.stopped_mass(group)?));
     let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(of_group).collect();
-    let outcome = if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned };
+    let outcome =
+        if warnings.is_empty() && of_cases.is_empty() { Outcome::Clean } else { Outcome::Warned };
     if options.json {
         output::print_json(&Groups { groups, stopped_mass, warnings })?;
     } else {

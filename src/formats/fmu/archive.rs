@@ -81,7 +81,12 @@ fn facts(spring: &Spring<'_>) -> Result<String, Error> {
     facts.insert("name".into(), spring.name.into());
     facts.insert("description".into(), spring.description.into());
     for (key, value) in spring.facts {
-        facts.insert((*key).into(), value.as_str().into());
+        // A warning in several lines, and several of them, are one text.
+        let text = match facts.get(*key).and_then(|before| before.as_str()) {
+            Some(before) => format!("{before} {value}"),
+            None => value.clone(),
+        };
+        facts.insert((*key).into(), text.into());
     }
     let text = serde_json::to_string_pretty(&facts);
     let text = text.map_err(|e| {
