@@ -1,7 +1,8 @@
 //! Rows of labels and numbers (`xforce=   1.0000E+00   yforce= …`): where the numbers are.
 //!
 //! A number is what stands between its label and the next one, so that a label that comes or
-//! goes with a release, and a gap of another width, change nothing.
+//! goes with a release, and a gap of another width, change nothing. Within one file widths stay:
+//! once numbers fill their usual columns, one that does not has lost some of its digits.
 
 use super::line::{Line, is_whole_real};
 
@@ -12,9 +13,27 @@ pub(crate) struct Labelled {
     pub width: usize,
 }
 
+/// Whether a file's numbers have been seen to fill their usual columns.
+#[derive(Default)]
+pub(crate) struct Widths {
+    are_usual: bool,
+}
+
+impl Widths {
+    /// Whether numbers that fill their usual columns, or do not, can be in this file.
+    pub(crate) fn allow(&mut self, is_usual: bool) -> bool {
+        self.are_usual |= is_usual;
+        is_usual || !self.are_usual
+    }
+}
+
 /// First and last column of every component's number; `None` for labels that the line does
 /// not have. `None` for the row if something else than one number stands behind a label.
-pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize, usize)>>> {
+pub(crate) fn fields(
+    line: &Line<'_>,
+    labels: &[Labelled],
+    widths: &mut Widths,
+) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
     let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
@@ -40,6 +59,7 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
     marks.sort_unstable();
     let ends = marks.iter().skip(1).map(|mark| mark.0).chain([text.len()]);
     let mut fields = vec![None; labels.len()];
+    let mut are_usual = true;
     for (&(_, from, known), to) in marks.iter().zip(ends) {
         let value = text.get(from..to)?.trim_ascii_end();
         if let Some(k) = known {
@@ -47,6 +67,7 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
             if !is_number(value, labels[k].width) {
                 return None;
             }
+            are_usual &= value.len() == labels[k].width;
             fields[k] = Some((from + 1, to));
         } else if value.is_empty() {
             return None;
@@ -56,7 +77,7 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
     let in_number =
         |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
     let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));
-    (!stars).then_some(fields)
+    (!stars && widths.allow(are_usual)).then_some(fields)
 }
 
 /// Whether the text behind a label is one number: a whole one, or, whatever it holds, one
@@ -73,7 +94,11 @@ pub(crate) fn numbers(
     to: usize,
     count: usize,
     width: usize,
+    widths: &mut Widths,
 ) -> Option<Vec<(usize, usize)>> {
+    if !widths.allow(to.saturating_sub(from) == count * width) {
+        return None;
+    }
     let text = line.text.get(from..to)?;
     let mut apart = Vec::with_capacity(count);
     let mut at = 0;
@@ -116,7 +141,7 @@ mod tests {
     fn values(text: &str) -> Option<Vec<Option<String>>> {
         let labels = [labelled("a", "x=", 10), labelled("b", "y=", 10)];
         let line = Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
-        let fields = fields(&line, &labels)?;
+        let fields = fields(&line, &labels, &mut Widths::default())?;
         let of = |field: &Option<(usize, usize)>| {
             field.map(|(from, to)| text[from - 1..to].trim().to_string())
         };
@@ -132,6 +157,20 @@ mod tests {
         assert_eq!(values(" y= -2.50E+00 x=  1.50E+00"), both, "in any order");
         assert_eq!(values(" x=  1.50E+00 set = 145"), Some(vec![a, None]));
         assert_eq!(values(" x=********** y= -2.50E+00"), Some(vec![Some("*".repeat(10)), b]));
+    }
+
+    #[test]
+    fn a_number_that_lost_digits_among_whole_ones_is_cut() {
+        let mut widths = Widths::default();
+        let mut read = |text: &str| {
+            let line =
+                Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
+            fields(&line, &[labelled("a", "x=", 10)], &mut widths).is_some()
+        };
+        assert!(read(" x= 1.50E+00"), "another release's width");
+        assert!(read(" x=  1.50E+00"));
+        assert!(!read(" x= 1.50E+00"));
+        assert!(read(" x= -1.50E+00"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `sleout`: energies of contact interfaces, one row each, and their sums.
 
 use super::ascii::{self, Body};
-use super::label_values::numbers;
+use super::label_values::{Widths, numbers};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -37,6 +37,7 @@ struct Sleout {
     table: Option<TableId>,
     /// Width of the widest row: with friction all rows have it.
     width: usize,
+    widths: Widths,
 }
 
 impl Body for Sleout {
@@ -68,7 +69,7 @@ impl Sleout {
             if memchr::memmem::find(&text[..from], b"**").is_some() {
                 return None;
             }
-            let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
+            let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH, &mut self.widths)?[0];
             states.scalar(name, line.columns(first, last), line, [first, last]);
             return Some(());
         }

@@ -3,7 +3,7 @@
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
 use super::ascii::{self, Body};
-use super::label_values::numbers;
+use super::label_values::{Widths, numbers};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -40,6 +40,7 @@ struct Spcforc {
     tables: Vec<[TableId; 2]>,
     /// Rows of each node in the pending state: one for each set of constraints it is in.
     rows: HashMap<i64, [usize; 2]>,
+    widths: Widths,
 }
 
 impl Body for Spcforc {
@@ -71,7 +72,7 @@ impl Spcforc {
         let from = at + label.len();
         let set_id = memchr::memmem::find(text, SET_ID);
         let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
-        let fields = numbers(line, from, end, 3, WIDTH)?;
+        let fields = numbers(line, from, end, 3, WIDTH, &mut self.widths)?;
         let Some(kind) = kind else {
             if !(set_id.is_none() && text[..at].trim_ascii().is_empty()) {
                 return None;

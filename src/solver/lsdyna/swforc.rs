@@ -1,7 +1,7 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
 use super::ascii::{self, Body};
-use super::label_values::{is_number, numbers};
+use super::label_values::{Widths, is_number, numbers};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -33,6 +33,7 @@ pub(crate) const FORMAT: Format =
 #[derive(Default)]
 struct Swforc {
     kinds: Vec<(Vec<u8>, TableId)>,
+    widths: Widths,
 }
 
 impl Body for Swforc {
@@ -85,7 +86,7 @@ impl Swforc {
                 if count > 3 {
                     return None;
                 }
-                numbers(line, rest, text.len(), count, WIDTH)?
+                numbers(line, rest, text.len(), count, WIDTH, &mut self.widths)?
             }
         };
         let known = self.kinds.iter().find(|(k, _)| *k == kind).map(|(_, table)| *table);
