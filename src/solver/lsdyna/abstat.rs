@@ -113,7 +113,7 @@ impl Abstat {
         let from = memchr::memmem::find(text, MATERIAL)? + MATERIAL.len();
         let to = memchr::memmem::find(text, AREAS[0].label.as_bytes())?;
         let material = integer(text.get(from..to)?)?;
-        let fields = fields(line, &AREAS, &mut self.widths)?;
+        let fields = fields(line, &AREAS, &mut self.widths, states)?;
         if fields.iter().any(Option::is_none) {
             return None;
         }

@@ -87,7 +87,8 @@ impl Dotted {
             self.entity = Some(EntityId::new(integer(value)?));
             return Some(());
         }
-        if !(is_number(value, VALUE_WIDTH) && self.widths.allow(value.len() == VALUE_WIDTH)) {
+        let excess = value.len() as isize - VALUE_WIDTH as isize;
+        if !(is_number(value, VALUE_WIDTH) && self.widths.allow(label, excess, line, states)) {
             return None;
         }
         if label == "time" {

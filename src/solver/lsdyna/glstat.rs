@@ -64,7 +64,7 @@ impl Body for Glstat {
             return;
         };
         let columns = [from + 1, value_end(line.text, from)];
-        if !self.is_value(line.columns(columns[0], columns[1]), from, line.text) {
+        if !self.is_value(&component, from, line, states) {
             let found = shown(line.columns(columns[0], columns[1]));
             let message = format!("expected a number of {VALUE_WIDTH} columns, found \"{found}\"");
             states.damage(line, Some(columns), message);
@@ -104,11 +104,19 @@ impl Body for Glstat {
 
 impl Glstat {
     /// Whether what stands behind a label is a number with nothing cut from it.
-    fn is_value(&mut self, value: &[u8], from: usize, text: &[u8]) -> bool {
-        let is_usual = from + value.len() == LABEL + VALUE_WIDTH;
+    fn is_value(
+        &mut self,
+        label: &str,
+        from: usize,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> bool {
+        let value = line.columns(from + 1, value_end(line.text, from));
         // The number of elements at the smallest step has fewer columns.
-        let is_count = integer(value).is_some() && is_text(text.trim_ascii());
-        is_count || (is_usual || is_whole_real(value.trim_ascii())) && self.widths.allow(is_usual)
+        let is_count = integer(value).is_some() && is_text(line.text.trim_ascii());
+        let excess = (from + value.len()) as isize - (LABEL + VALUE_WIDTH) as isize;
+        let is_number = excess == 0 || is_whole_real(value.trim_ascii());
+        is_count || is_number && self.widths.allow(label, excess, line, states)
     }
 }
 

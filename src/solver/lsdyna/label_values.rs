@@ -5,6 +5,8 @@
 //! once numbers fill their usual columns, one that does not has lost some of its digits.
 
 use super::line::{Line, is_whole_real};
+use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::states::StateReader;
 
 /// A component, its label, and the usual width of the number right behind the label.
 pub(crate) struct Labelled {
@@ -13,17 +15,44 @@ pub(crate) struct Labelled {
     pub width: usize,
 }
 
-/// Whether a file's numbers have been seen to fill their usual columns.
+/// How wide the numbers behind each label of a file are, and where that was first seen.
 #[derive(Default)]
 pub(crate) struct Widths {
-    are_usual: bool,
+    of: Vec<(String, isize, Place)>,
+    /// Labels come in the same order in every state.
+    next: usize,
 }
 
+/// Labels whose widths are noted; real files have about thirty.
+const MAX_LABELS: usize = 1_000;
+
 impl Widths {
-    /// Whether numbers that fill their usual columns, or do not, can be in this file.
-    pub(crate) fn allow(&mut self, is_usual: bool) -> bool {
-        self.are_usual |= is_usual;
-        is_usual || !self.are_usual
+    /// Whether a number that is so much wider than usual can be that of the label. If it is as wide as usual and the
+    /// first was not, that one is said.
+    pub(crate) fn allow(
+        &mut self,
+        label: &str,
+        excess: isize,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> bool {
+        let is_it = |at: &usize| self.of.get(*at).is_some_and(|of| of.0 == label);
+        let hint = Some(self.next).filter(is_it);
+        let Some(at) = hint.or_else(|| self.of.iter().position(|of| of.0 == label)) else {
+            if self.of.len() < MAX_LABELS {
+                self.of.push((label.to_string(), excess, line.into()));
+            }
+            return true;
+        };
+        self.next = (at + 1) % self.of.len();
+        let (_, known, place) = &mut self.of[at];
+        if excess == 0 && *known != 0 {
+            let message =
+                format!("the number of \"{label}\" is not as wide as those below: was it cut?");
+            states.problems.add(ProblemCode::BadLine, Some(*place), None, message);
+            *known = 0;
+        }
+        excess == *known
     }
 }
 
@@ -33,6 +62,7 @@ pub(crate) fn fields(
     line: &Line<'_>,
     labels: &[Labelled],
     widths: &mut Widths,
+    states: &mut StateReader<'_>,
 ) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
@@ -59,7 +89,6 @@ pub(crate) fn fields(
     marks.sort_unstable();
     let ends = marks.iter().skip(1).map(|mark| mark.0).chain([text.len()]);
     let mut fields = vec![None; labels.len()];
-    let mut are_usual = true;
     for (&(_, from, known), to) in marks.iter().zip(ends) {
         let value = text.get(from..to)?.trim_ascii_end();
         if let Some(k) = known {
@@ -67,7 +96,10 @@ pub(crate) fn fields(
             if !is_number(value, labels[k].width) {
                 return None;
             }
-            are_usual &= value.len() == labels[k].width;
+            let excess = value.len() as isize - labels[k].width as isize;
+            if !widths.allow(labels[k].label, excess, line, states) {
+                return None;
+            }
             fields[k] = Some((from + 1, to));
         } else if value.is_empty() {
             return None;
@@ -77,7 +109,7 @@ pub(crate) fn fields(
     let in_number =
         |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
     let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));
-    (!stars && widths.allow(are_usual)).then_some(fields)
+    (!stars).then_some(fields)
 }
 
 /// Whether the text behind a label is one number: a whole one, or, whatever it holds, one
@@ -94,11 +126,7 @@ pub(crate) fn numbers(
     to: usize,
     count: usize,
     width: usize,
-    widths: &mut Widths,
 ) -> Option<Vec<(usize, usize)>> {
-    if !widths.allow(to.saturating_sub(from) == count * width) {
-        return None;
-    }
     let text = line.text.get(from..to)?;
     let mut apart = Vec::with_capacity(count);
     let mut at = 0;
@@ -137,11 +165,14 @@ pub(crate) const fn labelled(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::Selection;
 
     fn values(text: &str) -> Option<Vec<Option<String>>> {
         let labels = [labelled("a", "x=", 10), labelled("b", "y=", 10)];
         let line = Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
-        let fields = fields(&line, &labels, &mut Widths::default())?;
+        let selection = Selection::all();
+        let mut states = StateReader::new(&selection);
+        let fields = fields(&line, &labels, &mut Widths::default(), &mut states)?;
         let of = |field: &Option<(usize, usize)>| {
             field.map(|(from, to)| text[from - 1..to].trim().to_string())
         };
@@ -161,16 +192,20 @@ mod tests {
 
     #[test]
     fn a_number_that_lost_digits_among_whole_ones_is_cut() {
-        let mut widths = Widths::default();
+        let (mut widths, selection) = (Widths::default(), Selection::all());
+        let mut states = StateReader::new(&selection);
         let mut read = |text: &str| {
             let line =
                 Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
-            fields(&line, &[labelled("a", "x=", 10)], &mut widths).is_some()
+            let labels = [labelled("a", "x=", 10)];
+            fields(&line, &labels, &mut widths, &mut states).is_some()
         };
         assert!(read(" x= 1.50E+00"), "another release's width");
-        assert!(read(" x=  1.50E+00"));
+        assert!(read(" x= 2.50E+00"));
+        assert!(read(" x=  1.50E+00"), "the usual one");
         assert!(!read(" x= 1.50E+00"));
         assert!(read(" x= -1.50E+00"));
+        assert_eq!(states.problems.into_list().len(), 1, "the first is said");
     }
 
     #[test]

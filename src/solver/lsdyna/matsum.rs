@@ -131,7 +131,7 @@ impl Matsum {
                 states.table(name, &components)
             })
         });
-        let Some(fields) = fields(line, LINES[index].1, &mut self.widths) else {
+        let Some(fields) = fields(line, LINES[index].1, &mut self.widths, states) else {
             states.damage(line, None, "expected labels and their numbers".into());
             return;
         };

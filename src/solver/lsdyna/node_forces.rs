@@ -115,7 +115,7 @@ impl NodeForces {
         let from = memchr::memchr(b'#', text)? + 1;
         let to = memchr::memmem::find(text, ID)?;
         let id = integer(text.get(from..to)?)?;
-        let fields = fields(line, &ROW, &mut self.widths)?;
+        let fields = fields(line, &ROW, &mut self.widths, states)?;
         if fields[..4].iter().any(Option::is_none) {
             return None;
         }
@@ -130,7 +130,7 @@ impl NodeForces {
     }
 
     fn moments(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
-        let fields = fields(line, &MOMENTS, &mut self.widths)?;
+        let fields = fields(line, &MOMENTS, &mut self.widths, states)?;
         let id = self.body?;
         if fields.iter().any(Option::is_none) {
             return None;
@@ -141,7 +141,7 @@ impl NodeForces {
     }
 
     fn totals(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
-        let fields = fields(line, &TOTALS, &mut self.widths)?;
+        let fields = fields(line, &TOTALS, &mut self.widths, states)?;
         let prefix = self.prefix(self.current?);
         for (label, field) in TOTALS.iter().zip(fields) {
             let Some((from, to)) = field else { continue };

@@ -111,7 +111,12 @@ impl Rbdout {
             return None;
         }
         let from = text.len() - start.len() + label.len();
-        let fields = numbers(line, from, text.len(), components.len(), width, &mut self.widths)?;
+        let fields = numbers(line, from, text.len(), components.len(), width)?;
+        let usual = components.len() * width;
+        let excess = (text.len() - from) as isize - usual as isize;
+        if !self.widths.allow(components[0], excess, line, states) {
+            return None;
+        }
         let table = tables[index][usize::from(self.is_local)];
         states.row(table, self.body?, line, |k| fields.get(k).copied());
         Some(())

@@ -69,7 +69,11 @@ impl Sleout {
             if memchr::memmem::find(&text[..from], b"**").is_some() {
                 return None;
             }
-            let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH, &mut self.widths)?[0];
+            let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
+            let excess = (text.len() - from) as isize - SUM_WIDTH as isize;
+            if !self.widths.allow(name, excess, line, states) {
+                return None;
+            }
             states.scalar(name, line.columns(first, last), line, [first, last]);
             return Some(());
         }

@@ -72,7 +72,12 @@ impl Spcforc {
         let from = at + label.len();
         let set_id = memchr::memmem::find(text, SET_ID);
         let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
-        let fields = numbers(line, from, end, 3, WIDTH, &mut self.widths)?;
+        let fields = numbers(line, from, end, 3, WIDTH)?;
+        let what = if kind.is_some() { "forces or moments" } else { "force resultants" };
+        let excess = end as isize - (from + 3 * WIDTH) as isize;
+        if !self.widths.allow(what, excess, line, states) {
+            return None;
+        }
         let Some(kind) = kind else {
             if !(set_id.is_none() && text[..at].trim_ascii().is_empty()) {
                 return None;

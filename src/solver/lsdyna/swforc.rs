@@ -80,13 +80,18 @@ impl Swforc {
                 vec![(from + 1, end)]
             }
             None => {
+                let length = text.len() - rest;
                 let words = text[rest..].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
                 let columns = (text.len() - rest).is_multiple_of(WIDTH);
                 let count = if columns { (text.len() - rest) / WIDTH } else { words.count() };
                 if count > 3 {
                     return None;
                 }
-                numbers(line, rest, text.len(), count, WIDTH, &mut self.widths)?
+                let excess = length as isize - (count * WIDTH) as isize;
+                if count > 0 && !self.widths.allow("weld", excess, line, states) {
+                    return None;
+                }
+                numbers(line, rest, text.len(), count, WIDTH)?
             }
         };
         let known = self.kinds.iter().find(|(k, _)| *k == kind).map(|(_, table)| *table);
