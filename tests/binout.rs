@@ -573,7 +573,8 @@ fn job_ids_stand_before_names() {
         let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]);
         assert_eq!(output.status.code(), Some(code), "{output:?}");
         if code > 0 {
-            return String::from_utf8(output.stderr).unwrap().into();
+            let said = [output.stdout, output.stderr].concat();
+            return String::from_utf8(said).unwrap().into();
         }
         let listed = crumple_ok(folder.path(), &["inspect", "12kmh"]);
         assert!(files.iter().all(|(name, _)| listed.contains(name)), "{listed}");

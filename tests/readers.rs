@@ -886,12 +886,13 @@ fn swapped_rows_of_a_section_are_not_another_quantity() {
     for swapped in [[0, 2, 1], [1, 0, 2], [2, 1, 0], [1, 2, 0]] {
         let text = heading.to_string()
             + &state("0.00000E+00", [0, 1, 2])
-            + &state("1.00000E-03", swapped)
-            + &state("2.00000E-03", [0, 1, 2]);
+            + &state("1.00000E-03", [0, 1, 2])
+            + &state("2.00000E-03", swapped)
+            + &state("3.00000E-03", [0, 1, 2]);
         let file = read("secforc", &text);
-        assert_eq!(&file.time[..], [0.0, 2e-3], "{swapped:?}");
-        assert_eq!(values(&file, 1, "x_moment"), [2.0; 2]);
-        assert_eq!(values(&file, 1, "area"), [3.0; 2]);
+        assert_eq!(&file.time[..], [0.0, 1e-3, 3e-3], "{swapped:?}");
+        assert_eq!(values(&file, 1, "x_moment"), [2.0; 3]);
+        assert_eq!(values(&file, 1, "area"), [3.0; 3]);
         assert!(codes(&file).contains(&ProblemCode::BadLine));
     }
 }
