@@ -562,6 +562,16 @@ fn any_section_with_states_is_read() {
     );
 }
 
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn control_volumes_of_a_real_binout() {
+    let path = shared("samples/more").join("binout_pyansys_heart_r16_smp_d_icvout");
+    let file = section(&path, "icvout");
+    assert_eq!((file.time.len(), file.problems.len()), (161, 0));
+    let volume = file.history(Some(EntityId::new(1)), "ICV_Volume").unwrap();
+    assert!(volume.values.iter().all(|v| *v > 0.0));
+}
+
 /// LS-DYNA puts the job id of a run before the names of its files.
 #[test]
 fn job_ids_stand_before_names() {

@@ -327,7 +327,7 @@ fn a_restart_goes_on_where_the_run_ended() {
         let [first, second] = restarted(&bytes, header, 100, again);
         fs::write(at("runT01"), first).unwrap();
         fs::write(at("runT02"), second).unwrap();
-        for name in ["nodout", "rwforc", "glstat", "matsum"] {
+        for name in ["nodout", "rwforc", "glstat", "rbdout"] {
             let (whole, joined) = (section(&at("wholeT01"), name), section(&at("runT01"), name));
             assert_eq!(whole.histories, joined.histories, "{name}");
             let said: Vec<ProblemCode> = joined.problems.iter().map(|p| p.code).collect();
@@ -355,6 +355,25 @@ fn a_restart_goes_on_where_the_run_ended() {
         file.problems[0].to_string(),
         "T02, which goes on, holds other histories: it is not read, nor what follows"
     );
+}
+
+/// A run of OpenRadioss' own tests that was restarted, and the same in one piece.
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn a_real_restart_is_the_uninterrupted_run() {
+    let folder = shared("samples/openradioss");
+    for name in ["rwforc", "nodout", "matsum", "glstat"] {
+        let joined = section(&folder.join("BOULE1V4T01"), name);
+        let whole = section(&folder.join("uninterrupted_BOULE1V4T01"), name);
+        assert_eq!((joined.time.len(), joined.problems.len()), (130, 0));
+        assert_eq!(joined.histories, whole.histories, "{name}");
+    }
+    let wall = section(&folder.join("BOXBEAM_SUBT01"), "rwforc");
+    assert!(
+        wall.history(Some(EntityId::new(1)), "z_force").unwrap().values.iter().any(|f| *f != 0.0)
+    );
+    let accelerations = section(&folder.join("ACCELEROT01"), "accelerometer");
+    assert_eq!((accelerations.entities.len(), accelerations.histories.len()), (1, 3));
 }
 
 /// A wall that records normal impulses alone; rigid bodies, springs, accelerometers and what has no name here.
