@@ -519,3 +519,109 @@ fn damaged_samples_never_panic() {
         damage(&bytes[..bytes.len().min(60_000)]);
     }
 }
+
+/// A section is read whatever its name; what has no states is named.
+#[test]
+fn any_section_with_states_is_read() {
+    let integers =
+        |values: &[i64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let mut out = Written::new();
+    out.ids("gceout", &[4]);
+    out.cd("/icvout/metadata");
+    out.data("ICV_ID.", 4, &integers(&[11]));
+    out.data("ICVI_ID.", 4, &integers(&[21]));
+    out.cd("/odd/values");
+    out.reals("time", &[0.0, 1.0, 2.0]);
+    for state in 1..4 {
+        let value = f64::from(state);
+        out.cd(&format!("/gceout/d{state:06}"));
+        out.reals("time", &[value]);
+        out.reals("x_force", &[value]);
+        out.cd(&format!("/icvout/d{state:06}"));
+        out.reals("time", &[value]);
+        out.reals("ICV_Volume", &[value]);
+        out.reals("ICVI_Area", &[10.0 * value]);
+        out.cd(&format!("/icvout/d{state:06}/misc"));
+        out.reals("further", &[value]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("HAT.binout0000");
+    fs::write(&path, &out.bytes).unwrap();
+    let value = |name: &str, id: i64, component: &str| {
+        section(&path, name).history(Some(EntityId::new(id)), component).unwrap().values[2]
+    };
+    assert_eq!(value("gceout", 4, "x_force"), 3.0);
+    assert_eq!(value("icvout", 11, "ICV_Volume"), 3.0);
+    assert_eq!(value("icvout", 21, "ICVI_Area"), 30.0);
+    let sections = read_sections(&path, None, &Selection::nothing()).unwrap();
+    let names: Vec<&str> = sections.iter().map(|s| s.section.as_str()).collect();
+    assert_eq!(names, ["gceout", "icvout", "odd/values"]);
+    assert_eq!(
+        sections[2].problems[0].to_string(),
+        "odd/values: 1 record not read: they do not stand in states (d000001, d000002, …) with times"
+    );
+}
+
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn control_volumes_of_a_real_binout() {
+    let path = shared("samples/more").join("binout_pyansys_heart_r16_smp_d_icvout");
+    let file = section(&path, "icvout");
+    assert_eq!((file.time.len(), file.problems.len()), (161, 0));
+    let volume = file.history(Some(EntityId::new(1)), "ICV_Volume").unwrap();
+    assert!(volume.values.iter().all(|v| *v > 0.0));
+}
+
+/// LS-DYNA puts the job id of a run before the names of its files.
+#[test]
+fn job_ids_stand_before_names() {
+    let run = fixture("fe/lead-car-wall/12kmh");
+    let text = |name: &str| fs::read(run.join(name)).unwrap();
+    let build = |files: &[(&str, Vec<u8>)], code: i32| -> serde_json::Value {
+        let folder = tempfile::tempdir().unwrap();
+        study(folder.path(), files);
+        let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]);
+        assert_eq!(output.status.code(), Some(code), "{output:?}");
+        if code > 0 {
+            let said = [output.stdout, output.stderr].concat();
+            return String::from_utf8(said).unwrap().into();
+        }
+        let listed = crumple_ok(folder.path(), &["inspect", "12kmh"]);
+        assert!(files.iter().all(|(name, _)| listed.contains(name)), "{listed}");
+        crumple_ok(folder.path(), &["init", "12kmh", "-o", "proposed.toml"]);
+        crumple_ok(folder.path(), &["build", "proposed.toml", "-o", "p.h5"]);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        report["runs"][0]["case"]["work_J"].clone()
+    };
+    let plain = build(&[("nodout", text("nodout")), ("rwforc", text("rwforc"))], 0);
+    let jobs = [("run7.nodout", text("nodout")), ("run7.rwforc", text("rwforc"))];
+    assert_eq!(build(&jobs, 0), plain);
+    assert_eq!(build(&[("HAT.v2.binout0000", binout_of(&run))], 0), plain);
+    let two = [("a.nodout", text("nodout")), ("b.nodout", text("nodout")), jobs[1].clone()];
+    let said = build(&two, 1).to_string();
+    assert!(said.contains("has a.nodout and b.nodout: write in the recipe which one"), "{said}");
+}
+
+/// The binouts of one job are one tree, apart from those of another.
+#[test]
+fn families_are_of_one_job() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, kind) in
+        [("a.binout0000", "nodout"), ("a.binout0001", "matsum"), ("b.binout0001", "rcforc")]
+    {
+        let mut out = Written::new();
+        out.ids(kind, &[7]);
+        for state in 1..4 {
+            out.cd(&format!("/{kind}/d{state:06}"));
+            out.reals("time", &[f64::from(state)]);
+            out.reals("x_force", &[1.0]);
+        }
+        fs::write(folder.path().join(name), out.bytes).unwrap();
+    }
+    let names = |file: &str| -> Vec<String> {
+        let read = read_sections(&folder.path().join(file), None, &Selection::nothing()).unwrap();
+        read.into_iter().map(|s| s.section).collect()
+    };
+    assert_eq!(names("a.binout0000"), ["nodout", "matsum"]);
+    assert_eq!(names("b.binout0001"), ["rcforc"]);
+}

@@ -51,7 +51,7 @@ fn is_beginning(read: &SolverFile, whole: &SolverFile) {
     // A first state that ends between two rows cannot be distinguished from a whole one.
     assert!(states < 2 || read.entities == whole.entities, "{name}: {:?}", read.entities);
     // T01's forces are differences of its impulses: at the end a one-sided one.
-    let is_rate = read.format == "t01" && name.ends_with("forc");
+    let is_rate = read.format == "t01" && (name.ends_with("forc") || name == "rbdout");
     let compared = if is_rate { states.saturating_sub(1) } else { states };
     for history in &read.histories {
         let other = whole.history(history.entity, &history.component).unwrap();

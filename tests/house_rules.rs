@@ -25,7 +25,7 @@ const MAY_NAME: [(&str, &[&str]); 37] = [
     ("manifest", &["guess", "file"]),
     ("stream", &[]),
     ("forest", &["stream"]),
-    ("solver", &["guess", "signal", "history", "file", "unit"]),
+    ("solver", &["guess", "plural", "signal", "history", "file", "unit"]),
     ("curve", &["plural", "signal", "piecewise", "history", "unit"]),
     ("rating", &["guess", "curve", "signal", "history", "table"]),
     ("study", &["guess", "curve", "solver", "history", "manifest", "file", "unit"]),

@@ -305,3 +305,125 @@ fn groups_of_one_kind_are_joined() {
         assert_eq!(values[4], 4.0 * id as f64);
     }
 }
+
+/// The bytes of a T01 in two files as a restart leaves them: each with the header, and states of its own.
+fn restarted(bytes: &[u8], header: usize, first: usize, again: usize) -> [Vec<u8>; 2] {
+    // Records of 4, 88, 24, 24, 432 and 36 bytes.
+    let state = 608 + 6 * 8;
+    let states = &bytes[header..];
+    let part = |states: &[u8]| [&bytes[..header], states].concat();
+    [part(&states[..first * state]), part(&states[(first - again) * state..])]
+}
+
+/// T01 and T02 are one record, whose impulses go on.
+#[test]
+fn a_restart_goes_on_where_the_run_ended() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let bytes = fs::read(t01_of("lead-car-wall/25kmh")).unwrap();
+    fs::write(at("wholeT01"), &bytes).unwrap();
+    let header = bytes.len() - section(&at("wholeT01"), "nodout").time.len() * (608 + 6 * 8);
+    for again in [0, 20] {
+        let [first, second] = restarted(&bytes, header, 100, again);
+        fs::write(at("runT01"), first).unwrap();
+        fs::write(at("runT02"), second).unwrap();
+        for name in ["nodout", "rwforc", "glstat", "rbdout"] {
+            let (whole, joined) = (section(&at("wholeT01"), name), section(&at("runT01"), name));
+            assert_eq!(whole.histories, joined.histories, "{name}");
+            let said: Vec<ProblemCode> = joined.problems.iter().map(|p| p.code).collect();
+            let expected = if again > 0 { vec![ProblemCode::RepeatedState] } else { Vec::new() };
+            assert_eq!(said, expected);
+        }
+    }
+    let alone = section(&at("runT02"), "nodout");
+    assert_eq!(alone.time.len(), section(&at("wholeT01"), "nodout").time.len() - 80);
+    // Both are one file of the run; without the first the beginning is missing.
+    let listed = crumple_ok(folder.path(), &["inspect", "."]);
+    assert!(listed.contains("runT01") && !listed.contains("runT02"), "{listed}");
+    fs::rename(at("runT02"), at("runT03")).unwrap();
+    let message = section(&at("runT01"), "nodout").problems[0].to_string();
+    assert_eq!(message, "runT02 is not there, so that what continues behind it is not read");
+    fs::remove_file(at("runT01")).unwrap();
+    let message = section(&at("runT03"), "nodout").problems[0].to_string();
+    assert_eq!(message, "runT02 is not there, so that the record begins late");
+    // What does not hold the same is not joined.
+    fs::write(at("runT01"), written(3040, &[(0, 9, 9), (102, 1, 6)], 5)).unwrap();
+    fs::write(at("runT02"), written(3040, &[(0, 8, 9), (102, 1, 6)], 5)).unwrap();
+    let file = section(&at("runT01"), "nodout");
+    assert_eq!(file.time.len(), 5);
+    assert_eq!(
+        file.problems[0].to_string(),
+        "T02, which goes on, holds other histories: it is not read, nor what follows"
+    );
+}
+
+/// A run of OpenRadioss' own tests that was restarted, and the same in one piece.
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn a_real_restart_is_the_uninterrupted_run() {
+    let folder = shared("samples/openradioss");
+    for name in ["rwforc", "nodout", "matsum", "glstat"] {
+        let joined = section(&folder.join("BOULE1V4T01"), name);
+        let whole = section(&folder.join("uninterrupted_BOULE1V4T01"), name);
+        assert_eq!((joined.time.len(), joined.problems.len()), (130, 0));
+        assert_eq!(joined.histories, whole.histories, "{name}");
+    }
+    let wall = section(&folder.join("BOXBEAM_SUBT01"), "rwforc");
+    assert!(
+        wall.history(Some(EntityId::new(1)), "z_force").unwrap().values.iter().any(|f| *f != 0.0)
+    );
+    let accelerations = section(&folder.join("ACCELEROT01"), "accelerometer");
+    assert_eq!((accelerations.entities.len(), accelerations.histories.len()), (1, 3));
+}
+
+/// A wall that records normal impulses alone; rigid bodies, springs, accelerometers and what has no name here.
+#[test]
+fn every_group_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    let groups = [(102, 3, 3), (103, 4, 9), (6, 5, 14), (108, 6, 3), (3, 7, 2), (77, 8, 1)];
+    fs::write(&path, written(3040, &groups, 5)).unwrap();
+    let value = |name: &str, id: i64, component: &str| {
+        let file = section(&path, name);
+        assert_eq!(file.problems, []);
+        let history = file.history(Some(EntityId::new(id)), component);
+        history.unwrap_or_else(|| panic!("{name}: {:?}", file.components)).values[4]
+    };
+    // Values rise by the id in each of 1/1024 s.
+    assert_eq!(value("rwforc", 3, "x_force"), 3.0 * 1024.0);
+    assert_eq!(value("rwforc", 3, "normal_force"), 3.0 * 1024.0 * 3f64.sqrt());
+    assert_eq!(value("rbdout", 4, "y_force"), 4.0 * 1024.0);
+    assert_eq!(value("rbdout", 4, "z_moment"), 4.0 * 1024.0);
+    assert_eq!(value("rbdout", 4, "x_rotation"), 16.0);
+    assert_eq!(value("deforc", 5, "x_force"), 20.0);
+    assert_eq!(value("accelerometer", 6, "z_acceleration"), 24.0);
+    assert_eq!(value("shell", 7, "variable_2"), 28.0);
+    assert_eq!(value("group_77", 8, "variable_1"), 32.0);
+    let notes = section(&path, "rwforc").notes;
+    assert_eq!(
+        notes[1],
+        "of 3 the run recorded no tangential impulses: their forces are the normal ones alone"
+    );
+    // The variables of one object may stand in several groups: no force is then half of one.
+    fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();
+    assert_eq!(value("rwforc", 3, "x_force"), 6.0 * 1024.0);
+}
+
+/// The last force of a record that goes on is a difference over one interval.
+#[test]
+fn a_cut_record_says_that_its_last_force_will_change() {
+    let bytes = written(3040, &[(0, 9, 9), (102, 3, 6)], 50);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("runT01");
+    fs::write(&path, &bytes[..bytes.len() - 10]).unwrap();
+    let said = |name: &str| {
+        section(&path, name).problems.iter().any(|p| p.message.contains("will change"))
+    };
+    assert!(said("rwforc") && !said("nodout"));
+    fs::write(&path, &bytes).unwrap();
+    assert!(!said("rwforc"));
+    assert!(
+        section(&path, "rwforc").notes[0]
+            .ends_with("the last force changes where the record goes on")
+    );
+}

@@ -759,3 +759,216 @@ fn a_hole_in_time_is_named() {
     assert_eq!(file.problems.len(), 21);
     assert_eq!(file.problems[20].code, ProblemCode::MoreProblems);
 }
+
+/// Rows of a wall over time, and the text with one line changed.
+fn wall_rows(rows: &[(&str, &str)]) -> String {
+    let heading = "    time       wall#   normal-force    x-force        y-force        z-force\n";
+    let row = |(time, force): &(&str, &str)| {
+        format!("{time:>12}{:>8}{force:>15}{}\n", 1, format!("{:>15}", "1.500000E+06").repeat(3))
+    };
+    heading.to_string() + &rows.iter().map(row).collect::<String>()
+}
+
+/// A state whose time is known far better than states lie apart is the same state, written again.
+#[test]
+fn of_a_state_written_twice_the_last_writing_counts() {
+    let (one, other) = ("1.000000E+06", "1.000000E+05");
+    let rows =
+        [("4.42521E-02", one), ("4.50020E-02", one), ("4.50020E-02", other), ("4.57518E-02", one)];
+    let file = read("rwforc", &wall_rows(&rows));
+    assert_eq!(&file.time[..], [0.0442521, 0.045002, 0.0457518]);
+    assert_eq!(values(&file, 1, "normal_force"), [1e6, 1e5, 1e6]);
+    assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
+    let message = file.problems[0].to_string();
+    assert!(
+        message.ends_with("the state at time 0.045002 is written twice: the last writing counts")
+    );
+    // States as near to each other as their times can tell are not.
+    let near = ["1.00000E+01", "1.00001E+01", "1.00001E+01", "1.00002E+01"].map(|t| (t, one));
+    let file = read("rwforc", &wall_rows(&near));
+    assert_eq!((file.time.len(), &file.problems[..]), (4, &[][..]));
+
+    let one = |time: &str, force: &str| {
+        format!(
+            "\n n o d a l   f o r c e/e n e r g y    o u t p u t  t=  {time}\n\n velocity boundary condition forces/rigid body moments\n nd#       7  xforce=   {force} yforce=   {force} zforce=   {force} energy=   {force}\n"
+        )
+    };
+    let (a, b) = ("1.0000E+00", "2.0000E+00");
+    let text = one("1.00000E-03", a) + &one("2.00000E-03", a) + &one("2.00000E-03", b);
+    let file = read("bndout", &(text + &one("3.00000E-03", a)));
+    assert_eq!(values(&file, 7, "x_force"), [1.0, 2.0, 1.0]);
+    assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
+}
+
+/// What is left of a number is not another number: the state is left out, and it is said.
+#[test]
+fn cut_numbers_are_not_read() {
+    let states = |damaged: usize, value: &str| -> SolverFile {
+        let text: String = (0..6)
+            .map(|k| {
+                let value = if k == damaged { value } else { "   1.71192E+09" };
+                let time = format!("{k}.00000E-03");
+                glstat(&time, &[("kinetic energy", value), ("total energy", "   2.00000E+09")])
+            })
+            .collect();
+        read("glstat", &text)
+    };
+    for cut in
+        ["  192E+09", "   1.7192E+09", "   1.71", "   1.71\n192E+09", "   1", "   1.71192E+9"]
+    {
+        let file = states(3, cut);
+        let kinetic = &file.history(None, "kinetic_energy").unwrap().values;
+        assert_eq!(kinetic[..], [1.71192e9; 5], "{cut:?}");
+        assert!(codes(&file).contains(&ProblemCode::BadLine), "{cut:?}: {:?}", file.problems);
+    }
+    // In the first state nothing tells yet how wide numbers are.
+    assert_eq!(states(0, "   1.7192E+09").problems[0].line, Some(8));
+
+    let mut text = String::new();
+    for (k, value) in ["   2.5000E+00", " 2.5000E+00", "   2.5000E+00"].iter().enumerate() {
+        text += &format!("\n time =   {k}.0000E+00\n");
+        text += &format!(" mat.#=    1             inten={value}     kinen=   1.0000E+00\n");
+    }
+    let file = read("matsum", &text);
+    assert_eq!(&file.time[..], [0.0, 2.0]);
+    assert_eq!(codes(&file), [ProblemCode::BadLine, ProblemCode::IncompleteState]);
+}
+
+/// Lines of another file between those that are read are counted.
+#[test]
+fn lines_of_another_file_are_named() {
+    let state = |k: u32| glstat(&format!("{k}.00000E-03"), &[("kinetic energy", "   1.00000E+09")]);
+    let text = state(0) + &state(1) + &wall_rows(&[("4.42521E-02", "1.000000E+06"); 3]);
+    let file = read("glstat", &text);
+    assert_eq!((file.time.len(), codes(&file)), (2, vec![ProblemCode::UnreadRows]));
+    assert_eq!(
+        file.problems[0].to_string(),
+        "line 15: 4 lines between those of this file not read, the first \"time       wall#   normal-force    x-force        y-forc\": of another file?"
+    );
+    let known = " number of shell elements that\n reached the minimum time step..    0\n";
+    assert_eq!(read("glstat", &(state(0) + known + &state(1) + known)).problems, []);
+
+    let part = |time: u32| {
+        format!(
+            "\n time =   {time}.0000E+00\n mat.#=    1             inten=   2.5000E+00     kinen=   1.0000E+00\n"
+        )
+    };
+    let file = read("matsum", &(part(0) + " Maximum mass increase in cycle 1\n" + &part(1)));
+    assert_eq!(file.problems, []);
+    let file = read("matsum", &(part(0) + "\n" + &wall_rows(&[]) + &part(1)));
+    assert_eq!((file.time.len(), codes(&file)), (2, vec![ProblemCode::UnreadRows]));
+
+    // The name decides which of them is the file's own.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run7.rwforc");
+    let rows: Vec<String> = (1..9).map(|k| format!("{k}.00000E-02")).collect();
+    let rows: Vec<(&str, &str)> = rows.iter().map(|time| (&time[..], "1.000000E+06")).collect();
+    let text = format!("{HEADER}{}{}", state(0), wall_rows(&rows));
+    std::fs::write(&path, text).unwrap();
+    let file = crumple::solver::read(&path, None, &Selection::all()).unwrap();
+    assert_eq!((file.format, file.time.len()), ("rwforc", 8));
+    assert!(codes(&file).contains(&ProblemCode::BadLine));
+}
+
+#[test]
+fn swapped_rows_of_a_section_are_not_another_quantity() {
+    let state = |time: &str, order: [usize; 3]| {
+        let four = |value: &str| format!("{value:>15}{0}{0}{0}", format!("{value:>12}"));
+        let rows = [
+            format!("{:>12}{time:>15}{}\n", 1, four("1.0000E+00")),
+            format!("{:27}{}\n", "global system", four("2.0000E+00")),
+            format!("{:27}{}\n", "", four("3.0000E+00")),
+        ];
+        order.map(|k| &rows[k][..]).concat() + "\n"
+    };
+    let heading =
+        " line#1  section#     time        x-force     y-force     z-force    magnitude\n";
+    for swapped in [[0, 2, 1], [1, 0, 2], [2, 1, 0], [1, 2, 0]] {
+        let text = heading.to_string()
+            + &state("0.00000E+00", [0, 1, 2])
+            + &state("1.00000E-03", [0, 1, 2])
+            + &state("2.00000E-03", swapped)
+            + &state("3.00000E-03", [0, 1, 2]);
+        let file = read("secforc", &text);
+        assert_eq!(&file.time[..], [0.0, 1e-3, 3e-3], "{swapped:?}");
+        assert_eq!(values(&file, 1, "x_moment"), [2.0; 3]);
+        assert_eq!(values(&file, 1, "area"), [3.0; 3]);
+        assert!(codes(&file).contains(&ProblemCode::BadLine));
+    }
+}
+
+/// A bag with two vents of one part has two rows of its material.
+#[test]
+fn a_material_may_be_there_for_each_vent() {
+    let mut text = String::new();
+    for k in 0..3 {
+        text += "      time   airbag/cv #  volume        pressure    internal energy      dm/dt in      density dm/dt out  total mass gas temp. surface area   reaction dm/dt outp dm/dt outv\n";
+        text += &format!("{:>12}{:>8}", format!("{k}.00000E-03"), 3);
+        text += &format!("{:>15}", "1.0000E+03").repeat(5);
+        text += &(format!("{:>11}", "1.000E+00").repeat(7) + "\n");
+        for area in ["1.0000E-01", "2.0000E-01"] {
+            text += &format!(
+                "    Material I.D.=           7  Unblocked  Area=  {area}    Blocked  Area=  0.0000E+00    Leakage      =  0.0000E+00\n"
+            );
+        }
+    }
+    let file = read("abstat", &text);
+    assert_eq!((file.time.len(), &file.problems[..]), (3, &[][..]));
+    assert_eq!(values(&file, 3, "volume"), [1000.0; 3]);
+    assert_eq!(values(&file, 3, "unblocked_area_mat7"), [0.1; 3]);
+    assert_eq!(values(&file, 3, "unblocked_area_mat7_2"), [0.2; 3]);
+}
+
+/// Details of solids at integration points and nodes; of shells, whose strains have no heading; both in one state.
+#[test]
+fn details_of_elements_in_all_their_forms() {
+    let six = |value: &str| format!("{value:>12}").repeat(6);
+    let state = |cycle: u32, time: &str, stress: &str| {
+        let heading = |what: &str| {
+            format!(
+                "\n\n\n e l e m e n t   {what}   c a l c u l a t i o n s   f o r   t i m e  s t e p{cycle:>9}   ( at time {time:>12} )\n\n"
+            )
+        };
+        let (stresses, blank) = (six(stress), " ".repeat(17));
+        let mut text = heading("s t r e s s") + " element  materl\n";
+        text += "     ipt  stress       sig-xx      sig-yy      sig-zz      sig-xy      sig-yz      sig-zx                       yield      location\n           state                                                                                  effsg      function\n";
+        text += "       7-      1\n";
+        for place in ["int. point  1", "int. point  2", "node      501"] {
+            let further = format!("{:>14}{:>14}", "3.0000E+00", "4.0000E+00");
+            text += &format!("         elastic {stresses}{further}      {place}\n");
+        }
+        text += &(heading("s t r a i n")
+            + " element  strain       eps-xx      eps-yy\n num/ipt   state\n");
+        text += "       7-      1\n";
+        for place in ["int. point  1", "node      501"] {
+            text += &format!("{blank}{}      {place}\n", six("5.0000E-03"));
+        }
+        text += &(heading("s t r e s s") + " element  materl(global)\n");
+        text += " ipt-shl  stress       sig-xx      sig-yy      sig-zz      sig-xy      sig-yz      sig-zx       plastic      location\n           state                                                 strain \n";
+        text += "       9-      2\n";
+        text += &format!("   1-  2 elastic {stresses}{:>14}  int. point  1\n", "6.0000E+00");
+        text += &format!("   2-  2 elastic {stresses}{:>14}  node      601\n", "6.0000E+00");
+        text += "\n ipt-shl  strain       eps-xx      eps-yy      eps-zz      eps-xy      eps-yz      eps-zx        location          \n\n";
+        text += "       9-      2\n";
+        text += &format!("   1-            {}   int. point  1\n", six("7.0000E-03"));
+        text
+    };
+    let text = state(1, "0.00000E+00", "1.0000E+00")
+        + &state(2, "1.00000E-03", "1.0000E+00")
+        + &state(2, "1.00000E-03", "2.0000E+00");
+    for format in ["eloutdet", "elout"] {
+        let file = read(format, &text);
+        assert_eq!(&file.time[..], [0.0, 1e-3]);
+        assert_eq!(codes(&file), [ProblemCode::RepeatedState], "{:?}", file.problems);
+        for (id, component, expected) in [
+            (7, "sig_xx_point2", [1.0, 2.0]),
+            (7, "yield_node501", [4.0, 4.0]),
+            (7, "eps_zx_node501", [5e-3, 5e-3]),
+            (9, "plastic_strain_point1", [6.0, 6.0]),
+            (9, "sig_zx_ip2_node601", [1.0, 2.0]),
+            (9, "eps_xx_point1", [7e-3, 7e-3]),
+        ] {
+            assert_eq!(values(&file, id, component), expected, "{component}");
+        }
+    }
+}

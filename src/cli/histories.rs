@@ -90,6 +90,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     for problem in &file.problems {
         options.warn(&format!("{}: {problem}", args.file.display()));
     }
+    if !options.quiet {
+        file.notes.iter().for_each(|note| output::say(&format!("note: {note}")));
+    }
     match output.zip(target).filter(|_| straight.is_none()) {
         Some((path, target)) => {
             let bar = Bar::new(options, "writing");

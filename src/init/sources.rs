@@ -9,13 +9,13 @@ use crate::history::History;
 use crate::signal::{derivative, integral, interpolate};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Entity, Selection, SolverFile};
+use crate::solver::{self, Entity, Selection, SolverFile, is_named_like_binary, without_job_id};
 use crate::study::files::{content_hash, is_section_of, is_without_states, shown_name};
 
 /// Histories of nodes, named as a recipe's file is.
 pub(super) const MOTION: &str = "nodout";
 /// Forces that a recipe can name, what acts between bodies before what acts within one.
-pub(super) const FORCES: [&str; 3] = ["rwforc", "rcforc", "secforc"];
+pub(super) const FORCES: [&str; 4] = ["rwforc", "rcforc", "secforc", "rbdout"];
 /// Energies of the whole model.
 const ENERGY: &str = "glstat";
 /// What a text says that was made of a T01.
@@ -85,8 +85,10 @@ impl Sources {
             found.extend(unread.iter().map(|why| format!("({why})")));
             Reason::NoMotion { found: found.join(", ") + &hint }
         })?;
-        let forces: Vec<Source> =
+        let chosen: Vec<Source> =
             FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed)).collect();
+        // LS-DYNA's rigid bodies have motions, those of OpenRadioss forces.
+        let forces = chosen.into_iter().filter(Source::may_have_forces).collect::<Vec<_>>();
         let mut parts = motion.parts();
         for part in forces.iter().flat_map(Source::parts) {
             if !parts.contains(&part) {
@@ -118,12 +120,12 @@ fn misnamed(folder: &Path) -> Option<String> {
 impl Source {
     /// The file that a build takes for `name`: the text, else the first binary file that has it.
     fn choose(folder: &Path, name: &'static str, listed: &[Listed]) -> Option<Self> {
-        let is_text = |file: &Listed| file.path == folder.join(name);
+        let is_text = |file: &Listed| without_job_id(&shown_name(&file.path)) == name;
         let holds = |file: &&Listed| {
             is_text(file) || file.sections.iter().any(|s| is_section_of(&s.section, name))
         };
         let mut holders: Vec<&Listed> = listed.iter().filter(holds).collect();
-        holders.sort_by_key(|file| !is_text(file));
+        holders.sort_by_key(|file| (!is_text(file), file.path != folder.join(name)));
         if holders.len() > 1 && is_text(holders[0]) && is_without_states(&holders[0].path) {
             holders.remove(0);
         }
@@ -156,6 +158,10 @@ impl Source {
         self.components.iter().any(|c| **c == *component)
     }
 
+    fn may_have_forces(&self) -> bool {
+        self.components.is_empty() || self.components.iter().any(|name| name.ends_with("_force"))
+    }
+
     /// Reads some of its histories; `ids` of `None` are all.
     pub(super) fn read(
         &self,
@@ -185,8 +191,8 @@ impl Source {
 /// Whether a file may hold what a proposal looks at: large files of other kinds are not opened.
 fn is_looked_at(path: &Path) -> bool {
     let name = shown_name(path);
-    let is_binary = name.starts_with("binout") || name.ends_with("T01");
-    is_binary || FORCES.contains(&&*name) || [MOTION, ENERGY].contains(&&*name)
+    let own = without_job_id(&name);
+    is_named_like_binary(&name) || FORCES.contains(&own) || [MOTION, ENERGY].contains(&own)
 }
 
 /// Why the forces of a section are means over their output intervals, if they are.

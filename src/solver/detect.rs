@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use super::family::restart_number;
 use super::format::Format;
 use super::source::{self, Source, Stream};
 use super::{SolverFile, lsdyna, openradioss, unknown_format};
@@ -60,17 +61,16 @@ const DETECT_LINES: u64 = 100_000;
 
 /// The format of a file.
 pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, Error> {
-    let (by_content, is_lsdyna) = look_at(path, source)?;
-    if let Some(format) = by_content {
-        return Ok(format);
-    }
-    let named_so = |f: &&Format| path.file_name().is_some_and(|name| name == f.name);
-    if let Some(format) = FORMATS.iter().find(named_so) {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.as_deref().map(without_job_id);
+    let by_own_name = FORMATS.iter().find(|f| name == Some(f.name));
+    let (by_content, is_lsdyna) = look_at(path, source, by_own_name)?;
+    if let Some(format) = by_content.or(by_own_name) {
         return Ok(format);
     }
     let by_name = path.iter().rev().take(2).find_map(|part| {
         let part = part.to_string_lossy().to_ascii_lowercase();
-        FORMATS.iter().find(|f| part.starts_with(f.name))
+        FORMATS.iter().find(|f| without_job_id(&part).starts_with(f.name))
     });
     match by_name {
         Some(format) if is_lsdyna => Ok(format),
@@ -84,8 +84,13 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
 
 const NOT_RECOGNISED: &str = "no solver output is recognised in it";
 
-/// The format that the content tells, and whether it has the header of LS-DYNA's text files.
-fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>, bool), Error> {
+/// The format that the content tells, and whether it has the header of LS-DYNA's text files. Where lines of several
+/// kinds stand in a file, those of the kind that it is `named` by count.
+fn look_at(
+    path: &Path,
+    source: &dyn Source,
+    named: Option<&'static Format>,
+) -> Result<(Option<&'static Format>, bool), Error> {
     let io = |source| Error::io(path, source);
     let unknown = |looks_like: &str| unknown_format(path, looks_like);
     let mut head = Vec::new();
@@ -99,15 +104,19 @@ fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>,
     if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
         return Ok((Some(format), false));
     }
-    let is_named_t01 = path.file_name().is_some_and(|n| n.to_string_lossy().ends_with(T01));
+    let is_named_t01 =
+        path.file_name().is_some_and(|n| restart_number(&n.to_string_lossy()) == Some(1));
     if is_named_t01 && !head.is_empty() {
         return Err(unknown("it is named like a T01, but does not begin like one: is it damaged?"));
     }
     let mut lines = lsdyna::line::Lines::new(Stream::new(source));
-    let mut is_lsdyna = false;
+    let (mut is_lsdyna, mut first) = (false, None);
     while let Some(line) = lines.next_line().map_err(io)? {
         if line.number > DETECT_LINES {
-            return Err(unknown(NOT_RECOGNISED));
+            match first {
+                Some(format) => return Ok((Some(format), is_lsdyna)),
+                None => return Err(unknown(NOT_RECOGNISED)),
+            }
         }
         if lsdyna::deck::signature(line.text) {
             let path = path.display();
@@ -121,11 +130,18 @@ fn look_at(path: &Path, source: &dyn Source) -> Result<(Option<&'static Format>,
         }
         // Titles in a legend are free text, but none begins like a line of a body, whose
         // signature also ends a legend that lost its closing line.
-        if let Some(format) = FORMATS.iter().find(|f| f.is_signature(line.text)) {
-            return Ok((Some(format), is_lsdyna));
+        let found = FORMATS.iter().find(|f| f.is_signature(line.text));
+        match (found, named) {
+            // An eloutdet may hold nothing but what an elout holds.
+            (Some(found), Some(named)) if named.name.starts_with(found.name) => {
+                return Ok((Some(named), is_lsdyna));
+            }
+            (Some(found), Some(_)) => drop(first.get_or_insert(found)),
+            (Some(found), None) => return Ok((Some(found), is_lsdyna)),
+            (None, _) => {}
         }
     }
-    Ok((None, is_lsdyna))
+    Ok((first, is_lsdyna))
 }
 
 /// Holds a named format against what the file looks like, if nothing was read by it.
@@ -138,7 +154,7 @@ pub(super) fn check_format(
     if sections.iter().any(|s| !s.time.is_empty()) {
         return Ok(());
     }
-    match look_at(path, source)? {
+    match look_at(path, source, None)? {
         (Some(found), _) if found.name != format.name => Err(error!(
             SolverFile,
             "{}: this is not a {}: it looks like a {}, read it as that",
@@ -170,8 +186,26 @@ pub(super) fn files_in(folder: &Path) -> String {
 
 /// Whether a file is named as a solver names one that can be read.
 pub(super) fn is_named_like_output(name: &str) -> bool {
-    name.ends_with(T01) || FORMATS.iter().any(|f| name.starts_with(f.name))
+    let own = without_job_id(name);
+    restart_number(name).is_some() || FORMATS.iter().any(|f| own.starts_with(f.name))
 }
 
-/// How OpenRadioss names its time history: the run's name and this.
-const T01: &str = "T01";
+/// The name of a file without the job id that LS-DYNA puts before it (`jobid=run7`: `run7.nodout`).
+pub(crate) fn without_job_id(name: &str) -> &str {
+    let is_own = |rest: &&str| {
+        let numbered = rest.split('%').next().unwrap_or(rest);
+        let bare = numbered.trim_end_matches(|c: char| c.is_ascii_digit());
+        FORMATS.iter().any(|f| f.name == bare)
+    };
+    let behind_points = || name.match_indices('.').map(|(at, _)| &name[at + 1..]);
+    match FORMATS.iter().any(|f| name.starts_with(f.name)) {
+        true => name,
+        false => behind_points().find(is_own).unwrap_or(name),
+    }
+}
+
+/// Whether a file is named like the first of a binary family: a binout, or a T01.
+pub(crate) fn is_named_like_binary(name: &str) -> bool {
+    without_job_id(name).starts_with("binout") && !name.contains('%')
+        || restart_number(name).is_some()
+}

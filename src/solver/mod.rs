@@ -45,7 +45,7 @@ use crate::guess;
 pub use decks::read_deck;
 pub use detect::FORMATS;
 use detect::{check_format, detect, files_in, named};
-pub(crate) use detect::{entity_word, format_names};
+pub(crate) use detect::{entity_word, format_names, is_named_like_binary, without_job_id};
 use error::check_selection;
 pub(crate) use error::no_component;
 pub(crate) use family::family;
@@ -128,9 +128,7 @@ pub fn read_sections(
     let mut head = [0; 16];
     let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
     let is_container = lsdyna::binout::recognises(&head[..count]);
-    if let Some(missing) = missing_continuation(path).filter(|_| format.is_binary()) {
-        let message =
-            format!("{missing} is not there, so that what continues behind it is not read");
+    if let Some(message) = missing_continuation(path).filter(|_| format.is_binary()) {
         let problem = Problem::new(ProblemCode::CutRecord, message);
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }

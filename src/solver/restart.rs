@@ -39,17 +39,52 @@ pub(crate) fn resolve(
             let from = kept.iter().rposition(|&k| stays(k)).map_or(0, |k| k + 1);
             let left_out = kept.split_off(from);
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
-                let message = format!(
-                    "{of}a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
-                    time[i],
-                    left_out.len(),
-                    time[first],
-                    time[last]
-                );
+                let twice = || {
+                    format!(
+                        "{of}the state at time {:?} is written twice: the last writing counts",
+                        time[i]
+                    )
+                };
+                let of_many = || {
+                    format!(
+                        "{of}a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
+                        time[i],
+                        left_out.len(),
+                        time[first],
+                        time[last]
+                    )
+                };
+                let message = if again && first == last { twice() } else { of_many() };
                 problems.push(Problem::at(ProblemCode::RepeatedState, place(i), message));
             }
         }
         kept.push(i);
     }
     (kept, problems)
+}
+
+/// Digits of a printed time at least.
+const FEWEST_DIGITS: i32 = 4;
+/// Steps of the last digit by which neighbours lie apart where an equal time is the same state.
+const STEPS: f64 = 10.0;
+
+/// Digits that a file's times are printed with: those of the time that has most.
+pub(crate) fn digits(time: &[f64]) -> i32 {
+    let of = |t: &f64| {
+        let text = format!("{t:e}");
+        let mantissa = text.split('e').next().unwrap_or_default();
+        mantissa.bytes().filter(u8::is_ascii_digit).count() as i32
+    };
+    time.iter().map(of).max().unwrap_or(0).max(FEWEST_DIGITS)
+}
+
+/// Whether two states of one time are the same one: neighbours at other times are much further
+/// away than the last of the times' digits can tell.
+pub(crate) fn is_known_apart(time: &[f64], above: usize, below: usize, digits: i32) -> bool {
+    let at = time[below];
+    let before = time[..above].iter().rev().find(|&&t| t != at);
+    let behind = time[below..].iter().find(|&&t| t != at);
+    let nearest = before.into_iter().chain(behind).map(|t| (t - at).abs()).reduce(f64::min);
+    let exponent = if at == 0.0 { f64::NEG_INFINITY } else { at.abs().log10().floor() };
+    nearest.is_some_and(|gap| gap >= STEPS * 10f64.powf(exponent - f64::from(digits - 1)))
 }

@@ -6,7 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::detect::{detect, is_named_like_output};
-use super::family::{family, is_continuation};
+use super::family::{family, is_continuation, restart_number};
+use super::is_output;
 use super::source::{self, Access};
 
 /// Folders deeper than this are not looked into.
@@ -54,6 +55,12 @@ pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
         // A pipe would wait for its writer.
         .filter(|path| path.is_file() && !is_continuation(path))
         .collect();
+    // Other files end like the history of a restart, too: what is in them tells.
+    let is_restart = |name: &str| restart_number(name).is_some_and(|number| number > 1);
+    files.retain(|path| {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        !is_restart(&name) || is_output(path)
+    });
     files.sort();
     let further: HashSet<PathBuf> =
         files.iter().flat_map(|path| family(path).into_iter().skip(1)).collect();

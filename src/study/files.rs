@@ -32,15 +32,14 @@ pub(super) fn force_file(force: &ForceSource) -> &str {
 /// Finds the file a recipe names: the text file of that name, or the section of a binout
 /// or of an OpenRadioss T01.
 pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
-    let text = folder.join(name);
     let names = file_names(folder)?;
+    let text = named_text(folder, name, &names)?;
     let names_only = Selection { audit: false, ..Selection::nothing() };
     let (mut binout, mut damaged) = (None, None);
-    let is_binary = |n: &&String| n.starts_with("binout") && !n.contains('%') || n.ends_with("T01");
-    for part in names.iter().filter(is_binary) {
-        let path = folder.join(part);
-        // A pipe would wait for its writer.
-        if !path.is_file() {
+    let outputs = solver::runs::output_files(folder).map_err(|source| Error::io(folder, source))?;
+    for path in outputs {
+        let part = shown_name(&path);
+        if !solver::is_named_like_binary(&part) {
             continue;
         }
         let sections = match solver::read_sections(&path, None, &names_only) {
@@ -83,6 +82,23 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
     };
     let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
     Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
+}
+
+/// The text file that a recipe calls `name`: the one of that name, or with a job id before it.
+fn named_text(folder: &Path, name: &str, names: &[String]) -> Result<PathBuf, Error> {
+    let exact = folder.join(name);
+    let is_named_so = |n: &&String| solver::without_job_id(n) == name && folder.join(n).is_file();
+    let mut of_jobs = names.iter().filter(is_named_so);
+    match (of_jobs.next(), of_jobs.next()) {
+        (Some(first), Some(second)) if !exact.is_file() => Err(error!(
+            Run,
+            "the run's folder {} has {first} and {second}: write in the recipe which one is meant",
+            folder.display()
+        )
+        .at_key("file")),
+        (Some(only), None) => Ok(folder.join(only)),
+        _ => Ok(exact),
+    }
 }
 
 /// A text file with at most this many bytes may be a header without states.

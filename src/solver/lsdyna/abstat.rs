@@ -1,7 +1,7 @@
 //! `abstat`: state of airbags and control volumes, and of the materials they are made of.
 
 use super::ascii::{self, Body};
-use super::label_values::{Labelled, fields, labelled};
+use super::label_values::{Labelled, Widths, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -46,9 +46,12 @@ pub(crate) const FORMAT: Format =
 #[derive(Default)]
 struct Abstat {
     table: Option<TableId>,
-    /// Areas by material; their components carry its id.
-    materials: Vec<(i64, TableId)>,
+    /// Areas by material and row of it below its airbag; their components carry both.
+    materials: Vec<((i64, usize), TableId)>,
     airbag: Option<EntityId>,
+    /// Materials of the rows below the airbag: one may be there for each of its vents.
+    below: Vec<i64>,
+    widths: Widths,
     width: usize,
 }
 
@@ -100,6 +103,7 @@ impl Abstat {
             states.begin(Some(time), line.into());
         }
         self.airbag = Some(airbag);
+        self.below.clear();
         states.row(table, airbag, line, |k| (k < count).then(|| field(k)));
         Some(())
     }
@@ -109,22 +113,27 @@ impl Abstat {
         let from = memchr::memmem::find(text, MATERIAL)? + MATERIAL.len();
         let to = memchr::memmem::find(text, AREAS[0].label.as_bytes())?;
         let material = integer(text.get(from..to)?)?;
-        let fields = fields(line, &AREAS)?;
+        let fields = fields(line, &AREAS, &mut self.widths, states)?;
         if fields.iter().any(Option::is_none) {
             return None;
         }
-        let known = self.materials.iter().find(|(m, _)| *m == material).map(|(_, t)| *t);
+        let row = 1 + self.below.iter().filter(|&&above| above == material).count();
+        let key = (material, row);
+        let known = self.materials.iter().find(|(k, _)| *k == key).map(|(_, t)| *t);
         let table = match known {
             Some(table) => table,
             None if self.materials.len() < MAX_MATERIALS => {
-                let names = AREAS.each_ref().map(|a| format!("{}_mat{material}", a.component));
+                let tail = if row > 1 { format!("_{row}") } else { String::new() };
+                let name = |area: &Labelled| format!("{}_mat{material}{tail}", area.component);
+                let names = AREAS.each_ref().map(name);
                 let table = states.table("materials", &names.each_ref().map(String::as_str));
-                self.materials.push((material, table));
+                self.materials.push((key, table));
                 table
             }
             None => return None,
         };
         states.row(table, self.airbag?, line, |k| fields[k]);
+        self.below.push(material);
         Some(())
     }
 }

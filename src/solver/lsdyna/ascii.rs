@@ -19,7 +19,8 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 
 use super::header::{self, LegendFence};
-use super::line::{Line, Lines};
+use super::line::{Line, Lines, shown};
+use crate::plural::counted;
 use crate::solver::format::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
@@ -58,6 +59,30 @@ pub(crate) trait Body {
     /// Contacts that the file declares to have no resultants.
     fn single_surfaces(&self) -> &[i64] {
         &[]
+    }
+}
+
+/// Lines between those that are read, which say nothing that is known: counted, and told at the end.
+#[derive(Default)]
+pub(crate) struct Skipped {
+    count: usize,
+    first: Option<(Place, String)>,
+}
+
+impl Skipped {
+    pub(crate) fn add(&mut self, line: &Line<'_>) {
+        self.count += 1;
+        let text = || shown(line.columns(1, 60)).trim().to_string();
+        self.first.get_or_insert_with(|| (line.into(), text()));
+    }
+
+    pub(crate) fn tell(&self, states: &mut StateReader<'_>) {
+        let Some((place, text)) = &self.first else { return };
+        let message = format!(
+            "{} between those of this file not read, the first \"{text}\": of another file?",
+            counted(self.count, "line")
+        );
+        states.problems.add(ProblemCode::UnreadRows, Some(*place), None, message);
     }
 }
 

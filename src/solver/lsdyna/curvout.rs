@@ -3,7 +3,7 @@
 //! Seen only with states that list no curve.
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, is_whole_real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
@@ -50,8 +50,7 @@ impl Curvout {
         let start = text.iter().position(|b| !b.is_ascii_whitespace())?;
         let id_end = start + text[start..].iter().position(u8::is_ascii_whitespace)?;
         let id = integer(&text[..id_end])?;
-        let is_number = matches!(real(&text[id_end..]), Field::Real(_));
-        if !is_number {
+        if !is_whole_real(text[id_end..].trim_ascii()) {
             return None;
         }
         let table = *self.table.get_or_insert_with(|| states.table("curves", &["ordinate"]));

@@ -3,7 +3,7 @@
 //! Never seen with data; read as the source of LSTC's converter `l2a` writes them.
 
 use super::ascii::Body;
-use super::label_values::is_number;
+use super::label_values::{Widths, is_number};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::states::{StateReader, TableId};
@@ -20,11 +20,12 @@ pub(crate) struct Dotted {
     entities: &'static [&'static str],
     tables: Vec<(String, TableId)>,
     entity: Option<EntityId>,
+    widths: Widths,
 }
 
 impl Dotted {
     pub(crate) fn new(entities: &'static [&'static str]) -> Self {
-        Self { entities, tables: Vec::new(), entity: None }
+        Self { entities, tables: Vec::new(), entity: None, widths: Widths::default() }
     }
 }
 
@@ -86,7 +87,8 @@ impl Dotted {
             self.entity = Some(EntityId::new(integer(value)?));
             return Some(());
         }
-        if !is_number(value, VALUE_WIDTH) {
+        let excess = value.len() as isize - VALUE_WIDTH as isize;
+        if !(is_number(value, VALUE_WIDTH) && self.widths.allow(label, excess, line, states)) {
             return None;
         }
         if label == "time" {

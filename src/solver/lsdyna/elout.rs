@@ -2,9 +2,10 @@
 //! strains of nodes.
 //!
 //! Seen with data: solids, beams, averages at nodes. Shells, thick shells and the details of
-//! elements are read as the source of LSTC's converter `l2a` writes them. Components are
-//! named as in a binout; those of a second integration point end with `_ip2`, and so on.
-//! Elements may erode: their values are then NaN.
+//! elements (at integration points, at nodes) are read as the source of LSTC's converter `l2a`
+//! writes them. Components are named as in a binout; those of a second integration point end with
+//! `_ip2`, and so on, those of details with `_point1` or `_node7`. Elements may erode: their values
+//! are then NaN. Each kind of element has a block of its own in a state.
 //!
 //! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
 //! that looks like erosion cannot fill the memory.
@@ -25,6 +26,7 @@ const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
 /// Behind 17 columns that tell integration point, surface and state: six numbers of 12, then
 /// further ones of 14, at nodes of 12.
 const LABEL: usize = 17;
+const POINT: usize = 9;
 const WIDTH: usize = 12;
 const WIDE: usize = 14;
 /// Beams: resultants of 11 behind 11 columns; stresses of 15 behind 16.
@@ -84,6 +86,8 @@ struct Elout {
     entity: Option<EntityId>,
     /// Inside a beam's stresses at its integration points.
     at_points: bool,
+    /// Behind a heading: a row that the state already has is the first of the next one.
+    begins: bool,
     unread: Option<Place>,
 }
 
@@ -143,22 +147,43 @@ impl Elout {
         let to = memchr::memmem::find(line.text, b"( at time");
         let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
         let time = super::at_time(line.text).filter(|_| line.is_heading());
-        let repeats = self.quantity == Some(quantity) && quantity != Quantity::Beam;
         self.quantity = Some(quantity);
+        self.begins = true;
         let is_same = states.is_pending()
             && time.is_some()
             && states.pending_time() == time
-            && self.cycle.as_deref() == cycle
-            && !repeats;
+            && self.cycle.as_deref() == cycle;
         if time.is_some() && !is_same {
-            states.begin(time, line.into());
             self.cycle = cycle.map(<[u8]>::to_vec);
+            self.begin(time, line, states);
         }
         if time.is_none() {
             self.quantity = None;
             states.damage(line, None, "expected a cycle number and \"( at time … )\"".into());
         }
         true
+    }
+
+    fn begin(&self, time: Option<f64>, line: &Line<'_>, states: &mut StateReader<'_>) {
+        states.begin(time, line.into());
+        if let Some(cycle) = self.cycle.as_deref().and_then(integer) {
+            states.set_cycle(cycle);
+        }
+    }
+
+    /// One row; the first behind a heading begins a state where the one above has it already.
+    fn row(
+        &mut self,
+        table: TableId,
+        entity: EntityId,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+        field: impl Fn(usize) -> (usize, usize),
+    ) {
+        if std::mem::take(&mut self.begins) && states.has_row(table, entity) {
+            self.begin(states.pending_time(), line, states);
+        }
+        states.row(table, entity, line, |k| Some(field(k)));
     }
 
     /// Whether the line names columns; notes those behind the tensor.
@@ -170,6 +195,16 @@ impl Elout {
                 () if has(b"plastic") => &["plastic_strain"],
                 () => &["effsg", "yield"],
             };
+        }
+        // The strains of shells stand below the heading of their stresses.
+        let is_new = match self.quantity {
+            Some(Quantity::Stress) if has(b"eps-xx") => Some(Quantity::Strain),
+            Some(Quantity::Strain) if has(b"sig-xx") => Some(Quantity::Stress),
+            _ => None,
+        };
+        if let Some(quantity) = is_new.filter(|_| line.is_heading()) {
+            self.quantity = Some(quantity);
+            self.begins = true;
         }
         const STARTS: [&[u8]; 12] = [
             b"element ",
@@ -240,9 +275,9 @@ impl Elout {
             let table = self.table(key, states, || {
                 names.iter().map(std::string::ToString::to_string).collect()
             })?;
-            states.row(table, entity, line, |k| {
+            self.row(table, entity, line, states, |k| {
                 let from = RESULTANT_AT + k * RESULTANT_WIDTH;
-                Some((from + 1, from + RESULTANT_WIDTH))
+                (from + 1, from + RESULTANT_WIDTH)
             });
             return Some(());
         }
@@ -255,9 +290,9 @@ impl Elout {
         let table = self.table(key, states, || {
             BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect()
         })?;
-        states.row(table, entity, line, |k| {
+        self.row(table, entity, line, states, |k| {
             let from = BEAM_STRESS_AT + k * BEAM_STRESS_WIDTH;
-            Some((from + 1, from + BEAM_STRESS_WIDTH))
+            (from + 1, from + BEAM_STRESS_WIDTH)
         });
         Some(())
     }
@@ -279,8 +314,11 @@ impl Elout {
         let quantity = self.quantity?;
         let nodal = matches!(quantity, Quantity::NodalStress | Quantity::NodalStrain);
         let label = text.get(..LABEL)?;
-        let (point, surface) = place(label).filter(|_| !label.contains(&b'*'))?;
         let (numbers, location) = location(text)?;
+        // Details of solids, and those at nodes, have no integration point but their location.
+        let (point, surface) = place(label)
+            .or_else(|| location.and(label[..POINT].trim_ascii().is_empty().then_some((1, ""))))
+            .filter(|_| !label.contains(&b'*'))?;
         let further: &'static [&'static str] = match quantity {
             Quantity::Stress => self.further,
             Quantity::NodalStress => &["yield"],
@@ -309,12 +347,12 @@ impl Elout {
             let tensor = TENSOR.iter().map(|axes| format!("{surface}{kind}_{axes}{tail}"));
             tensor.chain(further.iter().map(|name| format!("{surface}{name}{tail}"))).collect()
         })?;
-        states.row(table, entity, line, |k| {
+        self.row(table, entity, line, states, |k| {
             let (from, width) = match k.checked_sub(TENSOR.len()) {
                 None => (LABEL + k * WIDTH, WIDTH),
                 Some(k) => (tensor_end + k * wide, wide),
             };
-            Some((from + 1, from + width))
+            (from + 1, from + width)
         });
         Some(())
     }
@@ -325,7 +363,7 @@ type Location = (&'static str, i64);
 
 /// A row without the place of its point, with which rows of details end, and that place.
 fn location(text: &[u8]) -> Option<(&[u8], Option<Location>)> {
-    let found = [b"int. point".as_slice(), b"node "]
+    let found = [b"int. point".as_slice(), b"node"]
         .iter()
         .find_map(|word| memchr::memmem::rfind(text, word).map(|at| (at, word.len())));
     Some(match found.filter(|(at, _)| *at > LABEL) {

@@ -1,12 +1,14 @@
 //! `glstat`: energies and other quantities of the whole model, one labelled line each.
 //!
 //! A state is label → value, and labels may be absent. A cut removes them from the end, so a last state that ends
-//! early is not whole.
+//! early is not whole. What stands between the labels and is not known to stand there is counted.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, Skipped};
 use super::dotted::split;
-use super::line::{Field, Line, integer, is_whole_real, real};
+use super::label_values::Widths;
+use super::line::{Field, Line, integer, is_whole_real, real, shown};
 use crate::solver::format::Format;
+use crate::solver::problem::Place;
 use crate::solver::states::StateReader;
 
 const STATE: &[u8] = b" dt of cycle";
@@ -32,9 +34,13 @@ pub(crate) const FORMAT: Format =
 struct Glstat {
     /// Inside a block of mass properties, which ends with a row of stars.
     in_properties: bool,
+    widths: Widths,
+    skipped: Skipped,
 }
 
 const PROPERTIES: &[u8] = b"m a s s   p r o p e r t i e s";
+/// What lines of text between the labels begin with.
+const TEXTS: [&[u8]; 4] = [b"number of ", b"reached the ", b"added mass", b"percentage increase"];
 
 impl Body for Glstat {
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
@@ -52,10 +58,18 @@ impl Body for Glstat {
             self.in_properties = (self.in_properties && !is_ruler) || text.starts_with(PROPERTIES);
             if !is_ruler && !line.is_heading() {
                 states.damage(line, None, "expected a label and its value, found stars".into());
+            } else if !(is_ruler || self.in_properties || text.is_empty() || is_text(text)) {
+                self.skipped.add(line);
             }
-            return; // Text between the labels: mass properties, warnings.
+            return;
         };
         let columns = [from + 1, value_end(line.text, from)];
+        if !self.is_value(&component, from, line, states) {
+            let found = shown(line.columns(columns[0], columns[1]));
+            let message = format!("expected a number of {VALUE_WIDTH} columns, found \"{found}\"");
+            states.damage(line, Some(columns), message);
+            return;
+        }
         // Only a wall's number may stand behind the value.
         let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
         let wall = wall_number(rest);
@@ -82,6 +96,32 @@ impl Body for Glstat {
             _ => states.damage(line, Some(columns), "expected a time".into()),
         }
     }
+
+    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
+        self.skipped.tell(states);
+    }
+}
+
+impl Glstat {
+    /// Whether what stands behind a label is a number with nothing cut from it.
+    fn is_value(
+        &mut self,
+        label: &str,
+        from: usize,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> bool {
+        let value = line.columns(from + 1, value_end(line.text, from));
+        // The number of elements at the smallest step has fewer columns.
+        let is_count = integer(value).is_some() && is_text(line.text.trim_ascii());
+        let excess = (from + value.len()) as isize - (LABEL + VALUE_WIDTH) as isize;
+        let is_number = excess == 0 || is_whole_real(value.trim_ascii());
+        is_count || is_number && self.widths.allow(label, excess, line, states)
+    }
+}
+
+fn is_text(text: &[u8]) -> bool {
+    TEXTS.iter().any(|known| text.starts_with(known))
 }
 
 /// Where the value that begins behind `from` ends: with a whole number, else where values

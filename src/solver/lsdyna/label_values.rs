@@ -1,9 +1,12 @@
 //! Rows of labels and numbers (`xforce=   1.0000E+00   yforce= …`): where the numbers are.
 //!
 //! A number is what stands between its label and the next one, so that a label that comes or
-//! goes with a release, and a gap of another width, change nothing.
+//! goes with a release, and a gap of another width, change nothing. Within one file widths stay:
+//! once numbers fill their usual columns, one that does not has lost some of its digits.
 
 use super::line::{Line, is_whole_real};
+use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::states::StateReader;
 
 /// A component, its label, and the usual width of the number right behind the label.
 pub(crate) struct Labelled {
@@ -12,9 +15,55 @@ pub(crate) struct Labelled {
     pub width: usize,
 }
 
+/// How wide the numbers behind each label of a file are, and where that was first seen.
+#[derive(Default)]
+pub(crate) struct Widths {
+    of: Vec<(String, isize, Place)>,
+    /// Labels come in the same order in every state.
+    next: usize,
+}
+
+/// Labels whose widths are noted; real files have about thirty.
+const MAX_LABELS: usize = 1_000;
+
+impl Widths {
+    /// Whether a number that is so much wider than usual can be that of the label. If it is as wide as usual and the
+    /// first was not, that one is said.
+    pub(crate) fn allow(
+        &mut self,
+        label: &str,
+        excess: isize,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> bool {
+        let is_it = |at: &usize| self.of.get(*at).is_some_and(|of| of.0 == label);
+        let hint = Some(self.next).filter(is_it);
+        let Some(at) = hint.or_else(|| self.of.iter().position(|of| of.0 == label)) else {
+            if self.of.len() < MAX_LABELS {
+                self.of.push((label.to_string(), excess, line.into()));
+            }
+            return true;
+        };
+        self.next = (at + 1) % self.of.len();
+        let (_, known, place) = &mut self.of[at];
+        if excess == 0 && *known != 0 {
+            let message =
+                format!("the number of \"{label}\" is not as wide as those below: was it cut?");
+            states.problems.add(ProblemCode::BadLine, Some(*place), None, message);
+            *known = 0;
+        }
+        excess == *known
+    }
+}
+
 /// First and last column of every component's number; `None` for labels that the line does
 /// not have. `None` for the row if something else than one number stands behind a label.
-pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<(usize, usize)>>> {
+pub(crate) fn fields(
+    line: &Line<'_>,
+    labels: &[Labelled],
+    widths: &mut Widths,
+    states: &mut StateReader<'_>,
+) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
     let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
@@ -45,6 +94,10 @@ pub(crate) fn fields(line: &Line<'_>, labels: &[Labelled]) -> Option<Vec<Option<
         if let Some(k) = known {
             let to = from + value.len();
             if !is_number(value, labels[k].width) {
+                return None;
+            }
+            let excess = value.len() as isize - labels[k].width as isize;
+            if !widths.allow(labels[k].label, excess, line, states) {
                 return None;
             }
             fields[k] = Some((from + 1, to));
@@ -112,11 +165,14 @@ pub(crate) const fn labelled(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::Selection;
 
     fn values(text: &str) -> Option<Vec<Option<String>>> {
         let labels = [labelled("a", "x=", 10), labelled("b", "y=", 10)];
         let line = Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
-        let fields = fields(&line, &labels)?;
+        let selection = Selection::all();
+        let mut states = StateReader::new(&selection);
+        let fields = fields(&line, &labels, &mut Widths::default(), &mut states)?;
         let of = |field: &Option<(usize, usize)>| {
             field.map(|(from, to)| text[from - 1..to].trim().to_string())
         };
@@ -132,6 +188,24 @@ mod tests {
         assert_eq!(values(" y= -2.50E+00 x=  1.50E+00"), both, "in any order");
         assert_eq!(values(" x=  1.50E+00 set = 145"), Some(vec![a, None]));
         assert_eq!(values(" x=********** y= -2.50E+00"), Some(vec![Some("*".repeat(10)), b]));
+    }
+
+    #[test]
+    fn a_number_that_lost_digits_among_whole_ones_is_cut() {
+        let (mut widths, selection) = (Widths::default(), Selection::all());
+        let mut states = StateReader::new(&selection);
+        let mut read = |text: &str| {
+            let line =
+                Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
+            let labels = [labelled("a", "x=", 10)];
+            fields(&line, &labels, &mut widths, &mut states).is_some()
+        };
+        assert!(read(" x= 1.50E+00"), "another release's width");
+        assert!(read(" x= 2.50E+00"));
+        assert!(read(" x=  1.50E+00"), "the usual one");
+        assert!(!read(" x= 1.50E+00"));
+        assert!(read(" x= -1.50E+00"));
+        assert_eq!(states.problems.into_list().len(), 1, "the first is said");
     }
 
     #[test]

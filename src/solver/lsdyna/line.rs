@@ -133,8 +133,18 @@ pub(crate) enum Field {
 /// Reads one Fortran real: the whole field, blanks around it allowed, nothing else.
 ///
 /// Accepts what solvers write beyond C's syntax: `1.5D+00`, and exponents whose `E`
-/// was dropped to make room (`-1.5000-345`, `0.00+00`).
+/// was dropped to make room (`-1.5000-345`, `0.00+00`). Fortran prints no exponent without a point: of
+/// `192E+09` the beginning is missing.
 pub(crate) fn real(field: &[u8]) -> Field {
+    let text = field.trim_ascii();
+    match free_real(text) {
+        Field::Real(_) if !text.contains(&b'.') && integer(text).is_none() => Field::Bad,
+        read => read,
+    }
+}
+
+/// The same for what people write: `5E5` is a number, too.
+pub(crate) fn free_real(field: &[u8]) -> Field {
     let text = field.trim_ascii();
     let plain = match text {
         [] => return Field::Bad,
@@ -253,6 +263,10 @@ mod tests {
         t("\0\0\0", Field::Bad);
         t("-", Field::Bad);
         t("0x10", Field::Bad);
+        t("  192E+09", Field::Bad); // 1.71192E+09 that was cut
+        t("192+09", Field::Bad);
+        t(" 12", Field::Real(12.0));
+        assert_eq!(free_real(b"192E+09"), Field::Real(192e9));
     }
 
     #[test]

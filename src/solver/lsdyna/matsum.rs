@@ -1,14 +1,18 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
+use super::ascii::Skipped;
 use super::ascii::{self, Body};
-use super::label_values::{Labelled, fields, labelled};
+use super::label_values::{Labelled, Widths, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
+use crate::solver::problem::Place;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" time =";
 const PART: &[u8] = b" mat.#=";
+/// Begins what may stand below the parts.
+const BELOW: &[u8] = b"Maximum mass increase";
 /// Width of every number, right behind its label.
 const WIDTH: usize = 13;
 
@@ -60,6 +64,8 @@ pub(crate) const FORMAT: Format =
 struct Matsum {
     tables: Option<[TableId; 4]>,
     part: Option<i64>,
+    widths: Widths,
+    skipped: Skipped,
 }
 
 impl Body for Matsum {
@@ -95,8 +101,11 @@ impl Body for Matsum {
         }
         match (found, self.part) {
             (Some(index), Some(part)) => self.values(index, part, line, states),
-            // "Maximum mass increase in …" and the like, below the parts.
-            (None, _) if line.is_heading() && !text.starts_with(PART) => {}
+            (None, _) if line.is_heading() && !text.starts_with(PART) => {
+                if !text.trim_ascii_start().starts_with(BELOW) {
+                    self.skipped.add(line);
+                }
+            }
             _ => states.damage(
                 line,
                 None,
@@ -108,6 +117,10 @@ impl Body for Matsum {
     fn interrupt(&mut self) {
         self.part = None;
     }
+
+    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
+        self.skipped.tell(states);
+    }
 }
 
 impl Matsum {
@@ -118,7 +131,7 @@ impl Matsum {
                 states.table(name, &components)
             })
         });
-        let Some(fields) = fields(line, LINES[index].1) else {
+        let Some(fields) = fields(line, LINES[index].1, &mut self.widths, states) else {
             states.damage(line, None, "expected labels and their numbers".into());
             return;
         };

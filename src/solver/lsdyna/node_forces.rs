@@ -2,7 +2,7 @@
 //! print them: `nd#  200034  xforce=… yforce=… zforce=… energy=…`, then `xtotal=…`.
 
 use super::ascii::Body;
-use super::label_values::{Labelled, components, fields, labelled};
+use super::label_values::{Labelled, Widths, components, fields, labelled};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::problem::ProblemCode;
@@ -55,6 +55,9 @@ pub(crate) struct NodeForces {
     blocks: Vec<Block>,
     current: Option<usize>,
     body: Option<i64>,
+    /// Behind a heading: a row that the state already has is the first of the next one.
+    begins: bool,
+    widths: Widths,
 }
 
 struct Block {
@@ -64,7 +67,8 @@ struct Block {
 
 impl NodeForces {
     pub(crate) fn new(layout: &'static Layout) -> Self {
-        Self { layout, blocks: Vec::new(), current: None, body: None }
+        let widths = Widths::default();
+        Self { layout, blocks: Vec::new(), current: None, body: None, begins: false, widths }
     }
 
     /// What the names of the block's components begin with.
@@ -111,18 +115,22 @@ impl NodeForces {
         let from = memchr::memchr(b'#', text)? + 1;
         let to = memchr::memmem::find(text, ID)?;
         let id = integer(text.get(from..to)?)?;
-        let fields = fields(line, &ROW)?;
+        let fields = fields(line, &ROW, &mut self.widths, states)?;
         if fields[..4].iter().any(Option::is_none) {
             return None;
         }
         let [table, _] = self.tables(states)?;
         self.body = Some(id);
-        states.row(table, EntityId::new(id), line, |k| fields[k]);
+        let entity = EntityId::new(id);
+        if std::mem::take(&mut self.begins) && states.has_row(table, entity) {
+            states.begin(states.pending_time(), line.into());
+        }
+        states.row(table, entity, line, |k| fields[k]);
         Some(())
     }
 
     fn moments(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
-        let fields = fields(line, &MOMENTS)?;
+        let fields = fields(line, &MOMENTS, &mut self.widths, states)?;
         let id = self.body?;
         if fields.iter().any(Option::is_none) {
             return None;
@@ -133,7 +141,7 @@ impl NodeForces {
     }
 
     fn totals(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
-        let fields = fields(line, &TOTALS)?;
+        let fields = fields(line, &TOTALS, &mut self.widths, states)?;
         let prefix = self.prefix(self.current?);
         for (label, field) in TOTALS.iter().zip(fields) {
             let Some((from, to)) = field else { continue };
@@ -153,6 +161,7 @@ impl Body for NodeForces {
         }
         let done = if text.starts_with(self.layout.state) {
             self.current = None;
+            self.begins = true;
             let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
             match at.map(|at| real(&text[at..])) {
                 // Every kind of boundary condition has a heading of its own at one time.

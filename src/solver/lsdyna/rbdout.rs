@@ -3,7 +3,7 @@
 //! Never seen with data; read as the source of LSTC's converter `l2a` writes it.
 
 use super::ascii::{self, Body};
-use super::label_values::numbers;
+use super::label_values::{Widths, numbers};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -53,6 +53,7 @@ struct Rbdout {
     tables: Option<Vec<[TableId; 2]>>,
     body: Option<EntityId>,
     is_local: bool,
+    widths: Widths,
 }
 
 impl Body for Rbdout {
@@ -111,6 +112,11 @@ impl Rbdout {
         }
         let from = text.len() - start.len() + label.len();
         let fields = numbers(line, from, text.len(), components.len(), width)?;
+        let usual = components.len() * width;
+        let excess = (text.len() - from) as isize - usual as isize;
+        if !self.widths.allow(components[0], excess, line, states) {
+            return None;
+        }
         let table = tables[index][usize::from(self.is_local)];
         states.row(table, self.body?, line, |k| fields.get(k).copied());
         Some(())

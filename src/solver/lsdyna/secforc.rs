@@ -56,9 +56,16 @@ impl Secforc {
             LINES.each_ref().map(|(name, components)| states.table(name, components))
         });
         let width = FIELDS[FIELDS.len() - 1].1;
+        // The second line names a system there, the third has blanks.
+        let label = line.columns(ID.0, TIME.1).trim_ascii();
+        let found = match label.first() {
+            None => 2,
+            Some(first) if first.is_ascii_alphabetic() => 1,
+            Some(_) => 0,
+        };
         let head = match (self.section, real(line.columns(TIME.0, TIME.1))) {
-            (Some((id, seen)), _) if seen < LINES.len() => Some((id, seen, None)),
-            (_, Field::Real(time)) => {
+            (Some((id, seen)), _) if seen == found => Some((id, seen, None)),
+            (_, Field::Real(time)) if found == 0 => {
                 integer(line.columns(ID.0, ID.1)).map(|id| (id, 0, Some(time)))
             }
             _ => None,

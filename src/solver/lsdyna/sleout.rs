@@ -1,7 +1,7 @@
 //! `sleout`: energies of contact interfaces, one row each, and their sums.
 
 use super::ascii::{self, Body};
-use super::label_values::numbers;
+use super::label_values::{Widths, numbers};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -37,6 +37,7 @@ struct Sleout {
     table: Option<TableId>,
     /// Width of the widest row: with friction all rows have it.
     width: usize,
+    widths: Widths,
 }
 
 impl Body for Sleout {
@@ -69,6 +70,10 @@ impl Sleout {
                 return None;
             }
             let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
+            let excess = (text.len() - from) as isize - SUM_WIDTH as isize;
+            if !self.widths.allow(name, excess, line, states) {
+                return None;
+            }
             states.scalar(name, line.columns(first, last), line, [first, last]);
             return Some(());
         }

@@ -3,7 +3,7 @@
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
 use super::ascii::{self, Body};
-use super::label_values::numbers;
+use super::label_values::{Widths, numbers};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -40,6 +40,7 @@ struct Spcforc {
     tables: Vec<[TableId; 2]>,
     /// Rows of each node in the pending state: one for each set of constraints it is in.
     rows: HashMap<i64, [usize; 2]>,
+    widths: Widths,
 }
 
 impl Body for Spcforc {
@@ -72,6 +73,11 @@ impl Spcforc {
         let set_id = memchr::memmem::find(text, SET_ID);
         let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
         let fields = numbers(line, from, end, 3, WIDTH)?;
+        let what = if kind.is_some() { "forces or moments" } else { "force resultants" };
+        let excess = end as isize - (from + 3 * WIDTH) as isize;
+        if !self.widths.allow(what, excess, line, states) {
+            return None;
+        }
         let Some(kind) = kind else {
             if !(set_id.is_none() && text[..at].trim_ascii().is_empty()) {
                 return None;

@@ -1,7 +1,7 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
 use super::ascii::{self, Body};
-use super::label_values::{is_number, numbers};
+use super::label_values::{Widths, is_number, numbers};
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -33,6 +33,7 @@ pub(crate) const FORMAT: Format =
 #[derive(Default)]
 struct Swforc {
     kinds: Vec<(Vec<u8>, TableId)>,
+    widths: Widths,
 }
 
 impl Body for Swforc {
@@ -79,10 +80,15 @@ impl Swforc {
                 vec![(from + 1, end)]
             }
             None => {
+                let length = text.len() - rest;
                 let words = text[rest..].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
                 let columns = (text.len() - rest).is_multiple_of(WIDTH);
                 let count = if columns { (text.len() - rest) / WIDTH } else { words.count() };
                 if count > 3 {
+                    return None;
+                }
+                let excess = length as isize - (count * WIDTH) as isize;
+                if count > 0 && !self.widths.allow("weld", excess, line, states) {
                     return None;
                 }
                 numbers(line, rest, text.len(), count, WIDTH)?

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use super::{INTERFACE, NODES, RIGID_WALL, SECTION};
+use super::variables::{PART, SUBSET};
 use crate::solver::source::Stream;
 
 /// A record of the header is at most this long; a state's may be as long as the file.
@@ -59,20 +59,25 @@ impl<'a> Records<'a> {
 /// Bytes of the length before and behind each record.
 pub(crate) const FRAME: u64 = 4;
 
-/// A group of histories.
+/// A group of histories: objects with the same variables.
 pub(crate) struct Group {
     pub kind: i32,
     pub objects: Vec<(i64, Option<String>)>,
     pub codes: Vec<i32>,
+    /// Where its values are in a state: the record, and the first of them in it.
+    pub record: usize,
+    pub start: usize,
 }
 
+#[derive(Default)]
 pub(crate) struct Header {
     pub title: Option<String>,
     pub solver: Option<String>,
     pub globals: usize,
-    pub part_values: usize,
-    pub subset_values: usize,
+    /// Those of the file, then parts and subsets.
     pub groups: Vec<Group>,
+    /// Lengths of a state's records in bytes: time, globals, parts, subsets, groups.
+    pub lengths: Vec<usize>,
 }
 
 fn integers(record: &[u8]) -> Vec<i32> {
@@ -120,24 +125,50 @@ impl Header {
         if globals > 0 && !skip(records, 1)? {
             return Ok(None);
         }
-        let Some(part_values) = part_values(records, parts, title_length)? else { return Ok(None) };
+        let Some(of_parts) = parts_of(records, parts, title_length)? else { return Ok(None) };
         if !skip(records, materials + properties)? {
             return Ok(None);
         }
-        let Some(subset_values) = subset_values(records, subsets)? else { return Ok(None) };
-        let mut read = Vec::new();
-        for _ in 0..groups {
-            let Some(group) = Group::read(records)? else { return Ok(None) };
-            read.push(group);
-        }
-        Ok(Some(Self {
+        let Some(of_subsets) = subsets_of(records, subsets)? else { return Ok(None) };
+        let mut header = Self {
             title: text(first.get(4..).unwrap_or_default()),
             solver: text(&solver),
             globals,
-            part_values,
-            subset_values,
-            groups: read,
-        }))
+            groups: Vec::new(),
+            lengths: vec![4],
+        };
+        if globals > 0 {
+            header.lengths.push(4 * globals);
+        }
+        let mut of_model = Vec::new();
+        for kind in [of_parts, of_subsets] {
+            let words: usize = kind.iter().map(|group| group.codes.len()).sum();
+            let record = header.lengths.len();
+            header.lengths.extend((words > 0).then_some(4 * words));
+            let mut start = 0;
+            for group in kind {
+                let words = group.codes.len();
+                of_model.push(Group { record, start, ..group });
+                start += words;
+            }
+        }
+        for _ in 0..groups {
+            let Some(group) = Group::read(records)? else { return Ok(None) };
+            let record = header.lengths.len();
+            header.lengths.push(4 * group.objects.len() * group.codes.len());
+            header.groups.push(Group { record, ..group });
+        }
+        header.groups.extend(of_model);
+        Ok(Some(header))
+    }
+
+    /// Whether a state has the same values of the same objects as one below the other header.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.lengths == other.lengths
+            && self.groups.iter().zip(&other.groups).all(|(a, b)| {
+                let ids = |group: &Group| group.objects.iter().map(|o| o.0).collect::<Vec<_>>();
+                a.kind == b.kind && a.codes == b.codes && ids(a) == ids(b)
+            })
     }
 }
 
@@ -151,47 +182,70 @@ fn skip(records: &mut Records<'_>, count: usize) -> io::Result<bool> {
     Ok(true)
 }
 
-/// Values that a state has of all parts.
-fn part_values(
+/// The parts that have values.
+fn parts_of(
     records: &mut Records<'_>,
     parts: usize,
     title_length: usize,
-) -> io::Result<Option<usize>> {
-    let mut values = 0;
+) -> io::Result<Option<Vec<Group>>> {
+    let mut found = Vec::new();
     for _ in 0..parts {
         // Id, title, four integers: the last is the number of history variables.
         let Some(part) = records.header()? else { return Ok(None) };
         let tail = integers(part.get(4 + title_length..).unwrap_or_default());
         let Some(variables) = count(tail.get(3)) else { return Ok(None) };
-        values += variables;
-        if variables > 0 && records.header()?.is_none() {
-            return Ok(None);
+        let title = part.get(4..4 + title_length).unwrap_or_default();
+        if variables > 0 {
+            let Some(codes) = records.header()? else { return Ok(None) };
+            let Some(group) = Group::of_one(PART, &part, title, &codes, variables) else {
+                return Ok(None);
+            };
+            found.push(group);
         }
     }
-    Ok(Some(values))
+    Ok(Some(found))
 }
 
-/// Values that a state has of all subsets.
-fn subset_values(records: &mut Records<'_>, subsets: usize) -> io::Result<Option<usize>> {
-    let mut values = 0;
+/// The subsets that have values.
+fn subsets_of(records: &mut Records<'_>, subsets: usize) -> io::Result<Option<Vec<Group>>> {
+    let mut found = Vec::new();
     for _ in 0..subsets {
         // Id, parent, number of child subsets, of parts, of variables, title.
         let Some(subset) = records.header()? else { return Ok(None) };
         let head = integers(subset.get(..20).unwrap_or_default());
         for k in 2..5 {
             let Some(number) = count(head.get(k)) else { return Ok(None) };
-            if k == 4 {
-                values += number;
+            if number == 0 {
+                continue;
             }
-            if number > 0 && records.next()?.is_none() {
-                return Ok(None);
+            let Some(codes) = records.next()? else { return Ok(None) };
+            if k == 4 {
+                let title = subset.get(20..).unwrap_or_default();
+                let Some(group) = Group::of_one(SUBSET, &subset, title, &codes, number) else {
+                    return Ok(None);
+                };
+                found.push(group);
             }
         }
     }
-    Ok(Some(values))
+    Ok(Some(found))
 }
 
 impl Group {
+    /// A part or a subset, whose record begins with its id.
+    fn of_one(
+        kind: i32,
+        record: &[u8],
+        title: &[u8],
+        codes: &[u8],
+        variables: usize,
+    ) -> Option<Self> {
+        let id = i64::from(*integers(record.get(..4)?).first()?);
+        let codes = integers(codes);
+        let objects = vec![(id, text(title))];
+        (codes.len() == variables).then_some(Self { kind, objects, codes, record: 0, start: 0 })
+    }
+
     pub(crate) fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
         // Id, type, one integer, number of objects, number of variables, title.
         let Some(head) = records.header()? else { return Ok(None) };
@@ -217,24 +271,15 @@ impl Group {
             },
         };
         if codes.len() == variables {
-            Ok(Some(Self { kind, objects: named, codes }))
+            Ok(Some(Self { kind, objects: named, codes, record: 0, start: 0 }))
         } else {
             Ok(None)
         }
     }
 
-    pub(crate) fn section(&self) -> Option<&'static str> {
-        match self.kind {
-            NODES => Some("nodout"),
-            INTERFACE => Some("rcforc"),
-            RIGID_WALL => Some("rwforc"),
-            SECTION => Some("secforc"),
-            _ => None,
-        }
-    }
-
-    /// Position of a variable's code among an object's values.
-    pub(crate) fn position(&self, code: usize) -> Option<usize> {
-        self.codes.iter().position(|&c| usize::try_from(c) == Ok(code))
+    /// Where the value of a variable of its `object`-th object is in a state: the record, and the place in it.
+    pub(crate) fn place(&self, object: usize, code: i32) -> Option<(usize, usize)> {
+        let at = self.codes.iter().position(|&c| c == code)?;
+        Some((self.record, self.start + object * self.codes.len() + at))
     }
 }

@@ -2,37 +2,29 @@
 //!
 //! Its groups are given as the sections of LS-DYNA that hold the same: nodes as `nodout`,
 //! rigid walls as `rwforc`, contact interfaces as `rcforc`, cross sections as `secforc` (never
-//! seen in a file), global variables as `glstat`. T01 stores the *impulse* of walls, contacts
-//! and sections; the forces here are its central difference over time (one-sided at both
+//! seen in a file), rigid bodies as `rbdout`, springs as `deforc`, parts as `matsum`, global variables as
+//! `glstat`; other groups have sections of their own (`variables`). T01 stores the *impulse* of walls, contacts,
+//! sections and rigid bodies; the forces here are its central difference over time (one-sided at both
 //! ends), means over two output intervals.
 //!
 //! All states of a T01 have one length, so a damaged state is passed over and the next one is found. The file has no
-//! check sums.
+//! check sums. A restart goes on in `T02`, with the impulses of `T01`: both are one record.
 
 mod header;
 mod states;
+mod variables;
 
 use std::io;
 use std::sync::Arc;
 
 use super::format::Format;
-use super::lsdyna::nodout::TRANSLATIONS;
 use super::problem::{Problem, ProblemCode};
 use super::source::{Source, Stream};
 use super::{Selection, SolverFile};
-use crate::history::{EntityId, History, Side};
-use crate::signal::derivative;
+use crate::history::{EntityId, History};
 use header::{Header, Records};
 use states::StateReader;
 
-/// Types of history groups that are read.
-const NODES: i32 = 0;
-const INTERFACE: i32 = 101;
-const RIGID_WALL: i32 = 102;
-const SECTION: i32 = 104;
-
-/// Node variables by code, from 1: those of a nodout without its coordinates.
-const NODE_COMPONENTS: &[&str] = TRANSLATIONS.split_at(9).0;
 /// Global variables in their order, named as in `glstat` where it has them.
 const GLOBAL_COMPONENTS: [&str; 22] = [
     "internal_energy",
@@ -58,10 +50,6 @@ const GLOBAL_COMPONENTS: [&str; 22] = [
     "inlet_energy",
     "outlet_energy",
 ];
-/// Components made from the impulses FNX FNY FNZ FTX FTY FTZ (codes 1 to 6).
-const FORCE_COMPONENTS: [&str; 3] = ["x_force", "y_force", "z_force"];
-const IMPULSES: usize = 6;
-
 pub(crate) const FORMAT: Format = Format::binary("t01", recognises, read);
 
 /// Whether a file begins like a T01: a record of a code and a title of 80 characters.
@@ -73,9 +61,8 @@ fn recognises(head: &[u8]) -> bool {
 
 /// Reads the selected histories of every section, or of the one selected.
 fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
-    let Some(source) = parts.first() else { return Ok(Vec::new()) };
-    let input = Stream::new(&**source);
-    let mut records = Records::new(input);
+    let Some((first, restarts)) = parts.split_first() else { return Ok(Vec::new()) };
+    let mut records = Records::new(Stream::new(&**first));
     let Some(header) = Header::read(&mut records)? else {
         let message = format!("the header is damaged or cut at byte {}", records.position());
         let file = SolverFile {
@@ -86,69 +73,18 @@ fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<Solv
     };
     let mut states = StateReader::new(&header, selection);
     states.read(&header, &mut records)?;
-    Ok(states.finish(&header, selection))
-}
-
-/// Names of an object in its section: both sides of an interface.
-fn entities(section: &str, id: i64) -> Vec<EntityId> {
-    match section {
-        "rcforc" => {
-            [Side::SurfA, Side::SurfB].map(|side| EntityId { id, side: Some(side) }).to_vec()
+    for (k, part) in restarts.iter().enumerate() {
+        let mut records = Records::new(Stream::new(&**part));
+        match Header::read(&mut records)? {
+            Some(own) if own.is_like(&header) => states.read(&header, &mut records)?,
+            own => {
+                let what = if own.is_some() { "holds other histories" } else { "is damaged" };
+                states.end_before(k + 2, what);
+                break;
+            }
         }
-        _ => vec![EntityId::new(id)],
     }
-}
-
-/// The component that is the size of a force, where the section has one.
-fn magnitude(section: &str) -> &'static [&'static str] {
-    match section {
-        "rwforc" => &["normal_force"],
-        "secforc" => &["total_force"],
-        _ => &[],
-    }
-}
-
-/// The histories of one object from its variables by code.
-fn histories(
-    section: &str,
-    entity: EntityId,
-    own: &[(usize, Vec<f64>)],
-    time: &Arc<[f64]>,
-) -> Vec<History> {
-    if section == "nodout" {
-        let component = |code: usize| NODE_COMPONENTS.get(code.wrapping_sub(1));
-        return own
-            .iter()
-            .filter_map(|(code, values)| {
-                Some(history(Some(entity), component(*code)?, values.clone(), time))
-            })
-            .collect();
-    }
-    let impulse = |code: usize| own.iter().find(|(c, _)| *c == code).map(|(_, v)| v);
-    let all: Option<Vec<&Vec<f64>>> = (1..=IMPULSES).map(impulse).collect();
-    let Some(all) = all.filter(|_| time.len() > 1) else { return Vec::new() };
-    // SURFB feels the opposite of what T01 writes for the interface.
-    let sign = if entity.side == Some(Side::SurfB) { -1.0 } else { 1.0 };
-    let rate = |values: &[f64]| derivative(time, values);
-    let normal: Vec<Vec<f64>> = (0..3).map(|k| rate(all[k])).collect();
-    let mut made = Vec::new();
-    let total: Vec<Vec<f64>> = (0..3)
-        .map(|k| {
-            let tangential = rate(all[k + 3]);
-            normal[k].iter().zip(tangential).map(|(n, t)| sign * (n + t)).collect()
-        })
-        .collect();
-    for &component in magnitude(section) {
-        // A wall's normal force, but the whole force of a section.
-        let of = if section == "rwforc" { &normal } else { &total };
-        let length = |i: usize| of.iter().map(|n| n[i] * n[i]).sum::<f64>().sqrt();
-        let values = (0..time.len()).map(length).collect();
-        made.push(history(Some(entity), component, values, time));
-    }
-    for (component, values) in FORCE_COMPONENTS.into_iter().zip(total) {
-        made.push(history(Some(entity), component, values, time));
-    }
-    made
+    Ok(states.finish(&header, selection))
 }
 
 fn history(
@@ -173,12 +109,8 @@ fn empty(section: &str) -> SolverFile {
         time: Arc::new([]),
         histories: Vec::new(),
         problems: Vec::new(),
-        notes: match section {
-            "rwforc" | "rcforc" | "secforc" => vec![DIFFERENTIATED.into()],
-            _ => Vec::new(),
-        },
+        notes: Vec::new(),
     }
 }
 
-const DIFFERENTIATED: &str =
-    "forces are the central difference of T01's impulses, a mean over two output intervals";
+const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so that the last force changes where the record goes on";

@@ -1,23 +1,35 @@
 //! The states of a T01: kept values, damage, and the histories made of them.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use super::header::{FRAME, Group, Header, Records};
-use super::{
-    FORCE_COMPONENTS, GLOBAL_COMPONENTS, IMPULSES, NODE_COMPONENTS, empty, entities, histories,
-    history, magnitude,
-};
-use crate::history::{EntityId, Side};
-use crate::solver::problem::{Diagnostics, Place, ProblemCode};
+use super::header::{FRAME, Header, Records};
+use super::variables::{Component, Made, components, entities, is_normal_only, section, variable};
+use super::{DIFFERENTIATED, GLOBAL_COMPONENTS, empty, history};
+use crate::history::{EntityId, History, Side};
+use crate::signal::derivative;
+use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 use crate::solver::{Entity, Selection, SolverFile};
 
-/// One value per state of one object's variable.
+/// One value per state.
 struct Channel {
+    record: usize,
     offset: usize,
     values: Vec<f64>,
+}
+
+/// An object: the variables of one may be spread over several groups.
+struct Object {
+    kind: i32,
+    id: i64,
+    title: Option<String>,
+    /// Its groups, and its place among the objects of each.
+    places: Vec<(usize, usize)>,
+    components: Arc<[Component]>,
+    /// The channel of each variable that is kept.
+    channels: HashMap<i32, usize>,
 }
 
 /// Values next to each other that a node loses for one state when it stands on a wall: its
@@ -27,80 +39,125 @@ const STANDING: usize = 6;
 /// The states, of selected values only.
 pub(crate) struct StateReader {
     time: Vec<f64>,
-    globals: Vec<Channel>,
-    /// Channels per group, in order of the offsets asked for.
-    groups: Vec<Vec<Channel>>,
-    /// Lengths of a state's records in bytes: time, globals, parts, subsets, groups.
+    /// Of the globals that are kept, then of the objects.
+    channels: Vec<Channel>,
+    globals: usize,
+    objects: Vec<Object>,
+    /// Lengths of a state's records in bytes.
     lengths: Vec<usize>,
-    first_group: usize,
     /// Where each kept state begins.
     starts: Vec<u64>,
     /// Kept values that are not finite numbers.
     not_finite: usize,
+    /// Whether the end of the file cuts a state.
+    is_cut: bool,
     /// What was found to be wrong on the way.
     problems: Diagnostics,
 }
 
-/// The channels of a group's selected objects and variables.
-fn channels_of(group: &Group, section: &str, selection: &Selection) -> Vec<Channel> {
-    let wants = |component: &str| selection.wants_component(component);
-    let codes: Vec<usize> = match section {
-        "nodout" => {
-            (1..=NODE_COMPONENTS.len()).filter(|&code| wants(NODE_COMPONENTS[code - 1])).collect()
+/// The objects of all groups, each once, with what they have.
+fn objects_of(header: &Header) -> Vec<Object> {
+    let mut objects: Vec<Object> = Vec::new();
+    let mut index: HashMap<(i32, i64), usize> = HashMap::new();
+    for (group, of) in header.groups.iter().enumerate() {
+        let kind = of.kind;
+        for (k, (id, title)) in of.objects.iter().enumerate() {
+            let at = *index.entry((kind, *id)).or_insert_with(|| {
+                let (title, components) = (title.clone(), Arc::new([]) as Arc<[Component]>);
+                let (places, channels) = (Vec::new(), HashMap::new());
+                objects.push(Object { kind, id: *id, title, places, components, channels });
+                objects.len() - 1
+            });
+            objects[at].places.push((group, k));
         }
-        _ if magnitude(section).iter().chain(&FORCE_COMPONENTS).any(|c| wants(c)) => {
-            (1..=IMPULSES).collect()
+    }
+    // Most objects have the groups of the one above.
+    let mut last: (Vec<usize>, Arc<[Component]>) = (Vec::new(), Arc::new([]));
+    for object in &mut objects {
+        let groups: Vec<usize> = object.places.iter().map(|place| place.0).collect();
+        if groups != last.0 {
+            last = (groups, components(object.kind, &object.codes(header)).into());
         }
-        _ => Vec::new(),
-    };
-    let positions: Vec<usize> = codes.iter().filter_map(|&code| group.position(code)).collect();
-    let sides = [None, Some(Side::SurfA), Some(Side::SurfB)];
-    let wanted = |id: i64| sides.into_iter().any(|side| selection.wants(EntityId { id, side }));
-    let objects = group.objects.iter().enumerate().filter(|(_, object)| wanted(object.0));
+        object.components = last.1.clone();
+    }
     objects
-        .flat_map(|(k, _)| {
-            let channel =
-                move |p: &usize| Channel { offset: k * group.codes.len() + p, values: Vec::new() };
-            positions.iter().map(channel)
-        })
-        .collect()
+}
+
+impl Object {
+    /// The codes of its variables, each once.
+    fn codes(&self, header: &Header) -> Vec<i32> {
+        let mut seen = HashSet::new();
+        let all = self.places.iter().flat_map(|&(group, _)| &header.groups[group].codes);
+        all.copied().filter(|code| seen.insert(*code)).collect()
+    }
+
+    fn is_wanted(&self, selection: &Selection) -> bool {
+        let is_here = selection.section.as_ref().is_none_or(|s| *s == section(self.kind));
+        is_here && entities(self.kind, self.id).iter().any(|entity| selection.wants(*entity))
+    }
+
+    /// A component's values.
+    fn values(&self, made: &Made, channels: &[Channel], time: &[f64], sign: f64) -> Vec<f64> {
+        let of = |code: &i32| &channels[self.channels[code]].values;
+        let rate = |codes: &Vec<i32>| {
+            let rates = codes.iter().map(|code| derivative(time, of(code)));
+            let sum = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(b).map(|(a, b)| a + b).collect();
+            rates.reduce(sum).unwrap_or_default()
+        };
+        match made {
+            Made::Value(code) => of(code).clone(),
+            Made::Rate(codes) => rate(codes).into_iter().map(|force| sign * force).collect(),
+            Made::Size(axes) => {
+                let [x, y, z] = axes.each_ref().map(rate);
+                let of_state = |i: usize| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+                (0..time.len()).map(of_state).collect()
+            }
+        }
+    }
 }
 
 impl StateReader {
     pub(crate) fn new(header: &Header, selection: &Selection) -> Self {
-        let wants_section = |name: &str| selection.section.as_ref().is_none_or(|s| s == name);
-        let channel = |offset| Channel { offset, values: Vec::new() };
-        let globals = GLOBAL_COMPONENTS
+        let wants_globals = selection.section.as_ref().is_none_or(|s| s == "glstat");
+        let mut channels: Vec<Channel> = GLOBAL_COMPONENTS
             .iter()
             .enumerate()
             .take(header.globals)
-            .filter(|(_, name)| wants_section("glstat") && selection.wants_component(name))
-            .map(|(k, _)| channel(k))
+            .filter(|(_, name)| wants_globals && selection.wants_component(name))
+            .map(|(offset, _)| Channel { record: 1, offset, values: Vec::new() })
             .collect();
-        let groups = header
-            .groups
-            .iter()
-            .map(|group| match group.section().filter(|s| wants_section(s)) {
-                Some(section) => channels_of(group, section, selection),
-                None => Vec::new(),
-            })
-            .collect();
-        let mut lengths = vec![4];
-        lengths.extend([header.globals].iter().filter(|&&n| n > 0).map(|n| 4 * n));
-        lengths.extend([header.part_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
-        lengths.extend([header.subset_values].iter().filter(|&&n| n > 0).map(|n| 4 * n));
-        let first_group = lengths.len();
-        lengths.extend(header.groups.iter().map(|g| 4 * g.objects.len() * g.codes.len()));
+        let globals = channels.len();
+        let mut objects = objects_of(header);
+        for object in objects.iter_mut().filter(|object| object.is_wanted(selection)) {
+            let wanted = object.components.iter().filter(|c| selection.wants_component(&c.name));
+            for code in wanted.flat_map(|component| component.made.codes()) {
+                let mut places = object.places.iter();
+                let place = places.find_map(|&(group, k)| header.groups[group].place(k, code));
+                let Some((record, offset)) = place else { continue };
+                object.channels.entry(code).or_insert_with(|| {
+                    channels.push(Channel { record, offset, values: Vec::new() });
+                    channels.len() - 1
+                });
+            }
+        }
         Self {
             time: Vec::new(),
+            channels,
             globals,
-            groups,
-            lengths,
-            first_group,
+            objects,
+            lengths: header.lengths.clone(),
             starts: Vec::new(),
             not_finite: 0,
+            is_cut: false,
             problems: Diagnostics::default(),
         }
+    }
+
+    /// Says that the record ends before its `number`-th file, and why.
+    pub(crate) fn end_before(&mut self, number: usize, what: &str) {
+        let message =
+            format!("T{number:02}, which goes on, {what}: it is not read, nor what follows");
+        self.problems.add(ProblemCode::UnreadRows, None, None, message);
     }
 
     /// Bytes of one state.
@@ -138,6 +195,7 @@ impl StateReader {
             }
             start += self.stride();
         }
+        self.is_cut |= damaged.is_some();
         self.leave_out(damaged, number + 1);
         self.look_for_zeros(header, &above, None);
         if self.not_finite > 0 {
@@ -201,19 +259,17 @@ impl StateReader {
 
     /// What the `word`-th value of a state's record is.
     fn name(&self, header: &Header, record: usize, word: usize) -> String {
-        let Some(group) = record.checked_sub(self.first_group).map(|k| &header.groups[k]) else {
+        let group = header.groups.iter().find(|group| {
+            let values = group.objects.len() * group.codes.len();
+            group.record == record && (group.start..group.start + values).contains(&word)
+        });
+        let Some(group) = group else {
             let global = GLOBAL_COMPONENTS.get(word).filter(|_| record == 1 && header.globals > 0);
             return global.map_or(format!("value {}", word + 1), std::string::ToString::to_string);
         };
-        let width = group.codes.len().max(1);
-        let id = group.objects.get(word / width).map_or(0, |(id, _)| *id);
-        let code = usize::try_from(group.codes[word % width]).unwrap_or(0);
-        match group.section() {
-            Some("nodout") if (1..=NODE_COMPONENTS.len()).contains(&code) => {
-                format!("{}[{id}]", NODE_COMPONENTS[code - 1])
-            }
-            section => format!("variable {code} of {} {id}", section.unwrap_or("object")),
-        }
+        let (at, width) = (word - group.start, group.codes.len().max(1));
+        let id = group.objects.get(at / width).map_or(0, |(id, _)| *id);
+        format!("{}[{id}]", variable(group.kind, group.codes[at % width]))
     }
 
     fn store(&mut self, state: &[Vec<u8>], start: u64) {
@@ -230,18 +286,10 @@ impl StateReader {
         }
         self.starts.push(start);
         self.time.push(time);
-        let mut keep = |channel: &mut Channel, record: &[u8]| {
-            let value = real(record, channel.offset);
+        for channel in &mut self.channels {
+            let value = real(&state[channel.record], channel.offset);
             self.not_finite += usize::from(!value.is_finite());
             channel.values.push(value);
-        };
-        for channel in &mut self.globals {
-            keep(channel, &state[1]);
-        }
-        for (channels, record) in self.groups.iter_mut().zip(&state[self.first_group..]) {
-            for channel in channels {
-                keep(channel, record);
-            }
         }
     }
 
@@ -266,39 +314,36 @@ impl StateReader {
             }
         };
         take(&mut self.time);
-        self.globals.iter_mut().chain(self.groups.iter_mut().flatten()).for_each(|channel| {
-            take(&mut channel.values);
-        });
+        self.channels.iter_mut().for_each(|channel| take(&mut channel.values));
     }
 
     pub(crate) fn finish(mut self, header: &Header, selection: &Selection) -> Vec<SolverFile> {
         self.resolve_restarts();
-        let has_impulses = header.groups.iter().any(|g| g.section().is_some_and(|s| s != "nodout"));
+        let has_impulses =
+            self.objects.iter().flat_map(|o| &*o.components).any(|c| c.made.is_rate());
         if self.time.len() == 1 && has_impulses {
             let message = "one state has no rate of impulses: there are no forces";
             self.problems.add(ProblemCode::AbsentComponent, None, None, message.into());
         }
-        let time: Arc<[f64]> = self.time.into();
-        let problems = self.problems.into_list();
-        let mut files = group_files(header, self.groups, selection, &time);
+        let time: Arc<[f64]> = std::mem::take(&mut self.time).into();
+        let mut files = self.sections(header, selection, &time);
         if header.globals > 0 {
             let mut file = empty("glstat");
             file.components =
                 GLOBAL_COMPONENTS.iter().take(header.globals).map(|&c| c.into()).collect();
-            file.histories = self
-                .globals
-                .into_iter()
-                .map(|c| history(None, GLOBAL_COMPONENTS[c.offset], c.values, &time))
-                .collect();
+            let of = |c: Channel| history(None, GLOBAL_COMPONENTS[c.offset], c.values, &time);
+            self.channels.truncate(self.globals);
+            file.histories = std::mem::take(&mut self.channels).into_iter().map(of).collect();
             files.push(file);
         }
         files.retain(|f| selection.section.as_ref().is_none_or(|s| *s == f.section));
+        let problems = self.problems.into_list();
         for file in &mut files {
             file.time = time.clone();
             file.solver = Some("OpenRadioss".into());
             file.version.clone_from(&header.solver);
             file.title.clone_from(&header.title);
-            file.problems.clone_from(&problems);
+            file.problems.splice(..0, problems.iter().cloned());
             if file.time.is_empty() {
                 file.components.clear();
                 file.histories.clear();
@@ -306,70 +351,75 @@ impl StateReader {
         }
         files
     }
-}
 
-/// One file for each section that the groups have.
-fn group_files(
-    header: &Header,
-    groups: Vec<Vec<Channel>>,
-    selection: &Selection,
-    time: &Arc<[f64]>,
-) -> Vec<SolverFile> {
-    let mut files: Vec<SolverFile> = Vec::new();
-    let mut seen: HashSet<(&str, EntityId)> = HashSet::new();
-    // The variables of one object may be spread over several groups.
-    let mut made: HashSet<(&str, EntityId, Arc<str>)> = HashSet::new();
-    for (group, channels) in header.groups.iter().zip(groups) {
-        let Some(section) = group.section() else { continue };
-        let file = match files.iter_mut().find(|f| f.section == section) {
-            Some(file) => file,
-            None => {
-                files.push(empty(section));
-                let last = files.len() - 1;
-                &mut files[last]
+    /// One file for each section that the objects have.
+    fn sections(
+        &self,
+        header: &Header,
+        selection: &Selection,
+        time: &Arc<[f64]>,
+    ) -> Vec<SolverFile> {
+        let mut files: Vec<SolverFile> = Vec::new();
+        let mut known: HashSet<(i32, Arc<str>)> = HashSet::new();
+        let mut normal_only: Vec<(usize, i64)> = Vec::new();
+        for object in &self.objects {
+            let name = section(object.kind);
+            let at = files.iter().position(|f| f.section == name).unwrap_or_else(|| {
+                files.push(empty(&name));
+                files.len() - 1
+            });
+            if is_normal_only(object.kind, &object.codes(header)) {
+                normal_only.push((at, object.id));
             }
-        };
-        let mut channels = channels.into_iter().peekable();
-        for (k, (id, title)) in group.objects.iter().enumerate() {
-            let range = k * group.codes.len()..(k + 1) * group.codes.len();
-            let mut own: Vec<(usize, Vec<f64>)> = Vec::new();
-            while let Some(c) = channels.next_if(|c| range.contains(&c.offset)) {
-                let code = group.codes[c.offset - range.start];
-                own.push((usize::try_from(code).unwrap_or(0), c.values));
-            }
-            for entity in entities(section, *id) {
-                if seen.insert((section, entity)) {
-                    file.entities.push(Entity { id: entity, title: title.clone() });
+            let file = &mut files[at];
+            let made = || object.components.iter().filter(|c| time.len() > 1 || !c.made.is_rate());
+            for component in made() {
+                if known.insert((object.kind, component.name.clone())) {
+                    file.components.push(component.name.clone());
                 }
-                if selection.wants(entity) {
-                    let new = histories(section, entity, &own, time).into_iter().filter(|h| {
-                        selection.wants_component(&h.component)
-                            && made.insert((section, entity, h.component.clone()))
-                    });
-                    file.histories.extend(new);
+                if component.made.is_rate() && file.notes.is_empty() {
+                    file.notes.push(DIFFERENTIATED.into());
+                    file.problems.extend(time.last().filter(|_| self.is_cut).map(goes_on));
                 }
             }
-        }
-        for component in components_of(group, section, time.len()) {
-            if !file.components.contains(&component) {
-                file.components.push(component);
+            for entity in entities(object.kind, object.id) {
+                file.entities.push(Entity { id: entity, title: object.title.clone() });
+                if !(selection.wants(entity) && object.is_wanted(selection)) {
+                    continue;
+                }
+                let wanted = made().filter(|c| selection.wants_component(&c.name));
+                file.histories.extend(wanted.map(|c| self.history(object, entity, c, time)));
             }
         }
+        for (file, ids) in normal_only.chunk_by(|a, b| a.0 == b.0).map(|of| (of[0].0, of)) {
+            let ids: Vec<String> = ids.iter().take(5).map(|(_, id)| id.to_string()).collect();
+            let more = if ids.len() == 5 { " and others" } else { "" };
+            files[file].notes.push(format!(
+                "of {}{more} the run recorded no tangential impulses: their forces are the normal ones alone",
+                ids.join(", ")
+            ));
+        }
+        files
     }
-    files
+
+    fn history(
+        &self,
+        object: &Object,
+        entity: EntityId,
+        component: &Component,
+        time: &Arc<[f64]>,
+    ) -> History {
+        // SURFB feels the opposite of what T01 writes for the interface.
+        let sign = if entity.side == Some(Side::SurfB) { -1.0 } else { 1.0 };
+        let values = object.values(&component.made, &self.channels, time, sign);
+        history(Some(entity), &component.name, values, time)
+    }
 }
 
-/// The components that a group's variables give.
-fn components_of(group: &Group, section: &str, states: usize) -> Vec<Arc<str>> {
-    let has = |code: usize| group.position(code).is_some();
-    match section {
-        "nodout" => (1..=NODE_COMPONENTS.len())
-            .filter(|&code| has(code))
-            .map(|code| NODE_COMPONENTS[code - 1].into())
-            .collect(),
-        _ if states > 1 && (1..=IMPULSES).all(has) => {
-            magnitude(section).iter().chain(&FORCE_COMPONENTS).map(|&c| c.into()).collect()
-        }
-        _ => Vec::new(),
-    }
+/// What the end of a cut file means for forces.
+fn goes_on(last: &f64) -> Problem {
+    let message = format!(
+        "the record goes on behind time {last:?}: the forces there are differences over one interval, and will change"
+    );
+    Problem::new(ProblemCode::CutRecord, message)
 }

@@ -8,6 +8,8 @@
 //! A file that continues as `name%001`, `name%002`, … and the files `binout0000`,
 //! `binout0001`, … of the processes of one run are one tree over several containers.
 //!
+//! Any directory with states is a section, whatever its name; what else the container holds is named.
+//!
 //! Of a record that is there twice the later one counts: a restart wrote it again. Entities
 //! may differ between states (eroded elements): a state that lacks one has NaN there.
 //!
@@ -28,11 +30,13 @@ mod values;
 use std::io;
 
 use super::lsda::Header;
+use crate::plural::counted;
 use crate::solver::format::Format;
+use crate::solver::problem::{Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};
 use bytes::Bytes;
-use records::Tree;
+use records::{Section, Tree};
 use section::SectionReader;
 
 pub(crate) const FORMAT: Format = Format::binary("binout", recognises, read);
@@ -42,8 +46,8 @@ pub(crate) fn recognises(head: &[u8]) -> bool {
     Header::parse(head).is_some()
 }
 
-/// Reads the selected histories of every section, or of the one selected. Empty if no
-/// section is one of a binout.
+/// Reads the selected histories of every section, or of the one selected. Empty if the container
+/// has no section of histories: other data have no states with times.
 fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<SolverFile>> {
     let mut tree = Tree::default();
     for (number, part) in parts.iter().enumerate() {
@@ -53,11 +57,40 @@ fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<Solv
     let bytes = Bytes::new(parts, &tree.headers);
     // Damaged records concern all sections: what they held is not known.
     let common = std::mem::take(&mut tree.problems).into_list();
+    let has_times = |s: &Section| s.component("time").is_some();
+    let is_binout = |s: &Section| has_times(s) || s.states.is_empty();
+    if !tree.sections.iter().any(is_binout) {
+        return Ok(Vec::new());
+    }
     let mut files = Vec::new();
     for section in tree.sections.iter().filter(|s| wanted(&s.name)) {
         let (mut file, problems) = SectionReader::open(section, bytes, selection)?.read()?;
         file.problems = common.iter().cloned().chain(problems.into_list()).collect();
         files.push(file);
     }
+    let others = tree.others.iter().filter(|(name, _)| wanted(name));
+    files.extend(others.map(|(name, &records)| unread(name, records)));
     Ok(files)
+}
+
+/// A directory whose data are not histories.
+fn unread(name: &str, records: usize) -> SolverFile {
+    let message = format!(
+        "{name}: {} not read: they do not stand in states (d000001, d000002, …) with times",
+        counted(records, "record")
+    );
+    SolverFile {
+        format: FORMAT.name,
+        section: name.into(),
+        solver: None,
+        version: None,
+        title: None,
+        entities: Vec::new(),
+        without_data: Vec::new(),
+        components: Vec::new(),
+        time: [].into(),
+        histories: Vec::new(),
+        problems: vec![Problem::new(ProblemCode::UnreadRows, message)],
+        notes: Vec::new(),
+    }
 }

@@ -1,19 +1,12 @@
 //! Where the records of a family of containers are: the walk that notes them.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
 use super::super::lsda::{self, Event, Header, Payload, change_directory};
 use crate::solver::problem::{Diagnostics, ProblemCode};
 use crate::solver::source::Source;
-
-/// Sections by which a container is known to be a binout.
-const SECTIONS: [&str; 24] = [
-    "abstat", "bndout", "curvout", "dbsensor", "deforc", "disbout", "elout", "eloutdet", "glstat",
-    "jntforc", "matsum", "ncforc", "nodfor", "nodout", "rbdout", "rcforc", "rwforc", "secforc",
-    "sleout", "spcforc", "sphout", "swforc", "tprint", "trhist",
-];
 
 /// Metadata that tells whose values there are.
 pub(super) const LISTS: [&str; 4] = ["ids", "side", "force_ids", "moment_ids"];
@@ -37,6 +30,8 @@ pub(super) struct Tree {
     /// By part; `None` where a part is not a container.
     pub headers: Vec<Option<Header>>,
     pub sections: Vec<Section>,
+    /// Directories that hold data but no states, and how many records of each.
+    pub others: BTreeMap<String, usize>,
     index: HashMap<String, usize>,
     records: usize,
     /// Whether sections were left out.
@@ -97,8 +92,11 @@ impl Tree {
                     let message = "there are too many records; those that follow are left out";
                     self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
                 }
-                if let Some((section, state)) = here.filter(|_| self.records < MAX_RECORDS) {
+                let is_within = self.records < MAX_RECORDS;
+                if let Some((section, state)) = here.filter(|_| is_within) {
                     self.sections[section].note(name, state, DataRecord { part, payload });
+                } else if is_within {
+                    self.note_other(&path);
                 }
             }
             Event::Damage { at, resumed, message } => {
@@ -132,20 +130,29 @@ impl Tree {
         self.problems.add_at_byte(code, byte, message);
     }
 
+    /// Notes data in a directory that is not a state. Directories below a state are part of it.
+    fn note_other(&mut self, path: &[String]) {
+        let is_state = |name: &String| name == "metadata" || state_number(name).is_some();
+        let name = path.join("/");
+        let is_new = !self.others.contains_key(&name);
+        if path.is_empty()
+            || path.iter().any(is_state)
+            || is_new && self.others.len() == MAX_SECTIONS
+        {
+            return;
+        }
+        *self.others.entry(name).or_default() += 1;
+    }
+
     /// The section and state a path names; `None` for what is not a result of a binout.
-    /// States are `d` and digits, padded or not; directories below them hold no results.
+    /// Directories below states hold no results.
     fn place(&mut self, path: &[String]) -> Option<(usize, Option<usize>)> {
         let (last, section) = path.split_last()?;
-        if !SECTIONS.contains(&section.first()?.as_str()) {
+        section.first()?;
+        let number = state_number(last);
+        if number.is_none() && last != "metadata" {
             return None;
         }
-        let number = match last.strip_prefix('d') {
-            Some(digits) if digits.bytes().all(|b| b.is_ascii_digit()) => {
-                Some(digits.parse().ok()?)
-            }
-            _ if last == "metadata" => None,
-            _ => return None,
-        };
         let name = section.join("/");
         let index = match self.index.get(&name) {
             Some(&index) => index,
@@ -166,6 +173,12 @@ impl Tree {
         };
         Some((index, number.map(|number| self.sections[index].state(number))))
     }
+}
+
+/// The number of a state's directory: `d` and digits, padded or not.
+fn state_number(name: &str) -> Option<u64> {
+    let digits = name.strip_prefix('d')?;
+    digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
 }
 
 impl Section {

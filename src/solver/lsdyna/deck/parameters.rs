@@ -72,7 +72,7 @@ impl Parameters {
             Some((sign, Value::Real(value))) => Some(sign as f64 * value),
             Some((sign, Value::Integer(value))) => Some(sign as f64 * *value as f64),
             None if field.text.is_empty() => return Ok(None),
-            None => match line::real(field.text) {
+            None => match line::free_real(field.text) {
                 line::Field::Real(value) => Some(value),
                 _ => None,
             },
