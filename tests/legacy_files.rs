@@ -341,6 +341,45 @@ fn radioss_functions() {
         &si,
         "line 4, columns 1-20: expected one number in each field of 20 columns",
     );
+    // What the deck makes of the points: scaled, then shifted; each time it says so.
+    let moved = |id: u32, factors: &str| format!("/MOVE_FUNCT/{id}\nmoved\n# x y\n{factors}\n");
+    let numbers = |of: [f64; 4]| of.map(|v| format!("{v:>20}")).concat();
+    let half: String =
+        POINTS.iter().map(|(d, f)| format!("{:>20}{:>20}\n", 2.0 * d + 2.0, 4.0 * f)).collect();
+    let deck = funct(5, &half) + &moved(5, &numbers([0.5, 0.25, -1.0, 0.0])) + &moved(6, "");
+    let note =
+        "scale: /MOVE_FUNCT of line 9: abscissas times 0.5 plus -1, ordinates times 0.25 plus 0";
+    t(&deck, &si, &[note]);
+    let before = moved(5, "")
+        + &moved(5, &numbers([0.0, 0.25, 0.0, 0.0]))
+        + &funct(5, &{
+            POINTS.iter().map(|(d, f)| format!("{d:>20}{:>20}\n", 4.0 * f)).collect::<String>()
+        });
+    t(&before, &si, &["line 1: abscissas times 1 plus 0", "line 5: abscissas times 1 plus 0"]);
+    wrong(
+        &deck.replace("                0.25", "                   x"),
+        &si,
+        "line 12, columns 21-40",
+    );
+    // What is not straight between points, has units of its own, or stands twice.
+    let smooth = funct(5, &half).replace("/FUNCT", "# s\n/FUNCT_SMOOTH");
+    wrong(
+        &smooth,
+        &si,
+        "line 2: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
+    );
+    t(
+        &(smooth + &one.replace("/5", "/7")),
+        &ReadOptions { curve: Some("7".into()), ..given(Some("mm-t-s")) },
+        &[],
+    );
+    wrong(
+        &one.replace("FUNCT/5", "FUNCT/5/2"),
+        &si,
+        "line 1: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT/5/2",
+    );
+    let five = ReadOptions { curve: Some("5".into()), ..si.clone() };
+    wrong(&format!("{one}{one}"), &five, "the file has 2 curves \"5\": leave one of them in it");
 }
 
 /// What crumple wrote for Radioss and Modelica comes back with all that it says; other packages are refused.

@@ -155,6 +155,11 @@ fn units_and_factors_are_those_of_the_arguments() {
     );
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
+    // Both in ms: nothing compares them, but a filter sees it.
+    let error = crumple_fails(here, 1, &["rate", "t.csv", "t.csv", "--cfc", "60"]);
+    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms behind the file's name; else filter with a lower class"), "{error}");
+    let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
+    assert_eq!(both["to_s"], 0.199);
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //! the points that other tools need.
 
 use crate::error::{Error, error};
+use crate::guess;
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
-use super::curve::Place;
 use super::curve::{Metadata, ReadCurve, ReadFile};
+use super::curve::{Place, shown};
 use crate::unit::UnitSystem;
 
 /// Most points of a curve: guards memory. Test records have some ten thousand.
@@ -25,6 +26,54 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
         ))
     } else {
         Ok(())
+    }
+}
+
+/// Refuses one point more than a curve may have.
+pub(super) fn check_points(points: usize) -> Result<(), Error> {
+    if points > MAX_POINTS {
+        let most = MAX_POINTS;
+        Err(error!(CurveFile, "the curve has more than {most} points: thin it"))
+    } else {
+        Ok(())
+    }
+}
+
+/// Curves and columns that a message lists.
+pub(super) const LISTED: usize = 20;
+
+/// Which of a file's curves was asked for by its name, else the only one; each with its name and title.
+pub(super) fn choose(
+    curves: impl Iterator<Item = (String, String)> + Clone,
+    asked: Option<&str>,
+) -> Result<usize, Error> {
+    let known = || {
+        let name = |(name, title): (String, String)| match title.trim() {
+            "" => shown(&name),
+            title => format!("{} (\"{}\")", shown(&name), shown(title)),
+        };
+        curves.clone().take(LISTED).map(name).collect::<Vec<_>>().join(", ")
+    };
+    let is_asked = |(name, _): &(String, String)| asked.is_none_or(|asked| name == asked.trim());
+    let mut found = curves.clone().enumerate().filter(|(_, curve)| is_asked(curve));
+    match (found.next(), found.count(), asked) {
+        (Some((at, _)), 0, _) => Ok(at),
+        (None, _, Some(asked)) => {
+            let (asked, known) = (shown(asked), known());
+            let hint = guess::hint(&asked, &known);
+            Err(error!(CurveFile, "the file has no curve \"{asked}\": it has {known}{hint}"))
+        }
+        (_, more, Some(asked)) => Err(error!(
+            CurveFile,
+            "the file has {count} curves \"{asked}\": leave one of them in it",
+            asked = shown(asked),
+            count = more + 1
+        )),
+        (_, _, None) => Err(error!(
+            CurveFile,
+            "the file holds several curves: choose one with --curve: {known}",
+            known = known()
+        )),
     }
 }
 

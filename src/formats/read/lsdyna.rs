@@ -6,12 +6,11 @@
 //! of 0 means 1. Lines that begin with `$` are comments, also where a title should stand.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
+use super::columns::{Columns, Places, check_curves, check_points, choose};
 use super::curve::{Place, shown};
 use super::curve::{stated_units, title, units};
 use super::text::{lines, number};
 use crate::error::{Error, error};
-use crate::guess;
 
 const REMEDY: &str = " (or in a comment of the file: \"$ units: mm-t-s\")";
 
@@ -24,8 +23,13 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
-    let found = deck.choose(input.options.curve.as_deref())?;
-    let Found { id, title: found, scale, points, lines, facts, units: stated } = found;
+    if deck.curves.is_empty() {
+        return Err(error!(CurveFile, "expected a *DEFINE_CURVE, found none in this deck"));
+    }
+    let names = deck.curves.iter().map(|curve| (curve.id.to_string(), curve.title.clone()));
+    let at = choose(names, input.options.curve.as_deref())?;
+    let Found { id, title: found, scale, points, lines, facts, units: stated } =
+        deck.curves.swap_remove(at);
     let mut notes = vec![format!("curve: {id} of the deck")];
     let system = units(stated, input.options.units, REMEDY, &mut notes)?;
     if scale != Scale::default() {
@@ -45,9 +49,6 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         ..Columns::at(Places::Lines(lines))
     })
 }
-
-/// Curves that a message lists.
-const LISTED: usize = 20;
 
 /// Factors and offsets of card 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,60 +205,7 @@ impl Deck {
         let fields = Fields::of(line, number, 20);
         curve.points.push((fields.number(0, false)?, fields.number(1, false)?));
         curve.lines.push(number);
-        if curve.points.len() > MAX_POINTS {
-            Err(error!(
-                CurveFile,
-                "the curve has more than {most} points: thin it",
-                most = MAX_POINTS
-            ))
-        } else {
-            Ok(())
-        }
-    }
-
-    /// The curve of that number, or the only one.
-    fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
-        let known = || {
-            let shown = |c: &Found| {
-                if c.title.is_empty() {
-                    c.id.to_string()
-                } else {
-                    format!("{} (\"{}\")", c.id, shown(&c.title))
-                }
-            };
-            self.curves.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
-        };
-        let at = match (asked, self.curves.len()) {
-            (_, 0) => {
-                let found = "none in this deck";
-                return Err(error!(
-                    CurveFile,
-                    "expected {expected}, found {found}",
-                    expected = "a *DEFINE_CURVE"
-                ));
-            }
-            (None, 1) => 0,
-            (None, _) => {
-                return Err(error!(
-                    CurveFile,
-                    "the file holds several curves: choose one with --curve: {known}",
-                    known = known()
-                ));
-            }
-            (Some(asked), _) => {
-                let is_asked = |c: &Found| c.id.to_string() == asked.trim();
-                self.curves.iter().position(is_asked).ok_or_else(|| {
-                    let asked = shown(asked);
-                    let known = known();
-                    error!(
-                        CurveFile,
-                        "the file has no curve \"{asked}\": it has {known}{}",
-                        guess::hint(&asked, &known)
-                    )
-                })?
-            }
-        };
-        Ok(self.curves.swap_remove(at))
+        check_points(curve.points.len())
     }
 }
 

@@ -7,12 +7,11 @@
 //! `k_u`, one number, is the unloading stiffness.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
+use super::columns::{Columns, LISTED, Places, check_curves, check_points, choose};
 use super::curve::units;
 use super::curve::{Place, shown};
 use super::modelica::OURS;
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Longest name of a matrix, with its zero byte.
@@ -34,7 +33,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         ));
     }
     let matrices = matrices(input.bytes)?;
-    let table = choose(&matrices, input.options.curve.as_deref())?;
+    let table = chosen(&matrices, input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: matrix {} of the file", table.name)];
     let ours = table.name.strip_prefix(OURS);
     let system = match (ours.is_some(), input.options.units) {
@@ -203,44 +202,22 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
 }
 
 /// The matrix that was asked for, else ours, else the only one of two columns.
-fn choose<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
+fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
     let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2 && !m.is_text).collect();
-    let known = || fitting.iter().map(|m| shown(&m.name)).collect::<Vec<_>>().join(", ");
-    let by_name = |name: &str| fitting.iter().find(|m| m.name == name).copied();
-    let has_ours = fitting.iter().filter(|m| m.name.starts_with(OURS)).count();
-    let table = match (asked, by_name(OURS).filter(|_| has_ours == 1), &fitting[..]) {
-        (_, _, []) => {
-            let sizes =
-                matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));
-            let found = match matrices.len() {
-                0 => "none".into(),
-                _ => sizes.take(20).collect::<Vec<_>>().join(", "),
-            };
-            let expected = "a full matrix of doubles with two columns, such as fd_load";
-            return Err(error!(CurveFile, "expected {expected}, found {found}"));
-        }
-        (Some(asked), ..) => by_name(asked).ok_or_else(|| {
-            let asked = shown(asked);
-            let known = known();
-            error!(
-                CurveFile,
-                "the file has no curve \"{asked}\": it has {known}{}",
-                guess::hint(&asked, &known)
-            )
-        })?,
-        (None, Some(ours), _) => ours,
-        (None, None, [only]) => only,
-        (None, None, _) => {
-            return Err(error!(
-                CurveFile,
-                "the file holds several curves: choose one with --curve: {known}",
-                known = known()
-            ));
-        }
-    };
-    if table.rows > MAX_POINTS {
-        Err(error!(CurveFile, "the curve has more than {most} points: thin it", most = MAX_POINTS))
-    } else {
-        Ok(table)
+    if fitting.is_empty() {
+        let sizes =
+            matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));
+        let found = match matrices.len() {
+            0 => "none".into(),
+            _ => sizes.take(LISTED).collect::<Vec<_>>().join(", "),
+        };
+        let expected = "a full matrix of doubles with two columns, such as fd_load";
+        return Err(error!(CurveFile, "expected {expected}, found {found}"));
     }
+    let ours = fitting.iter().filter(|m| m.name.starts_with(OURS)).count();
+    let has_ours = ours == 1 && fitting.iter().any(|m| m.name == OURS);
+    let names = fitting.iter().map(|m| (m.name.clone(), String::new()));
+    let table = fitting[choose(names, asked.or(has_ours.then_some(OURS)))?];
+    check_points(table.rows)?;
+    Ok(table)
 }

@@ -5,13 +5,12 @@
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
+use super::columns::{Columns, Places, check_curves, check_points, choose};
 use super::curve::{Metadata, stated_units, units};
 use super::curve::{Place, shown};
 use super::label::{Label, Quantity};
 use super::text::{lines, number};
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Name of the table and of the matrix that our exports write, in SI.
@@ -174,33 +173,16 @@ impl File {
     /// The table that was asked for, else ours, else the only one that can be a curve.
     fn choose(&self, asked: Option<&str>) -> Result<&Table, Error> {
         let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
-        let known = || fitting.iter().map(|t| t.name.clone()).collect::<Vec<_>>().join(", ");
         if fitting.is_empty() {
             let found = format!("{} others", self.tables.len());
             let expected = "a table of two columns, such as \"double fd_load(4,2)\"";
             return Err(error!(CurveFile, "expected {expected}, found {found}"));
         }
-        let by_name = |name: &str| fitting.iter().find(|t| t.name == name).copied();
         // Several of ours are the curves of several speeds.
         let ours = fitting.iter().filter(|t| t.name.starts_with(OURS)).count();
-        match (asked, by_name(OURS).filter(|_| ours == 1), &fitting[..]) {
-            (Some(asked), ..) => by_name(asked).ok_or_else(|| {
-                let asked = shown(asked);
-                let known = known();
-                error!(
-                    CurveFile,
-                    "the file has no curve \"{asked}\": it has {known}{}",
-                    guess::hint(&asked, &known)
-                )
-            }),
-            (None, Some(ours), _) => Ok(ours),
-            (None, None, [only]) => Ok(only),
-            (None, None, _) => Err(error!(
-                CurveFile,
-                "the file holds several curves: choose one with --curve: {known}",
-                known = known()
-            )),
-        }
+        let has_ours = ours == 1 && fitting.iter().any(|t| t.name == OURS);
+        let names = fitting.iter().map(|t| (t.name.clone(), String::new()));
+        Ok(fitting[choose(names, asked.or(has_ours.then_some(OURS)))?])
     }
 }
 
@@ -234,13 +216,7 @@ fn check_size(
     bytes: usize,
     line: u64,
 ) -> Result<(), Error> {
-    if rows > MAX_POINTS {
-        return Err(error!(
-            CurveFile,
-            "the curve has more than {most} points: thin it",
-            most = MAX_POINTS
-        ));
-    }
+    check_points(rows)?;
     if rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
         Ok(())
     } else {

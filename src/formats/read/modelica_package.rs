@@ -4,12 +4,11 @@
 //! 200 points of a curve.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
+use super::columns::{Columns, MAX_POINTS, Places, check_curves, choose};
 use super::curve::{Metadata, title};
 use super::curve::{Place, shown};
 use super::text::{lines, number};
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
@@ -20,7 +19,14 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let packages = packages(input.text)?;
-    let package = choose(&packages, input.options.curve.as_deref())?;
+    if packages.is_empty() {
+        return Err(error!(
+            CurveFile,
+            "expected a package that crumple export wrote (constant Real d[…], f[…]), found none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file"
+        ));
+    }
+    let names = packages.iter().map(|package| (package.name.clone(), String::new()));
+    let package = &packages[choose(names, input.options.curve.as_deref())?];
     for array in [&package.d, &package.f] {
         array.check()?;
     }
@@ -164,35 +170,5 @@ impl Array {
         }
         self.is_closed = is_closed;
         Ok(())
-    }
-}
-
-/// The package that was asked for, or the only one.
-fn choose<'a>(packages: &'a [Package], asked: Option<&str>) -> Result<&'a Package, Error> {
-    let known = || packages.iter().map(|p| shown(&p.name)).collect::<Vec<_>>().join(", ");
-    let by_name = |asked: &str| packages.iter().find(|p| p.name == asked.trim());
-    match (asked, packages) {
-        (_, []) => Err(error!(
-            CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a package that crumple export wrote (constant Real d[…], f[…])",
-            found =
-                "none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file"
-        )),
-        (None, [only]) => Ok(only),
-        (None, _) => Err(error!(
-            CurveFile,
-            "the file holds several curves: choose one with --curve: {known}",
-            known = known()
-        )),
-        (Some(asked), _) => by_name(asked).ok_or_else(|| {
-            let asked = shown(asked);
-            let known = known();
-            error!(
-                CurveFile,
-                "the file has no curve \"{asked}\": it has {known}{}",
-                guess::hint(&asked, &known)
-            )
-        }),
     }
 }
