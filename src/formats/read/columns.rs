@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 use super::MIN_POINTS;
 use super::curve::{Metadata, ReadCurve, ReadFile};
 use super::curve::{Place, shown};
+use crate::curve::{Envelope, ForceCurve};
 use crate::unit::UnitSystem;
 
 /// Most points of a curve: guards memory. Test records have some ten thousand.
@@ -135,6 +136,18 @@ impl Columns {
             units: None,
             notes: Vec::new(),
             files: Vec::new(),
+        }
+    }
+
+    /// The curve that drives an interface, without any change: increasing deflections from 0, forces of 0 or above.
+    pub(super) fn as_they_stand(&self) -> Result<ForceCurve, Error> {
+        let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
+        match envelope.first_pulling_point() {
+            Some(point) => Err(error!(
+                CurveFile,
+                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+            )),
+            None => Ok(self.facts.driving(envelope)),
         }
     }
 

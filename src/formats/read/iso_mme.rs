@@ -140,13 +140,13 @@ fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
     };
     let bytes = file::read(&path, MAX_CURVE_BYTES)?;
     columns.files.push(ReadFile::of(&path, &bytes));
-    let text = decoded(&bytes).bytes;
+    let text = decoded(&bytes).text;
     described(&text, &mut columns.facts);
     comments(&text, &mut columns.facts)
 }
 
 /// Takes masses (kg) and velocities (m/s) of the test objects.
-fn described(bytes: &[u8], facts: &mut Metadata) {
+fn described(bytes: &str, facts: &mut Metadata) {
     let header = Header::read(bytes);
     let of = |what: &str, k: usize| {
         let text = |key: String| number(header.text(&key));
@@ -172,7 +172,7 @@ fn merged(first: Metadata, others: &[Metadata]) -> Metadata {
 }
 
 /// Takes the facts of lines `Comments :key: value`.
-fn comments(bytes: &[u8], facts: &mut Metadata) -> Result<(), Error> {
+fn comments(bytes: &str, facts: &mut Metadata) -> Result<(), Error> {
     for (at, line) in lines(bytes) {
         if let Some((key, value)) = line.split_once(':')
             && key.trim().eq_ignore_ascii_case("comments")
@@ -306,7 +306,7 @@ impl Channel {
     /// The channel of a file; `None` if it is of another dimension.
     fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, Error> {
         let file = ReadFile::of(path, bytes);
-        let bytes = &decoded(bytes).bytes;
+        let bytes = &decoded(bytes).text;
         let header = Header::read(bytes);
         let code = header.text("channel code");
         let quantity = match code.get(12..14) {
@@ -360,7 +360,7 @@ const NO_VALUE: &str = "NOVALUE";
 const HEADER_LINES: usize = 1_000;
 
 impl Header {
-    fn read(bytes: &[u8]) -> Self {
+    fn read(bytes: &str) -> Self {
         let entries = lines(bytes).take(HEADER_LINES).filter_map(|(at, line)| {
             let (name, value) = line.split_once(':')?;
             Some((at, name.trim().to_ascii_lowercase(), value.trim().to_string()))
@@ -419,7 +419,7 @@ impl Header {
     }
 
     /// The values, in SI, and their lines.
-    fn values(&self, bytes: &[u8], size: f64) -> Result<(Vec<f64>, Vec<u64>), Error> {
+    fn values(&self, bytes: &str, size: f64) -> Result<(Vec<f64>, Vec<u64>), Error> {
         let (mut values, mut at) = (Vec::new(), Vec::new());
         for (line, text) in lines(bytes).filter(|(_, t)| !t.contains(':') && !t.trim().is_empty()) {
             let value = number(&text).ok_or_else(|| {

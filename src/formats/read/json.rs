@@ -31,7 +31,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, Error> {
 
 /// Whether the first byte that is not a blank opens an object.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    input.text.trim_ascii_start().starts_with(b"{")
+    input.text.trim_ascii_start().starts_with('{')
 }
 
 /// The declared force, with the body's beside it where the file has both; or the force that was
@@ -40,7 +40,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let damaged = |source| {
         error!(CurveFile, "{path}: {source}", path = input.path.display()).caused_by(source)
     };
-    let mut curve = parse(input.path, input.text)?;
+    let mut curve = parse(input.path, input.text.as_bytes())?;
     let both = curve.body_force_n.is_some();
     let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
     if let Some(asked) = input.options.force {

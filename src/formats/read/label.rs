@@ -131,23 +131,38 @@ impl Quantity {
 
     /// The only quantity that words of a name are of.
     fn within(name: &str) -> Option<Self> {
-        let name = name.to_lowercase();
-        let words = || name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
+        let named = Self::all_within(name);
+        let first = *named.first()?;
+        named.iter().all(|other| *other == first).then_some(first)
+    }
+
+    /// The quantities that words of a text are of; none if it speaks of an edge, a bound or a rate.
+    pub(super) fn all_within(text: &str) -> Vec<Self> {
+        let text = text.to_lowercase();
+        let words = || text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
         if words().any(|word| OTHERS.contains(&word)) {
-            return None;
+            return Vec::new();
         }
         let of_word = |word: &str| {
             let whole = WORDS.iter().find(|(_, names)| names.contains(&word)).map(|(q, _)| *q);
             let ending = || ENDINGS.iter().find(|(_, end)| word.ends_with(end)).map(|(q, _)| *q);
             whole.or_else(ending)
         };
-        let mut named = words().filter_map(of_word);
-        let first = named.next()?;
-        named.all(|other| other == first).then_some(first)
+        words().filter_map(of_word).collect()
     }
 
-    /// SI value of a unit of this quantity.
+    /// SI value of a unit of this quantity, also of one that states it, as `LENGTH/0.001` does.
     pub(super) fn size_of(self, unit: &str) -> Option<f64> {
+        if let Some((dimension, size)) = unit.split_once('/') {
+            let dimensions: &[&str] = match self {
+                Self::Deflection => &["LENGTH", "DISPLACEMENT"],
+                Self::Force => &["FORCE"],
+                Self::Time => &["TIME"],
+            };
+            let size = size.trim().parse().ok().filter(|size: &f64| size.is_normal());
+            let is_its = dimensions.contains(&&*dimension.trim().to_ascii_uppercase());
+            return size.filter(|size| is_its && *size > 0.0);
+        }
         // Micro is a letter of its own in texts that are no ASCII.
         self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
     }
@@ -232,11 +247,13 @@ impl Label {
     }
 }
 
-/// `name [unit]` or `name (unit)`, apart.
+/// `name [unit]`, `name (unit)` or T/HIS' `name <LENGTH/0.001>;`, apart.
 fn in_brackets(text: &str) -> Option<(&str, &str)> {
+    let text = text.trim_end_matches([';', ' ']);
     let open = match text.chars().last()? {
         ']' => '[',
         ')' => '(',
+        '>' => '<',
         _ => return None,
     };
     let at = text.rfind(open)?;
@@ -281,6 +298,9 @@ mod tests {
             t(text, Some((Force, Some("kN"))));
         }
         t("time [ms]", Some((Time, Some("ms"))));
+        t("Crush <LENGTH/0.001>;", Some((Deflection, Some("LENGTH/0.001"))));
+        assert_eq!(Force.size_of("FORCE/1000"), Some(1e3));
+        assert_eq!(Force.size_of("LENGTH/1000").or(Force.size_of("FORCE/0")), None);
         t("t_s", Some((Time, Some("s"))));
         t("deflection", Some((Deflection, None)));
         t("Force [lbf]", Some((Force, Some("lbf"))));

@@ -100,7 +100,7 @@ struct Deck {
 }
 
 impl Deck {
-    fn read(bytes: &[u8]) -> Result<Self, Error> {
+    fn read(bytes: &str) -> Result<Self, Error> {
         let mut deck = Self::default();
         let (mut next, mut is_long) = (Next::Other, false);
         for (number, line) in lines(bytes) {

@@ -19,10 +19,7 @@ pub(super) const OURS: &str = "fd_load";
 const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    input
-        .text
-        .strip_prefix(b"#1")
-        .is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
+    input.text.strip_prefix("#1").is_some_and(|rest| rest.starts_with(['\n', '\r', ' ']))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
@@ -84,7 +81,7 @@ struct File {
 }
 
 impl File {
-    fn read(bytes: &[u8]) -> Result<Self, Error> {
+    fn read(bytes: &str) -> Result<Self, Error> {
         let mut file = Self { tables: Vec::new(), facts: Metadata::default(), units: None };
         for (at, line) in lines(bytes) {
             let (text, comment) = line.split_once('#').unwrap_or((&line, ""));

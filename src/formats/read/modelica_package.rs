@@ -94,7 +94,7 @@ struct Package {
 }
 
 /// The packages that hold a table.
-fn packages(text: &[u8]) -> Result<Vec<Package>, Error> {
+fn packages(text: &str) -> Result<Vec<Package>, Error> {
     let (mut packages, mut facts) = (Vec::<Package>::new(), Metadata::default());
     // The array that goes on in the next line.
     let mut open: Option<&'static str> = None;

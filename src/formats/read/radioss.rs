@@ -121,7 +121,7 @@ struct Deck {
 }
 
 impl Deck {
-    fn read(text: &[u8]) -> Result<Self, Error> {
+    fn read(text: &str) -> Result<Self, Error> {
         let mut deck = Self::default();
         let mut next = Next::Other;
         for (at, line) in lines(text) {
