@@ -20,24 +20,22 @@ pub(super) const MAX_CURVES: usize = 10_000;
 /// Refuses one curve more than a file may have.
 pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
     if curves > MAX_CURVES {
-        Err(error!(
+        let most = MAX_CURVES;
+        return Err(error!(
             CurveFile,
-            "the file has more than {most} curves: take out the one that is meant",
-            most = MAX_CURVES
-        ))
-    } else {
-        Ok(())
+            "the file has more than {most} curves: take out the one that is meant"
+        ));
     }
+    Ok(())
 }
 
 /// Refuses one point more than a curve may have.
 pub(super) fn check_points(points: usize) -> Result<(), Error> {
     if points > MAX_POINTS {
         let most = MAX_POINTS;
-        Err(error!(CurveFile, "the curve has more than {most} points: thin it"))
-    } else {
-        Ok(())
+        return Err(error!(CurveFile, "the curve has more than {most} points: thin it"));
     }
+    Ok(())
 }
 
 /// Curves and columns that a message lists.
@@ -59,23 +57,25 @@ pub(super) fn choose(
     let mut found = curves.clone().enumerate().filter(|(_, curve)| is_asked(curve));
     match (found.next(), found.count(), asked) {
         (Some((at, _)), 0, _) => Ok(at),
-        (None, _, Some(asked)) => {
-            let (asked, known) = (shown(asked), known());
-            let hint = guess::hint(&asked, &known);
-            Err(error!(CurveFile, "the file has no curve \"{asked}\": it has {known}{hint}"))
-        }
+        (None, _, Some(asked)) => Err(no_curve(asked, &known())),
         (_, more, Some(asked)) => Err(error!(
             CurveFile,
             "the file has {count} curves \"{asked}\": leave one of them in it",
             asked = shown(asked),
             count = more + 1
         )),
-        (_, _, None) => Err(error!(
-            CurveFile,
-            "the file holds several curves: choose one with --curve: {known}",
-            known = known()
-        )),
+        (_, _, None) => Err(several_curves(&known())),
     }
+}
+
+pub(super) fn no_curve(asked: &str, known: &str) -> Error {
+    let asked = shown(asked);
+    let hint = guess::hint(&asked, known);
+    error!(CurveFile, "the file has no curve \"{asked}\": it has {known}{hint}")
+}
+
+pub(super) fn several_curves(known: &str) -> Error {
+    error!(CurveFile, "the file holds several curves: choose one with --curve: {known}")
 }
 
 /// Deflections and forces below this share of the largest are zero.
@@ -155,13 +155,7 @@ impl Columns {
     pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
-            return Err(error!(
-                CurveFile,
-                "the curve has {}{of}: expected at least {least}",
-                crate::plural::counted(points, "point"),
-                least = MIN_POINTS,
-                of = ""
-            ));
+            return Err(too_few(points, ""));
         }
         self.check_finite()?;
         if self.time_s.is_none() {
@@ -254,13 +248,7 @@ impl Points {
         self.set_steps_apart(notes);
         let points = self.list.len();
         if points < MIN_POINTS {
-            let of = " without those of guard and repetition";
-            return Err(error!(
-                CurveFile,
-                "the curve has {}{of}: expected at least {least}",
-                crate::plural::counted(points, "point"),
-                least = MIN_POINTS
-            ));
+            return Err(too_few(points, " without those of guard and repetition"));
         }
         self.check_order()?;
         if self.list[0].d > 0.0 {
@@ -447,6 +435,11 @@ impl Points {
         }
         Ok(())
     }
+}
+
+pub(super) fn too_few(points: usize, of: &str) -> Error {
+    let (points, least) = (crate::plural::counted(points, "point"), MIN_POINTS);
+    error!(CurveFile, "the curve has {points}{of}: expected at least {least}")
 }
 
 /// Of points at one deflection, the first, the last and the extremes between.

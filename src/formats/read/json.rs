@@ -3,6 +3,7 @@
 use crate::error::{Error, error};
 use std::path::Path;
 
+use super::columns::too_few;
 use super::curve::{Metadata, ReadCurve, title};
 use super::{Input, MIN_POINTS, curve};
 use crate::curve::{ForceKind, Parameter};
@@ -48,14 +49,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     }
     let points = curve.deflection_m.len();
     if points < MIN_POINTS {
-        let few = error!(
-            CurveFile,
-            "the curve has {}{of}: expected at least {least}",
-            crate::plural::counted(points, "point"),
-            least = MIN_POINTS,
-            of = ""
-        );
-        return Err(curve::content(input.path)(few));
+        return Err(curve::content(input.path)(too_few(points, "")));
     }
     if both {
         notes.push(match curve.body_force_n {

@@ -105,7 +105,7 @@ impl Quantity {
         }
     }
 
-    pub(super) fn dimension(self) -> &'static Dimension {
+    fn dimension(self) -> &'static Dimension {
         match self {
             Self::Deflection => &LENGTH,
             Self::Force => &FORCE,
@@ -165,6 +165,18 @@ impl Quantity {
         }
         // Micro is a letter of its own in texts that are no ASCII.
         self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
+    }
+
+    /// The same, or what is wrong with the unit.
+    pub(super) fn known_size_of(self, unit: &str, place: Place) -> Result<f64, Error> {
+        self.size_of(unit).ok_or_else(|| {
+            let (what, known, unit) = (self.name(), self.dimension().known_units(), shown(unit));
+            let hint = guess::hint(&unit, &known);
+            error!(
+                CurveFile,
+                "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{hint}"
+            )
+        })
     }
 }
 
@@ -234,14 +246,15 @@ impl Label {
     ) -> Result<f64, Error> {
         let what = self.quantity.name();
         match (&self.unit, given) {
-            (Some(unit), _) => self.quantity.size_of(unit).ok_or_else(|| {
-                let known = self.quantity.dimension().known_units();
-                { let unit = shown(unit); error!(CurveFile, "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}", guess::hint(&unit, &known)) }
-            }),
+            (Some(unit), _) => self.quantity.known_size_of(unit, place),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
                 let example = self.quantity.example();
-                Err(error!(CurveFile, "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI", found = shown(text)))
+                Err(error!(
+                    CurveFile,
+                    "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
+                    found = shown(text)
+                ))
             }
         }
     }

@@ -8,9 +8,8 @@
 
 use super::Input;
 use super::columns::{Columns, LISTED, Places, check_curves, check_points, choose};
-use super::curve::units;
-use super::curve::{Place, shown};
-use super::modelica::OURS;
+use super::curve::{CUT, Place, expected, miscounted, shown, units};
+use super::modelica::{OURS, ours_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
@@ -25,11 +24,9 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     if is_later(input.bytes) {
-        let found = "one of a later version: save it with -v4";
         return Err(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a MAT file of version 4"
+            "expected a MAT file of version 4, found one of a later version: save it with -v4"
         ));
     }
     let matrices = matrices(input.bytes)?;
@@ -160,13 +157,9 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
     let mut at = 0;
     while at < bytes.len() {
         let head = head(bytes, at).ok_or_else(|| {
-            error!(
-                CurveFile,
-                "{place}: expected {expected}, found \"{found}\"",
-                expected = "a matrix of a MAT file of version 4 (save it with -v4)",
-                found = format!("{} bytes of something else", bytes.len() - at),
-                place = Place::Byte(at)
-            )
+            let found = format!("{} bytes of something else", bytes.len() - at);
+            let what = "a matrix of a MAT file of version 4 (save it with -v4)";
+            expected(Place::Byte(at), what, &found)
         })?;
         let begin = at + HEAD + head.name;
         let name = bytes.get(at + HEAD..begin).unwrap_or_default();
@@ -175,14 +168,12 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
         let size = values.and_then(|n| n.checked_mul(head.number << usize::from(head.is_complex)));
         let end = size.and_then(|size| begin.checked_add(size)).filter(|end| *end <= bytes.len());
         let Some(end) = end else {
-            return Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} rows of {}", head.rows, head.columns),
-                found = format!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
-                place = Place::Byte(at),
-                remedy = "write the file anew, it may be cut",
-                what = format!("matrix {}", shown(&name))
+            return Err(miscounted(
+                Place::Byte(at),
+                format_args!("matrix {}", shown(&name)),
+                format_args!("{} rows of {}", head.rows, head.columns),
+                format_args!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
+                CUT,
             ));
         };
         if head.is_read {
@@ -214,10 +205,8 @@ fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Mat
         let expected = "a full matrix of doubles with two columns, such as fd_load";
         return Err(error!(CurveFile, "expected {expected}, found {found}"));
     }
-    let ours = fitting.iter().filter(|m| m.name.starts_with(OURS)).count();
-    let has_ours = ours == 1 && fitting.iter().any(|m| m.name == OURS);
     let names = fitting.iter().map(|m| (m.name.clone(), String::new()));
-    let table = fitting[choose(names, asked.or(has_ours.then_some(OURS)))?];
+    let table = fitting[choose(names.clone(), asked.or(ours_of(names)))?];
     check_points(table.rows)?;
     Ok(table)
 }

@@ -10,6 +10,7 @@
 
 mod columns;
 pub(crate) mod curve;
+mod deck;
 mod encoding;
 mod iso_mme;
 pub(crate) mod json;
@@ -253,23 +254,18 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
         open(path).map(|(bytes, own)| (bytes, Some(own)))?
     };
     if bytes.starts_with(ZIP) {
-        let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV";
         return Err(curve::content(path)(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a curve"
+            "expected a curve, found a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV"
         )));
     }
     let text = encoding::decoded(&bytes);
     let input = Input { path, bytes: &bytes, text: &text.text, options };
     if bytes.is_empty() && own.is_some() {
-        let empty = error!(
+        return Err(curve::content(path)(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a curve",
-            found = "an empty file"
-        );
-        return Err(curve::content(path)(empty));
+            "expected a curve, found an empty file"
+        )));
     }
     let reader = reader(&input)?;
     if let (Some(option), true) =

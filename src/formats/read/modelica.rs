@@ -6,10 +6,9 @@
 
 use super::Input;
 use super::columns::{Columns, Places, check_curves, check_points, choose};
-use super::curve::{Metadata, stated_units, units};
-use super::curve::{Place, shown};
+use super::curve::{CUT, Metadata, Place, expected, miscounted, shown, stated_units, units, value};
 use super::label::{Label, Quantity};
-use super::text::{lines, number};
+use super::text::lines;
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
@@ -116,30 +115,16 @@ impl File {
         for (field, word) in words.enumerate() {
             let place = Place::Field { line, field: field + 1 };
             let Some(table) = self.tables.last_mut() else {
-                let expected = "a table such as \"double fd_load(4,2)\" in front of values";
-                return Err(error!(
-                    CurveFile,
-                    "{place}: expected {expected}, found \"{found}\"",
-                    found = shown(word)
-                ));
+                let what = "a table such as \"double fd_load(4,2)\" in front of values";
+                return Err(expected(place, what, word));
             };
-            let value = number(word).ok_or_else(|| {
-                error!(
-                    CurveFile,
-                    "{place}: expected a number, found \"{found}\"",
-                    found = shown(word)
-                )
-            })?;
+            let value = value(place.clone(), word)?;
             if table.values.len() == table.rows * table.columns {
-                let expected = format!(
+                let what = format_args!(
                     "no more than the {} rows of {} that table {} declares",
                     table.rows, table.columns, table.name
                 );
-                return Err(error!(
-                    CurveFile,
-                    "{place}: expected {expected}, found \"{found}\"",
-                    found = shown(word)
-                ));
+                return Err(expected(place, what, word));
             }
             if table.values.len() % table.columns == 0 {
                 table.lines.push(line);
@@ -153,18 +138,15 @@ impl File {
     fn check_last(&self) -> Result<(), Error> {
         let Some(table) = self.tables.last() else { return Ok(()) };
         if table.values.len() == table.rows * table.columns {
-            Ok(())
-        } else {
-            Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} rows of {}", table.rows, table.columns),
-                found = format!("{} values for it", table.values.len()),
-                place = Place::Line(table.line),
-                remedy = "write the file anew, it may be cut",
-                what = format!("table {}", table.name)
-            ))
+            return Ok(());
         }
+        Err(miscounted(
+            Place::Line(table.line),
+            format_args!("table {}", table.name),
+            format_args!("{} rows of {}", table.rows, table.columns),
+            format_args!("{} values for it", table.values.len()),
+            CUT,
+        ))
     }
 
     /// The table that was asked for, else ours, else the only one that can be a curve.
@@ -175,12 +157,16 @@ impl File {
             let expected = "a table of two columns, such as \"double fd_load(4,2)\"";
             return Err(error!(CurveFile, "expected {expected}, found {found}"));
         }
-        // Several of ours are the curves of several speeds.
-        let ours = fitting.iter().filter(|t| t.name.starts_with(OURS)).count();
-        let has_ours = ours == 1 && fitting.iter().any(|t| t.name == OURS);
         let names = fitting.iter().map(|t| (t.name.clone(), String::new()));
-        Ok(fitting[choose(names, asked.or(has_ours.then_some(OURS)))?])
+        Ok(fitting[choose(names.clone(), asked.or(ours_of(names)))?])
     }
+}
+
+/// Our table, if there is one; several of ours are the curves of several speeds.
+pub(super) fn ours_of(names: impl Iterator<Item = (String, String)>) -> Option<&'static str> {
+    let ours: Vec<String> =
+        names.map(|(name, _)| name).filter(|name| name.starts_with(OURS)).collect();
+    (ours == [OURS]).then_some(OURS)
 }
 
 /// Name, rows and columns, if the line declares a table.
@@ -194,15 +180,9 @@ fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, 
         let (rows, columns) = (rows.trim().parse().ok()?, columns.trim().parse().ok()?);
         (rows > 0 && columns > 0).then(|| (name.trim().to_string(), rows, columns))
     };
-    parse().map(Some).ok_or_else(|| {
-        error!(
-            CurveFile,
-            "{place}: expected {expected}, found \"{found}\"",
-            expected = "a table such as \"double fd_load(4,2)\"",
-            found = shown(text),
-            place = Place::Line(line)
-        )
-    })
+    parse()
+        .map(Some)
+        .ok_or_else(|| expected(Place::Line(line), "a table such as \"double fd_load(4,2)\"", text))
 }
 
 /// Refuses sizes that the file cannot hold: a value takes two bytes with its separator.
@@ -215,18 +195,15 @@ fn check_size(
 ) -> Result<(), Error> {
     check_points(rows)?;
     if rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
-        Ok(())
-    } else {
-        Err(error!(
-            CurveFile,
-            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-            declared = format!("{rows} rows of {columns}"),
-            found = format!("{bytes} bytes"),
-            place = Place::Line(line),
-            remedy = "correct the size",
-            what = format!("table {}", shown(name))
-        ))
+        return Ok(());
     }
+    Err(miscounted(
+        Place::Line(line),
+        format_args!("table {}", shown(name)),
+        format_args!("{rows} rows of {columns}"),
+        format_args!("{bytes} bytes"),
+        "correct the size",
+    ))
 }
 
 /// SI values of the units that a comment such as `d [m], F [N]` names.
@@ -234,7 +211,7 @@ fn sizes(comment: &str) -> Option<(f64, f64)> {
     let of = |wanted: Quantity| {
         comment.split([',', ';']).find_map(|text| {
             let label = Label::parse(text).filter(|label| label.quantity == wanted)?;
-            wanted.dimension().size_of(&label.unit?)
+            wanted.size_of(&label.unit?)
         })
     };
     Some((of(Quantity::Deflection)?, of(Quantity::Force)?))

@@ -4,10 +4,9 @@
 //! 200 points of a curve.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves, choose};
-use super::curve::{Metadata, title};
-use super::curve::{Place, shown};
-use super::text::{lines, number};
+use super::columns::{Columns, Places, check_curves, check_points, choose};
+use super::curve::{CUT, Metadata, Place, miscounted, shown, title, value};
+use super::text::lines;
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
@@ -31,14 +30,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         array.check()?;
     }
     if package.d.values.len() != package.f.values.len() {
-        return Err(error!(
-            CurveFile,
-            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-            declared = format!("{} forces", package.f.values.len()),
-            found = format!("{} deflections", package.d.values.len()),
-            place = Place::Line(package.f.line),
-            remedy = "write the file anew",
-            what = "constant f"
+        return Err(miscounted(
+            Place::Line(package.f.line),
+            "constant f",
+            format_args!("{} forces", package.f.values.len()),
+            format_args!("{} deflections", package.d.values.len()),
+            "write the file anew",
         ));
     }
     let mut notes = vec![
@@ -69,18 +66,11 @@ struct Array {
 impl Array {
     fn check(&self) -> Result<(), Error> {
         if self.is_closed && self.values.len() == self.declared {
-            Ok(())
-        } else {
-            Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} values", self.declared),
-                found = self.values.len(),
-                place = Place::Line(self.line),
-                remedy = "write the file anew, it may be cut",
-                what = format!("constant {}", self.name)
-            ))
+            return Ok(());
         }
+        let what = format_args!("constant {}", self.name);
+        let declared = format_args!("{} values", self.declared);
+        Err(miscounted(Place::Line(self.line), what, declared, self.values.len(), CUT))
     }
 }
 
@@ -152,21 +142,8 @@ impl Array {
         for (field, word) in text.split(',').enumerate().filter(|(_, word)| !word.trim().is_empty())
         {
             let place = Place::Field { line, field: field + 1 };
-            let value = number(word).ok_or_else(|| {
-                error!(
-                    CurveFile,
-                    "{place}: expected a number, found \"{found}\"",
-                    found = shown(word)
-                )
-            })?;
-            self.values.push(value);
-            if self.values.len() > MAX_POINTS {
-                return Err(error!(
-                    CurveFile,
-                    "the curve has more than {most} points: thin it",
-                    most = MAX_POINTS
-                ));
-            }
+            self.values.push(value(place, word)?);
+            check_points(self.values.len())?;
         }
         self.is_closed = is_closed;
         Ok(())

@@ -6,22 +6,19 @@
 //! the fourth line has mass, length and time, by name or by their size in SI.
 
 use super::Input;
-use super::columns::{Columns, Places, check_curves, check_points, choose};
-use super::curve::{Metadata, Place, stated_units, title, units};
-use super::lsdyna::Fields;
+use super::columns::{Columns, check_curves, choose};
+use super::curve::Place;
+use super::deck::{DeckCurve, Fields, Said, WIDTH};
 use super::text::{lines, number};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
 const REMEDY: &str = " (or in a comment of the file: \"# units: mm-t-s\")";
 
-/// Columns of a field.
-const WIDTH: usize = 20;
-
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     let is_comment = |line: &str| line.trim().is_empty() || line.starts_with(['#', '$']);
     let first = lines(input.beginning()).find(|(_, line)| !is_comment(line));
-    first.is_some_and(|(_, line)| is_keyword(&line))
+    first.is_some_and(|(_, line)| is_keyword(line))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
@@ -30,40 +27,29 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
         return Err(error!(CurveFile, "expected a /FUNCT, found {found}"));
     }
-    let names = deck.functions.iter().map(|f| (f.id.clone(), f.title.clone()));
+    let names = deck.functions.iter().map(|f| (f.curve.id.clone(), f.curve.title.clone()));
     let at = choose(names, input.options.curve.as_deref())?;
-    let mut found = deck.functions.swap_remove(at);
-    if found.keyword != FUNCTION || found.unit.is_some() {
+    let Function { line, keyword, unit, mut curve } = deck.functions.swap_remove(at);
+    if keyword != FUNCTION || unit.is_some() {
         return Err(error!(
             CurveFile,
             "{place}: expected /FUNCT/{id} with points between which it is straight, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
-            id = found.id,
-            keyword = found.keyword,
-            place = Place::Line(found.line),
-            unit = found.unit.map(|unit| format!("/{unit}")).unwrap_or_default()
+            id = curve.id,
+            place = Place::Line(line),
+            unit = unit.map(|unit| format!("/{unit}")).unwrap_or_default()
         ));
     }
-    let mut notes = vec![format!("curve: /FUNCT/{} of the deck", found.id)];
-    for Move { line, scale, shift, .. } in deck.moves.iter().filter(|m| m.id == found.id) {
-        for (x, y) in &mut found.points {
+    curve.notes.push(format!("curve: /FUNCT/{} of the deck", curve.id));
+    for Move { line, scale, shift, .. } in deck.moves.iter().filter(|m| m.id == curve.id) {
+        for (x, y) in &mut curve.points {
             (*x, *y) = (scale.0 * *x + shift.0, scale.1 * *y + shift.1);
         }
-        notes.push(format!(
+        curve.notes.push(format!(
             "scale: /MOVE_FUNCT of line {line}: abscissas times {} plus {}, ordinates times {} plus {}",
             scale.0, shift.0, scale.1, shift.1
         ));
     }
-    let system = units(found.units, input.options.units, REMEDY, &mut notes)?;
-    let (length, force) = (system.length_m, system.force());
-    Ok(Columns {
-        deflection_m: found.points.iter().map(|(x, _)| x * length).collect(),
-        force_n: found.points.iter().map(|(_, y)| y * force).collect(),
-        facts: found.facts,
-        title: title(&found.title, &mut notes),
-        units: Some(system),
-        notes,
-        ..Columns::at(Places::Lines(found.lines))
-    })
+    curve.columns(input.options.units, REMEDY)
 }
 
 /// Whether a line is one of `/NAME/…`.
@@ -71,21 +57,14 @@ fn is_keyword(line: &str) -> bool {
     line.strip_prefix('/').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_uppercase()))
 }
 
-/// A function of the deck, as it is written.
-#[derive(Clone, Debug, Default)]
-struct Found {
+/// A function of the deck.
+struct Function {
     line: u64,
     /// `FUNCT`, or another that begins so and is not read.
     keyword: String,
-    id: String,
     /// Number of units of its own.
     unit: Option<String>,
-    title: String,
-    points: Vec<(f64, f64)>,
-    lines: Vec<u64>,
-    /// What the comments in front of it say.
-    facts: Metadata,
-    units: Option<(UnitSystem, u64)>,
+    curve: DeckCurve,
 }
 
 /// What `/MOVE_FUNCT/id` makes of a function: scaled first, then shifted.
@@ -114,10 +93,9 @@ enum Next {
 /// The functions of a deck, and what its comments say.
 #[derive(Default)]
 struct Deck {
-    functions: Vec<Found>,
+    functions: Vec<Function>,
     moves: Vec<Move>,
-    facts: Metadata,
-    units: Option<(UnitSystem, u64)>,
+    said: Said,
 }
 
 impl Deck {
@@ -125,18 +103,14 @@ impl Deck {
         let mut deck = Self::default();
         let mut next = Next::Other;
         for (at, line) in lines(text) {
-            if let Some(comment) = line.strip_prefix(['#', '$']) {
-                let comment = comment.trim_start_matches(['#', '$']);
-                deck.units = stated_units(comment).map(|units| (units, at)).or(deck.units);
-                deck.facts.take(&line[..1], comment, Place::Line(at))?;
-                continue;
-            }
-            if is_keyword(&line) {
-                next = deck.keyword(&line, at);
+            if line.starts_with(['#', '$']) {
+                deck.said.comment(line, at)?;
+            } else if is_keyword(line) {
+                next = deck.keyword(line, at);
                 check_curves(deck.functions.len().max(deck.moves.len()))?;
-                continue;
+            } else {
+                next = deck.line(next, line, at)?;
             }
-            next = deck.line(next, &line, at)?;
         }
         Ok(deck)
     }
@@ -154,10 +128,8 @@ impl Deck {
             }
             _ if keyword.starts_with(FUNCTION) => {
                 let unit = parts.next().filter(|unit| !unit.is_empty() && unit != "0");
-                let (facts, units) = (self.facts, self.units);
-                let line = at;
-                let found = Found { line, keyword, id, unit, facts, units, ..Found::default() };
-                self.functions.push(found);
+                let curve = DeckCurve { id, said: self.said, ..DeckCurve::default() };
+                self.functions.push(Function { line: at, keyword, unit, curve });
                 Next::Title
             }
             _ => Next::Other,
@@ -168,7 +140,7 @@ impl Deck {
     fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, Error> {
         match (next, self.functions.last_mut(), self.moves.last_mut()) {
             (Next::Begin(0), None, _) => {
-                self.units = self.units.or(begin_units(line).map(|units| (units, at)));
+                self.said.units = self.said.units.or(begin_units(line).map(|units| (units, at)));
                 Ok(Next::Other)
             }
             (Next::Begin(more), ..) => Ok(more.checked_sub(1).map_or(Next::Other, Next::Begin)),
@@ -182,16 +154,11 @@ impl Deck {
             }
             (Next::Move(more), ..) => Ok(more.checked_sub(1).map_or(Next::Other, Next::Move)),
             (Next::Title, Some(function), _) => {
-                function.title = line.trim().into();
+                function.curve.title = line.trim().into();
                 Ok(Next::Point)
             }
-            (Next::Point, Some(function), _)
-                if function.keyword == FUNCTION && !line.trim().is_empty() =>
-            {
-                let fields = Fields::of(line, at, WIDTH);
-                function.points.push((fields.number(0, false)?, fields.number(1, false)?));
-                function.lines.push(at);
-                check_points(function.points.len())?;
+            (Next::Point, Some(function), _) if function.keyword == FUNCTION => {
+                function.curve.point(line, at)?;
                 Ok(Next::Point)
             }
             _ => Ok(next),

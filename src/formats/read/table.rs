@@ -9,8 +9,8 @@
 //! else those that name a quantity; without any, the last comment may name both. `CONTINUE` or `endcurve` ends a curve,
 //! and another may follow; `NAME #pts=N` begins one of a `Curveplot` file, whose labels are those of all its curves.
 
-use super::columns::{check_curves, check_points};
-use super::curve::{Place, shown};
+use super::columns::check_curves;
+use super::curve::{CUT, Place, expected, miscounted, shown};
 use super::label::{Label, Quantity, is_unit};
 use super::text::{lines, number};
 use crate::error::{Error, error};
@@ -314,7 +314,7 @@ impl<'a> Table<'a> {
         self.separator == Separator::Blanks
             && self.titles.is_empty()
             && self.columns == 2
-            && self.rows().next().is_none_or(is_plain)
+            && self.rows().take(HEADS).all(is_plain)
     }
 
     /// The fields of its first row, in a message.
@@ -382,14 +382,14 @@ impl<'a> Table<'a> {
             }
             take(&row)?;
             rows += 1;
-            check_points(rows)?;
         }
         match &self.declared {
-            Some((line, declared)) if declared.parse() != Ok(rows) => Err(error!(
-                CurveFile,
-                "{place}: the curve declares {declared} points (#pts), but the file has {rows} for it: write the file anew, it may be cut",
-                declared = shown(declared),
-                place = Place::Line(*line)
+            Some((line, declared)) if declared.parse() != Ok(rows) => Err(miscounted(
+                Place::Line(*line),
+                "the curve",
+                format_args!("{} points (#pts)", shown(declared)),
+                format_args!("{rows} for it"),
+                CUT,
             )),
             _ => Ok(()),
         }
@@ -422,12 +422,7 @@ pub(super) fn is_pair(line: &str) -> bool {
 }
 
 fn not_two(line: u64, found: &str) -> Error {
-    error!(
-        CurveFile,
-        "{place}: expected two numbers, or CONTINUE behind a curve, found \"{found}\"",
-        found = shown(found),
-        place = Place::Line(line)
-    )
+    expected(Place::Line(line), "two numbers, or CONTINUE behind a curve", found)
 }
 
 /// How the first of these lines fits as the header of a table, and its names.

@@ -1,8 +1,8 @@
 //! Curves and histories of text tables, whatever program or instrument wrote them.
 
 use super::Input;
-use super::columns::{Columns, Places, choose};
-use super::curve::{Metadata, Place, shown, stated_units, title};
+use super::columns::{Columns, Places, check_points, choose};
+use super::curve::{Metadata, Place, expected, shown, stated_units, title};
 use super::encoding::decoded;
 use super::label::{Label, Quantity};
 use super::layout::layout;
@@ -53,8 +53,10 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
 pub(super) fn read_pairs(input: &Input<'_>) -> Result<Columns, Error> {
     let tables = Table::pairs(input.text)?;
     if tables.is_empty() {
-        let expected = "a curve: lines of two numbers";
-        return Err(error!(CurveFile, "expected {expected}, found no such line"));
+        return Err(error!(
+            CurveFile,
+            "expected a curve: lines of two numbers, found no such line"
+        ));
     }
     let table = &tables[chosen(&tables, input.options.curve.as_deref())?];
     columns(input, table, &table.name, Vec::new())
@@ -106,7 +108,7 @@ fn columns(
             values[column.quantity as usize].push(value * column.size);
         }
         lines.push(row.line);
-        Ok(())
+        check_points(lines.len())
     })?;
     let [deflection_m, force_n, time_s] = values;
     Ok(Columns {
@@ -122,12 +124,7 @@ fn columns(
 }
 
 fn not_a_number(row: &Row<'_>, field: usize, found: &str) -> Error {
-    error!(
-        CurveFile,
-        "{place}: expected a number, found \"{found}\"",
-        found = shown(found),
-        place = Place::Field { line: row.line, field: field + 1 }
-    )
+    expected(Place::Field { line: row.line, field: field + 1 }, "a number", found)
 }
 
 /// Values over time, as a table or a curve's file has them.
