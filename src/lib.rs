@@ -71,8 +71,6 @@ pub mod curate;
 
 mod piecewise;
 
-mod table;
-
 mod stream;
 
 pub mod forest;

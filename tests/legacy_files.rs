@@ -230,6 +230,176 @@ fn texts_in_every_encoding() {
     assert!(error.contains("the unit \"µm\" of the deflection is not known"), "{error}");
 }
 
+/// CSV of LS-PrePost: a title, and a comma at each line's end. Curve files: `Curveplot`, `#pts=`, `endcurve`.
+#[test]
+fn curves_of_ls_prepost() {
+    let mm = given(Some("mm-t-s"));
+    let lines: String =
+        rows(1e-3, 1.0, ",    ", ".").lines().map(|l| format!("   {l},\n")).collect();
+    let csv = format!("Cross plot,Force vs displacement\nX-displacement,A1,\n{lines}");
+    let notes = table("a.csv", csv.as_bytes(), &mm);
+    has(&notes, "line 1 is a title");
+    has(&notes, "force of \"A1\" in units mm-t-s as given");
+    let refused_csv = |from: &str, to: &str, expected: &str| {
+        assert!(csv.contains(from));
+        let error = refused("a.csv", csv.replace(from, to).as_bytes(), &mm);
+        assert!(error.contains(expected), "{expected}: {error}");
+    };
+    refused_csv(
+        "Force vs",
+        "A vs",
+        "line 2: expected a column force with its unit, such as force_N or force_kN, found \"A1\"",
+    );
+    refused_csv("A1", "Force rate", "line 2: expected a column force");
+    refused_csv("A1", "A1 [J]", "line 2: expected a column force");
+    let three = csv.replace("A1,", "A1,B2,").replace(",\n ", ",1,\n ");
+    let error = refused("a.csv", three.as_bytes(), &mm);
+    assert!(error.contains("several columns could be the force: \"A1\", \"B2\""), "{error}");
+    let error = refused("a.csv", csv.as_bytes(), &given(None));
+    assert!(error.contains("line 2: the deflection has no unit"), "{error}");
+
+    let points = rows(1e-3, 1.0, "   ", ".");
+    let one =
+        |name: &str| format!("{name} #pts=5\n* Minval=  0.0 at time= 0.0\n{points}endcurve\n");
+    let head = "Curveplot\nbox against a wall\nX-displacement\nX-force\n";
+    let read = |text: &str, curve: Option<&str>| {
+        let options = ReadOptions { curve: curve.map(Into::into), ..mm.clone() };
+        let (curve, format) = read_bytes("a.crv", text.as_bytes(), &options)?;
+        assert_eq!(format, "two-columns");
+        is_points(&curve, text);
+        Ok::<_, String>(curve)
+    };
+    let single = format!("{head}{}", one("A-1"));
+    assert_eq!(read(&single, None).unwrap().title.as_deref(), Some("A-1"));
+    let two = format!("{single}{}", one("B-2").replace("3000000", "3000001"));
+    read(&two, Some("A-1")).unwrap();
+    read(&two, Some("1")).unwrap();
+    let wrong = |text: &str, curve: Option<&str>, expected: &str| {
+        let error = read(text, curve).map(|_| ()).unwrap_err();
+        assert!(error.contains(expected), "{expected}: {error}");
+    };
+    wrong(&two, None, "choose one with --curve: 1 (\"A-1\"), 2 (\"B-2\")");
+    wrong(&two, Some("C"), "the file has no curve \"C\": it has 1 (\"A-1\")");
+    wrong(&two.replace("B-2", "A-1"), Some("A-1"), "the file has 2 curves \"A-1\"");
+    wrong(
+        &single.replace("#pts=5", "#pts=6"),
+        None,
+        "line 5: the curve declares 6 points (#pts), but the file has 5 for it: write the file anew, it may be cut",
+    );
+    wrong(
+        &single.replace("1000   2000000\n", ""),
+        None,
+        "line 5: the curve declares 5 points (#pts), but the file has 4",
+    );
+    wrong(
+        &single.replace("50   3000000", "50   x"),
+        None,
+        "line 8, field 2: expected a number, found \"x\"",
+    );
+    wrong(
+        &single.replace("X-force", "Time"),
+        None,
+        "line 4: expected a force in the second column, found \"Time\"",
+    );
+}
+
+/// Labels of T/HIS that say the size of their unit in SI.
+#[test]
+fn factors_of_oasys_curves() {
+    let text =
+        |x: &str, y: &str| format!("Nose\n{x}\n{y}\nbox, 36 km/h\n{}", rows(1e-3, 1e3, ", ", "."));
+    let (x, y) = ("Crush <LENGTH/0.001>;", "Contact force <FORCE/1000>;");
+    let (curve, format) = read_bytes("a.cur", text(x, y).as_bytes(), &given(None)).unwrap();
+    assert_eq!(format, "two-columns");
+    is_points(&curve, "factors");
+    has(&curve.notes, "columns: deflection of \"Crush <LENGTH/0.001>;\" in LENGTH/0.001");
+    // They hold against what is given beside the file.
+    let given_units = given(Some("SI"));
+    is_points(&read_bytes("a.cur", text(x, y).as_bytes(), &given_units).unwrap().0, "given");
+    let wrong = |x: &str, y: &str, expected: &str| {
+        let error = refused("a.cur", text(x, y).as_bytes(), &given_units);
+        assert!(error.contains(expected), "{expected}: {error}");
+    };
+    wrong(
+        y,
+        x,
+        "line 2: expected a deflection in the first column, found \"Contact force <FORCE/1000>;\": name the columns by --deflection-column",
+    );
+    wrong(
+        "Crush <FORCE/1000>;",
+        y,
+        "line 2: the unit \"FORCE/1000\" of the deflection is not known",
+    );
+    wrong("Crush <LENGTH/mm>;", y, "line 2: the unit \"LENGTH/mm\" of the deflection is not known");
+    wrong("Velocity (m/s)", y, "line 2: the unit \"m/s\" of the deflection is not known");
+    let chosen = |deflection: &str, force: &str| ReadOptions {
+        columns: ColumnNames {
+            deflection: Some(deflection.into()),
+            force: Some(force.into()),
+            time: None,
+        },
+        ..given(None)
+    };
+    let swapped: String = rows(1e-3, 1e3, " ", ".")
+        .lines()
+        .map(|line| line.split_once(' ').map(|(d, f)| format!("{f} {d}\n")).unwrap())
+        .collect();
+    let swapped = format!("Nose\n{y}\n{x}\nbox\n{swapped}");
+    is_points(&read_bytes("a.cur", swapped.as_bytes(), &chosen("2", "1")).unwrap().0, "swapped");
+}
+
+/// A row with more fields than the header has: a decimal comma between commas, or a column that nothing names.
+#[test]
+fn rows_with_more_fields_than_the_header_are_refused() {
+    for text in ["d_m,force_N\n0,0\n0,5,1,5\n1,2\n2,3\n", "d_m,force_N\n0,0\n1,2\n2,3,7\n3,4\n"] {
+        let line = 2 + text.lines().skip(1).position(|l| l.matches(',').count() > 1).unwrap();
+        let error = refused("a.csv", text.as_bytes(), &given(None));
+        assert!(
+            error.contains(&format!(
+                "line {line}: expected 2 fields, one for each column of the table, found"
+            )),
+            "{error}"
+        );
+        let folder = file(text, "a.csv");
+        for command in [&["plot", "a.csv", "-o", "a.svg"][..], &["rate", "a.csv", "a.csv"]] {
+            let error = crumple_fails(folder.path(), 1, command);
+            assert!(
+                error.contains(&format!("line {line}: expected 2 fields")),
+                "{command:?}: {error}"
+            );
+        }
+    }
+    let error = refused("a.txt", b"d_m  x  force_N\n0 1 0\n1 2\n2 1 3\n3 1 4\n", &given(None));
+    assert!(error.contains("line 3, field 3: expected a number, found \"\""), "{error}");
+    let error = refused("a.txt", b"d_m  force_N  x\n0 0 1\n1 2\n2 3 1\n3 4 1\n", &given(None));
+    assert!(error.contains("line 3: expected 3 fields"), "{error}");
+    // Empty fields at the end are none.
+    let text = format!("d_m,force_N\n{}", rows(1.0, 1.0, ",", ".").replace('\n', ",,\n"));
+    table("a.csv", text.as_bytes(), &given(None));
+}
+
+/// A scenario says how what it cannot choose is chosen there; a picture chooses as `db add` does.
+#[test]
+fn curves_are_chosen_for_pictures_too() {
+    let head = "Curveplot\nbox\nX-displacement\nX-force\n";
+    let points = rows(1e-3, 1.0, " ", ".");
+    let folder =
+        file(&format!("{head}A #pts=5\n{points}endcurve\nB #pts=5\n{points}endcurve\n"), "a.crv");
+    let here = folder.path();
+    let plot = ["plot", "a.crv", "-o", "a.svg", "--units", "mm-t-s"];
+    assert!(
+        crumple_fails(here, 1, &plot).contains("choose one with --curve: 1 (\"A\"), 2 (\"B\")")
+    );
+    crumple_ok(here, &[&plot[..], &["--curve", "B"]].concat());
+    fs::write(
+        here.join("s.toml"),
+        "[run]\nduration = \"100ms\"\n[curves]\nc = { file = \"a.crv\", units = \"mm-t-s\" }\n[[train]]\nname = \"A\"\nspeed = \"10m/s\"\nvehicles = [{ name = \"A1\", mass = \"24t\" }]\n[wall]\n[contact]\ncurve = \"c\"\n",
+    )
+    .unwrap();
+    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    assert!(error.contains("; here as curve = \"…\" beside file"), "{error}");
+}
+
 fn file(text: &str, name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(name), text).unwrap();
@@ -341,6 +511,45 @@ fn radioss_functions() {
         &si,
         "line 4, columns 1-20: expected one number in each field of 20 columns",
     );
+    // What the deck makes of the points: scaled, then shifted; each time it says so.
+    let moved = |id: u32, factors: &str| format!("/MOVE_FUNCT/{id}\nmoved\n# x y\n{factors}\n");
+    let numbers = |of: [f64; 4]| of.map(|v| format!("{v:>20}")).concat();
+    let half: String =
+        POINTS.iter().map(|(d, f)| format!("{:>20}{:>20}\n", 2.0 * d + 2.0, 4.0 * f)).collect();
+    let deck = funct(5, &half) + &moved(5, &numbers([0.5, 0.25, -1.0, 0.0])) + &moved(6, "");
+    let note =
+        "scale: /MOVE_FUNCT of line 9: abscissas times 0.5 plus -1, ordinates times 0.25 plus 0";
+    t(&deck, &si, &[note]);
+    let before = moved(5, "")
+        + &moved(5, &numbers([0.0, 0.25, 0.0, 0.0]))
+        + &funct(5, &{
+            POINTS.iter().map(|(d, f)| format!("{d:>20}{:>20}\n", 4.0 * f)).collect::<String>()
+        });
+    t(&before, &si, &["line 1: abscissas times 1 plus 0", "line 5: abscissas times 1 plus 0"]);
+    wrong(
+        &deck.replace("                0.25", "                   x"),
+        &si,
+        "line 12, columns 21-40",
+    );
+    // What is not straight between points, has units of its own, or stands twice.
+    let smooth = funct(5, &half).replace("/FUNCT", "# s\n/FUNCT_SMOOTH");
+    wrong(
+        &smooth,
+        &si,
+        "line 2: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
+    );
+    t(
+        &(smooth + &one.replace("/5", "/7")),
+        &ReadOptions { curve: Some("7".into()), ..given(Some("mm-t-s")) },
+        &[],
+    );
+    wrong(
+        &one.replace("FUNCT/5", "FUNCT/5/2"),
+        &si,
+        "line 1: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT/5/2",
+    );
+    let five = ReadOptions { curve: Some("5".into()), ..si.clone() };
+    wrong(&format!("{one}{one}"), &five, "the file has 2 curves \"5\": leave one of them in it");
 }
 
 /// What crumple wrote for Radioss and Modelica comes back with all that it says; other packages are refused.

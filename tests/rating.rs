@@ -155,6 +155,43 @@ fn units_and_factors_are_those_of_the_arguments() {
     );
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
+    // Both in ms: nothing compares them, but a filter sees it.
+    let error = crumple_fails(here, 1, &["rate", "t.csv", "t.csv", "--cfc", "60"]);
+    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms behind the file's name; else filter with a lower class"), "{error}");
+    let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
+    assert_eq!(both["to_s"], 0.199);
+}
+
+/// Histories as LS-PrePost and T/HIS write them.
+#[test]
+fn histories_of_other_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let csv = "Nodal History,X-acceleration\nTime,A900001,B900002,";
+    write(here, "a.csv", csv, 200, |t| format!("  {t:?},  {:?},  {:?},", pulse(t), 1.1 * pulse(t)));
+    let crv = "Curveplot\nbox\nTime\nX-acceleration\nA-1 #pts=200\n* Minval= 0 at time= 0";
+    write(here, "a.crv", crv, 200, |t| format!("  {t:?}  {:?}", pulse(t)));
+    let cur = "box\nTime <TIME/0.001>;\nAcceleration <ACCELERATION/1>;\nnode 1";
+    write(here, "a.cur", cur, 200, |t| format!("{:?}, {:?}", 1e3 * t, 1.1 * pulse(t)));
+    let is_tenth = |of: &Value| {
+        let ratio = of["l1_ratio"].as_f64().unwrap();
+        assert!((ratio - 0.1).abs() < 1e-9, "{of}");
+    };
+    let of = rate(here, &["a.csv:A900001", "a.csv:B900002"]);
+    is_tenth(&of);
+    assert_eq!(of["quantity"], "acceleration", "the title says so");
+    is_tenth(&rate(here, &["a.crv", "a.csv:B900002"]));
+    is_tenth(&rate(here, &["a.crv:A-1", "a.cur,time=ms"]));
+    let error = crumple_fails(here, 1, &["rate", "a.crv", "a.cur"]);
+    assert!(error.contains("a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms"), "{error}");
+    let error = crumple_fails(here, 1, &["rate", "a.csv", "a.cur"]);
+    assert!(
+        error.contains("name one of \"A900001\", \"B900002\" behind the file's name: a.csv:COLUMN"),
+        "{error}"
+    );
+    // Whatever its name says.
+    std::fs::rename(here.join("a.crv"), here.join("a")).unwrap();
+    is_tenth(&rate(here, &["a", "a.cur,time=ms"]));
 }
 
 #[test]

@@ -5,7 +5,6 @@ use crate::assess::train::TrainComparison;
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{Chain, Run};
 use crate::plot::{Axis, Chart, Panel, Series, Shown};
-use crate::table::{CsvTable, NoNumber};
 
 /// What of a run is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,10 +62,6 @@ pub struct Motion {
     pub(crate) energies: Option<Energies>,
 }
 
-fn not_a_number(NoNumber { line, column, found, .. }: NoNumber) -> Error {
-    error!(Plot, "line {line}, column {column}: expected a number, found \"{found}\"")
-}
-
 fn not_csv(error: csv::Error) -> Error {
     Error::below(ErrorCode::Plot, error)
 }
@@ -77,9 +72,15 @@ impl Motion {
     /// # Errors
     /// If it has other columns, or fields that are not finite numbers.
     pub fn of_csv(text: &[u8]) -> Result<Self, Error> {
-        let mut table = CsvTable::open(text, 0).map_err(not_csv)?;
-        let header: Vec<String> = table.header().iter().map(String::from).collect();
-        let line = table.header_line();
+        let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        let mut table = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(text);
+        let header = table.headers().map_err(not_csv)?.clone();
+        let line = header.position().map_or(1, csv::Position::line);
+        let header: Vec<String> = header.iter().map(String::from).collect();
         if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
             return Err(error!(
                 Plot,
@@ -88,10 +89,24 @@ impl Motion {
             ));
         }
         let mut columns = vec![Vec::new(); header.len()];
-        for row in table.rows() {
+        for row in table.records() {
             let row = row.map_err(not_csv)?;
+            let line = row.position().map_or(0, csv::Position::line);
+            if row.len() > header.len() {
+                return Err(error!(
+                    Plot,
+                    "line {line}: expected {} fields, one for each column, found {}",
+                    header.len(),
+                    row.len()
+                ));
+            }
             for (k, column) in columns.iter_mut().enumerate() {
-                column.push(row.number(k).map_err(not_a_number)?);
+                let found = row.get(k).unwrap_or_default();
+                let number = found.parse::<f64>().ok().filter(|number| number.is_finite());
+                column.push(number.ok_or_else(|| {
+                    let at = k + 1;
+                    error!(Plot, "line {line}, column {at}: expected a number, found \"{found}\"")
+                })?);
             }
         }
         if columns[0].is_empty() {

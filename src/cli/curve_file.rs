@@ -6,18 +6,9 @@ use crate::unit::{STIFFNESS, SpeedKind};
 
 use super::arguments::{mass, one_of};
 
-/// How a file is read, and the impact that its curve belongs to.
+/// How a curve's file is read.
 #[derive(clap::Args)]
-pub(super) struct CurveFile {
-    /// What the speed is measured against [default: what the file says, else the group's]
-    #[arg(long, value_parser = one_of(KINDS))]
-    kind: Option<SpeedKind>,
-    /// Mass of the other body of a pair [default: what the file says, else that of the body]
-    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
-    other_mass: Option<f64>,
-    /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
-    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
-    unloading: Option<f64>,
+pub(super) struct Reading {
     /// Format of the file, if not by its content (crumple db add --list)
     #[arg(long)]
     from: Option<String>,
@@ -33,6 +24,22 @@ pub(super) struct CurveFile {
     /// Column of the time; none for force over deflection without times (slow tests)
     #[arg(long, value_name = "COLUMN")]
     time_column: Option<String>,
+}
+
+/// How a file is read, and the impact that its curve belongs to.
+#[derive(clap::Args)]
+pub(super) struct CurveFile {
+    /// What the speed is measured against [default: what the file says, else the group's]
+    #[arg(long, value_parser = one_of(KINDS))]
+    kind: Option<SpeedKind>,
+    /// Mass of the other body of a pair [default: what the file says, else that of the body]
+    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
+    other_mass: Option<f64>,
+    /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
+    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
+    unloading: Option<f64>,
+    #[command(flatten)]
+    reading: Reading,
     /// Take curves whose energy cannot be that of speed and mass
     #[arg(long)]
     accept_energy: bool,
@@ -47,37 +54,41 @@ fn stiffness(text: &str) -> Result<f64, String> {
     STIFFNESS.parse_positive(text).map_err(|e| e.to_string())
 }
 
+impl Reading {
+    /// Whether anything is said.
+    pub(super) fn is_asked(&self) -> bool {
+        self.options() != ReadOptions::default()
+    }
+
+    /// What is said here; the rest is as by default.
+    pub(super) fn options(&self) -> ReadOptions {
+        ReadOptions {
+            format: self.from.clone(),
+            curve: self.curve.clone(),
+            columns: ColumnNames {
+                deflection: self.deflection_column.clone(),
+                force: self.force_column.clone(),
+                time: self.time_column.clone(),
+            },
+            ..ReadOptions::default()
+        }
+    }
+}
+
 impl CurveFile {
     /// Whether anything is said.
     pub(super) fn is_asked(&self) -> bool {
-        let read = [
-            &self.from,
-            &self.curve,
-            &self.deflection_column,
-            &self.force_column,
-            &self.time_column,
-        ];
         let is_number = self.other_mass.is_some() || self.unloading.is_some();
-        self.kind.is_some() || is_number || self.accept_energy || read.iter().any(|o| o.is_some())
+        self.kind.is_some() || is_number || self.accept_energy || self.reading.is_asked()
     }
 
     /// What is said here; the rest is as by default.
     pub(super) fn settings(&self) -> Settings {
-        let columns = ColumnNames {
-            deflection: self.deflection_column.clone(),
-            force: self.force_column.clone(),
-            time: self.time_column.clone(),
-        };
         Settings {
             kind: self.kind,
             other_mass_kg: self.other_mass,
             unloading_stiffness_n_per_m: self.unloading,
-            read: ReadOptions {
-                format: self.from.clone(),
-                curve: self.curve.clone(),
-                columns,
-                ..ReadOptions::default()
-            },
+            read: self.reading.options(),
             accept_energy: self.accept_energy,
             ..Settings::default()
         }

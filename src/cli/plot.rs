@@ -21,6 +21,7 @@ use crate::unit::{UnitSystem, km_per_h};
 use serde::Serialize;
 
 use super::arguments::{self, one_of};
+use super::curve_file::Reading;
 use super::file_kind::FileKind;
 use super::output;
 use super::progress::Bar;
@@ -81,6 +82,8 @@ pub(super) struct Args {
     /// Of a solver file: filtered lines beside the raw ones, by channel frequency class such as 60
     #[arg(long, value_name = "CLASS", requires = "units", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
+    #[command(flatten)]
+    reading: Reading,
     /// Title above the picture (default: what is drawn)
     #[arg(long)]
     title: Option<String>,
@@ -266,6 +269,7 @@ impl Args {
             (self.section.is_some(), of_solver, "--section is for a solver file"),
             (self.format.is_some(), of_solver, "--format is for a solver file"),
             (self.units.is_some(), of_solver, "--units is for a solver file"),
+            (self.reading.is_asked(), of_solver, "--curve and the like are for a curve's file"),
         ] {
             if given && !allowed {
                 return Err(Failure::Usage(format!(
@@ -360,7 +364,7 @@ fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure>
         Err(error)
             if args.format.is_none() && (error.is_about("format") || error.is_about("deck")) =>
         {
-            let how = ReadOptions { units: args.units, ..ReadOptions::default() };
+            let how = ReadOptions { units: args.units, ..args.reading.options() };
             let (curve, _) = read::read(&args.file, &how)
                 .map_err(|of_curve| error.followed_by(&format!("; and as a curve: {of_curve}")))?;
             let (title, name) = (args.file.display().to_string(), curve.title.as_deref());

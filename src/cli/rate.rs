@@ -7,10 +7,11 @@ use super::arguments::one_of;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 use crate::error::Error;
 use crate::file;
+use crate::formats;
 use crate::rating::deceleration::Deceleration;
 use crate::rating::differences::MagnitudePhase;
 use crate::rating::iso18571::Iso18571;
-use crate::rating::{self, Quantity, Rating, RatingSettings, Signal, table};
+use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::unit::TIME;
 
@@ -155,6 +156,8 @@ enum TimeUnit {
 }
 
 impl TimeUnit {
+    const ALL: [Self; 3] = [Self::S, Self::Ms, Self::Us];
+
     fn name(self) -> &'static str {
         match self {
             Self::S => "s",
@@ -164,7 +167,7 @@ impl TimeUnit {
     }
 
     fn named(name: &str) -> Option<Self> {
-        [Self::S, Self::Ms, Self::Us].into_iter().find(|u| u.name() == name)
+        Self::ALL.into_iter().find(|u| u.name() == name)
     }
 
     /// Its length in s.
@@ -176,12 +179,14 @@ impl TimeUnit {
         }
     }
 
-    /// The unit that the name of a column ends with: `time_ms`, `time [ms]`, `t (ms)`.
+    /// The unit that the name of a column ends with: `time_ms`, `time [ms]`, `t (ms)`, `Time <TIME/0.001>;`.
     fn at_the_end_of(name: &str) -> Option<Self> {
-        let name = name.trim_end_matches([')', ']', ' ']);
+        let name = name.trim_end_matches([')', ']', ' ', ';', '>']);
         let (_, unit) = name.rsplit_once(['_', '(', '[', ' ', '/'])?;
+        let size = unit.parse::<f64>().ok().filter(|_| name.contains('<'));
+        let by_size = || Self::ALL.into_iter().find(|u| Some(u.seconds()) == size);
         // Both signs for micro.
-        Self::named(&unit.to_lowercase().replace(['µ', 'μ'], "u"))
+        Self::named(&unit.to_lowercase().replace(['µ', 'μ'], "u")).or_else(by_size)
     }
 }
 
@@ -302,26 +307,23 @@ fn failed(message: String) -> Failure {
 impl Wanted<'_> {
     fn read(&self, options: GlobalOptions) -> Result<Read, Failure> {
         let is_table = self.path.extension().is_some_and(|extension| {
-            ["csv", "tsv", "txt"].iter().any(|e| extension.eq_ignore_ascii_case(e))
+            ["csv", "tsv", "txt", "crv", "cur"].iter().any(|e| extension.eq_ignore_ascii_case(e))
         });
         if is_table && self.format.is_none() {
             return self.read_table();
         }
         match self.read_solver_file(options) {
-            // Any other name may hold a table as well, if its columns are asked for.
-            Err(Failure::Failed(error))
-                if self.column.is_some()
-                    && error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) =>
-            {
-                self.read_table()
-            }
+            // Any other name may hold a table as well.
             Err(Failure::Failed(error))
                 if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) =>
             {
-                Err(failed(format!(
-                    "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",
-                    self.path.display()
-                )))
+                match self.read_table() {
+                    Err(_) if self.column.is_none() => Err(failed(format!(
+                        "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",
+                        self.path.display()
+                    ))),
+                    read => read,
+                }
             }
             other => other,
         }
@@ -331,7 +333,7 @@ impl Wanted<'_> {
         let path = self.path.display();
         let text = file::read(self.path, MAX_TABLE_BYTES);
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
-        let columns = table::read(&mut &*text, self.column).map_err(|error| {
+        let read = formats::history(&text, self.column).map_err(|error| {
             let how = if error.is_about("column") {
                 format!(" behind the file's name: {path}:COLUMN")
             } else {
@@ -339,18 +341,19 @@ impl Wanted<'_> {
             };
             failed(format!("{path}: {error}{how}"))
         })?;
-        let said = TimeUnit::at_the_end_of(&columns.time_name);
+        let (line, time_name) = &read.time_name;
+        let said = TimeUnit::at_the_end_of(time_name);
         if self.address.unit.is_none()
             && let Some(unit) = said.filter(|unit| *unit != TimeUnit::S)
         {
             return Err(failed(format!(
-                "{path}: line 1, column 1 (\"{}\"): expected a time in s: write {path},time={}",
-                columns.time_name,
+                "{path}: line {line}, column 1 (\"{time_name}\"): expected a time in s: write {path},time={}",
                 unit.name()
             )));
         }
-        let signal = self.signal(&columns.name, &columns.time, &columns.values)?;
-        Ok(Read { signal, column: columns.name, is_table: true, problems: 0 })
+        let signal = self.signal(&read.name, &read.time, &read.values)?;
+        let column = format!("{} {}", read.name, read.title);
+        Ok(Read { signal, column, is_table: true, problems: 0 })
     }
 
     fn read_solver_file(&self, options: GlobalOptions) -> Result<Read, Failure> {

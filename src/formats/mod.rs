@@ -35,6 +35,7 @@ pub use export_curve::{ExportCurve, ExportInput};
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::curve::{Metadata, Place, ReadFile};
+pub(crate) use read::history;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
 pub use tail::Tail;
 

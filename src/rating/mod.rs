@@ -31,7 +31,6 @@ pub(crate) mod differences;
 pub(crate) mod iso18571;
 pub(crate) mod shift;
 mod signal;
-pub(crate) mod table;
 
 use schemars::JsonSchema;
 use serde::Serialize;

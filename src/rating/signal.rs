@@ -22,12 +22,25 @@ pub struct Signal {
     values: Vec<f64>,
 }
 
-/// What the filter cannot take. The filter's own words name the recipe's entry.
-fn too_much(error: &CfcError) -> String {
+/// Records that last longer than this are probably not of a collision, but count their times in a smaller unit.
+const LONG_S: f64 = 2.0;
+
+/// What the filter cannot take of a signal of that length. The filter's own words name the recipe's entry.
+fn too_much(error: &CfcError, length_s: f64) -> String {
     match error {
-        CfcError::TooCoarse { class, interval_s, longest_s } => format!(
-            "its samples are {interval_s:.2e} s apart, too far for CFC {class}: at most {longest_s:.2e} s; filter with a lower class or not at all"
-        ),
+        CfcError::TooCoarse { class, interval_s, longest_s } => {
+            let fits = |(_, size): &(&str, f64)| interval_s * size <= *longest_s;
+            let unit = [("ms", 1e-3), ("us", 1e-6)].into_iter().find(fits);
+            let unit = match unit.filter(|_| length_s > LONG_S) {
+                Some((unit, _)) => format!(
+                    "it lasts {length_s} s, so its times may be in {unit}: then write ,time={unit} behind the file's name; else "
+                ),
+                None => String::new(),
+            };
+            format!(
+                "its samples are {interval_s:.2e} s apart, too far for CFC {class}: at most {longest_s:.2e} s; {unit}filter with a lower class or not at all"
+            )
+        }
         CfcError::Uneven { spread_percent } => format!(
             "its intervals differ by up to {spread_percent:.0} % of their mean, too much for a CFC filter: filter not at all"
         ),
@@ -92,8 +105,10 @@ impl Signal {
 
     /// The signal behind a CFC filter without phase shift, at its own times.
     pub(crate) fn filtered(&self, class: u32) -> Result<Self, Error> {
+        let (first_s, last_s) = self.range_s();
         let filtered = cfc::filter(class, &self.time_s, &self.values).map_err(|source| {
-            error!(Rating, "{name}: {}", too_much(&source), name = self.name).caused_by(source)
+            let why = too_much(&source, last_s - first_s);
+            error!(Rating, "{name}: {why}", name = self.name).caused_by(source)
         })?;
         Ok(Self { values: filtered.values, ..self.clone() })
     }

@@ -116,8 +116,13 @@ impl CurveSource {
                     ..ReadOptions::default()
                 };
                 let read = read::driving(&file, &options).map_err(|error| {
-                    let asks = error.message().contains("--units");
-                    let here = if asks { "; here as units = \"…\" beside file" } else { "" };
+                    let here = [
+                        ("--units", "; here as units = \"…\" beside file"),
+                        ("--curve", "; here as curve = \"…\" beside file"),
+                        ("-column", "; here by the names of the columns in the file"),
+                    ];
+                    let asks = |(option, _): &(&str, &str)| error.message().contains(option);
+                    let here = here.into_iter().find(asks).map_or("", |(_, here)| here);
                     let error = Error::below(ErrorCode::CurveFile, error).followed_by(here);
                     of_curve(error).at_key("file")
                 })?;

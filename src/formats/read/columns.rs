@@ -2,11 +2,13 @@
 //! the points that other tools need.
 
 use crate::error::{Error, error};
+use crate::guess;
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
-use super::curve::Place;
 use super::curve::{Metadata, ReadCurve, ReadFile};
+use super::curve::{Place, shown};
+use crate::curve::{Envelope, ForceCurve};
 use crate::unit::UnitSystem;
 
 /// Most points of a curve: guards memory. Test records have some ten thousand.
@@ -18,14 +20,62 @@ pub(super) const MAX_CURVES: usize = 10_000;
 /// Refuses one curve more than a file may have.
 pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
     if curves > MAX_CURVES {
-        Err(error!(
+        let most = MAX_CURVES;
+        return Err(error!(
             CurveFile,
-            "the file has more than {most} curves: take out the one that is meant",
-            most = MAX_CURVES
-        ))
-    } else {
-        Ok(())
+            "the file has more than {most} curves: take out the one that is meant"
+        ));
     }
+    Ok(())
+}
+
+/// Refuses one point more than a curve may have.
+pub(super) fn check_points(points: usize) -> Result<(), Error> {
+    if points > MAX_POINTS {
+        let most = MAX_POINTS;
+        return Err(error!(CurveFile, "the curve has more than {most} points: thin it"));
+    }
+    Ok(())
+}
+
+/// Curves and columns that a message lists.
+pub(super) const LISTED: usize = 20;
+
+/// Which of a file's curves was asked for by its name, else the only one; each with its name and title.
+pub(super) fn choose(
+    curves: impl Iterator<Item = (String, String)> + Clone,
+    asked: Option<&str>,
+) -> Result<usize, Error> {
+    let known = || {
+        let name = |(name, title): (String, String)| match title.trim() {
+            "" => shown(&name),
+            title => format!("{} (\"{}\")", shown(&name), shown(title)),
+        };
+        curves.clone().take(LISTED).map(name).collect::<Vec<_>>().join(", ")
+    };
+    let is_asked = |(name, _): &(String, String)| asked.is_none_or(|asked| name == asked.trim());
+    let mut found = curves.clone().enumerate().filter(|(_, curve)| is_asked(curve));
+    match (found.next(), found.count(), asked) {
+        (Some((at, _)), 0, _) => Ok(at),
+        (None, _, Some(asked)) => Err(no_curve(asked, &known())),
+        (_, more, Some(asked)) => Err(error!(
+            CurveFile,
+            "the file has {count} curves \"{asked}\": leave one of them in it",
+            asked = shown(asked),
+            count = more + 1
+        )),
+        (_, _, None) => Err(several_curves(&known())),
+    }
+}
+
+pub(super) fn no_curve(asked: &str, known: &str) -> Error {
+    let asked = shown(asked);
+    let hint = guess::hint(&asked, known);
+    error!(CurveFile, "the file has no curve \"{asked}\": it has {known}{hint}")
+}
+
+pub(super) fn several_curves(known: &str) -> Error {
+    error!(CurveFile, "the file holds several curves: choose one with --curve: {known}")
 }
 
 /// Deflections and forces below this share of the largest are zero.
@@ -89,17 +139,23 @@ impl Columns {
         }
     }
 
+    /// The curve that drives an interface, without any change: increasing deflections from 0, forces of 0 or above.
+    pub(super) fn as_they_stand(&self) -> Result<ForceCurve, Error> {
+        let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
+        match envelope.first_pulling_point() {
+            Some(point) => Err(error!(
+                CurveFile,
+                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+            )),
+            None => Ok(self.facts.driving(envelope)),
+        }
+    }
+
     /// The curve of these columns. A record over time keeps its signs, which its motion tells.
     pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
-            return Err(error!(
-                CurveFile,
-                "the curve has {}{of}: expected at least {least}",
-                crate::plural::counted(points, "point"),
-                least = MIN_POINTS,
-                of = ""
-            ));
+            return Err(too_few(points, ""));
         }
         self.check_finite()?;
         if self.time_s.is_none() {
@@ -192,13 +248,7 @@ impl Points {
         self.set_steps_apart(notes);
         let points = self.list.len();
         if points < MIN_POINTS {
-            let of = " without those of guard and repetition";
-            return Err(error!(
-                CurveFile,
-                "the curve has {}{of}: expected at least {least}",
-                crate::plural::counted(points, "point"),
-                least = MIN_POINTS
-            ));
+            return Err(too_few(points, " without those of guard and repetition"));
         }
         self.check_order()?;
         if self.list[0].d > 0.0 {
@@ -385,6 +435,11 @@ impl Points {
         }
         Ok(())
     }
+}
+
+pub(super) fn too_few(points: usize, of: &str) -> Error {
+    let (points, least) = (crate::plural::counted(points, "point"), MIN_POINTS);
+    error!(CurveFile, "the curve has {points}{of}: expected at least {least}")
 }
 
 /// Of points at one deflection, the first, the last and the extremes between.

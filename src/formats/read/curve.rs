@@ -3,6 +3,7 @@
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
+use super::text::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::loading_branch;
 use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};
@@ -269,6 +270,31 @@ impl fmt::Display for Place {
             Self::Row(row) => write!(f, "row {row}"),
         }
     }
+}
+
+/// What should stand at a place, and what does.
+pub(super) fn expected(place: Place, what: impl fmt::Display, found: &str) -> Error {
+    let found = shown(found);
+    error!(CurveFile, "{place}: expected {what}, found \"{found}\"")
+}
+
+/// The number that a text is.
+pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
+    number(text).ok_or_else(|| expected(place, "a number", text))
+}
+
+/// What to do with a file that is shorter than it says.
+pub(super) const CUT: &str = "write the file anew, it may be cut";
+
+/// Another number of values than the file declares.
+pub(super) fn miscounted(
+    place: Place,
+    what: impl fmt::Display,
+    declared: impl fmt::Display,
+    found: impl fmt::Display,
+    remedy: &str,
+) -> Error {
+    error!(CurveFile, "{place}: {what} declares {declared}, but the file has {found}: {remedy}")
 }
 
 /// Characters of a wrong value that a message repeats.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// A text as UTF-8 without a byte-order mark, and what was done for it.
 pub(super) struct Decoded<'a> {
-    pub bytes: Cow<'a, [u8]>,
+    pub text: Cow<'a, str>,
     pub note: Option<&'static str>,
 }
 
@@ -20,8 +20,7 @@ pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
             units.push(u16::from(b'?'));
         }
         let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
-        let bytes = text.collect::<String>().into_bytes();
-        Decoded { bytes: Cow::Owned(bytes), note: Some(note) }
+        Decoded { text: text.collect(), note: Some(note) }
     };
     match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),
@@ -52,13 +51,14 @@ fn is_zero(bytes: &[u8], which: usize) -> bool {
 }
 
 fn utf8_or_latin1(bytes: &[u8]) -> Decoded<'_> {
-    if std::str::from_utf8(bytes).is_ok() {
-        return Decoded { bytes: Cow::Borrowed(bytes), note: None };
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Decoded { text: text.into(), note: None },
+        // A character of Latin-1 has the number of its byte.
+        Err(_) => Decoded {
+            text: bytes.iter().copied().map(char::from).collect(),
+            note: Some("text: Latin-1, as it is no UTF-8"),
+        },
     }
-    // A character of Latin-1 has the number of its byte.
-    let text: String = bytes.iter().copied().map(char::from).collect();
-    let note = Some("text: Latin-1, as it is no UTF-8");
-    Decoded { bytes: Cow::Owned(text.into_bytes()), note }
 }
 
 #[cfg(test)]
@@ -72,7 +72,7 @@ mod tests {
         let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
         let t = |bytes: Vec<u8>, note: Option<&str>| {
             let decoded = decoded(&bytes);
-            assert_eq!(String::from_utf8_lossy(&decoded.bytes), text, "{note:?}");
+            assert_eq!(decoded.text, text, "{note:?}");
             assert_eq!(decoded.note.map(|n| &n[6..14]), note);
         };
         t(text.into(), None);
@@ -81,7 +81,7 @@ mod tests {
         t([vec![0xFE, 0xFF], pairs(u16::to_be_bytes)].concat(), Some("UTF-16, "));
         t(latin1, Some("Latin-1,"));
         let plain: Vec<u8> = "d_m;F_N\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        assert_eq!(&*decoded(&plain).bytes, b"d_m;F_N\n");
-        assert_eq!(&*decoded(&[0xFF, 0xFE, b'a', 0, b'b']).bytes, b"a?");
+        assert_eq!(decoded(&plain).text, "d_m;F_N\n");
+        assert_eq!(decoded(&[0xFF, 0xFE, b'a', 0, b'b']).text, "a?");
     }
 }

@@ -8,15 +8,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::columns::{Columns, MAX_POINTS, Places};
-use super::curve::{Metadata, Place, ReadFile, shown, title};
+use super::columns::{Columns, LISTED, Places, check_points, no_curve, several_curves};
+use super::curve::{CUT, Metadata, Place, ReadFile, expected, miscounted, shown, title, value};
 use super::encoding::decoded;
 use super::label::Quantity;
 use super::text::{lines, number};
 use super::{Input, MAX_CURVE_BYTES};
 use crate::error::{Error, error};
 use crate::file;
-use crate::guess;
 use crate::signal::interpolate;
 
 /// Files of a folder that are looked at: a test has some hundred channels.
@@ -36,9 +35,6 @@ pub(super) fn tests(folder: &Path) -> Vec<PathBuf> {
         within.filter(|path| path.is_dir() && !of(path).is_empty()).collect()
     }
 }
-
-/// Tests of a folder that a message lists.
-const LISTED: usize = 20;
 
 /// Refuses a folder of several tests: each has a speed of its own.
 pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), Error> {
@@ -68,12 +64,8 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let (mut found, mut bytes_left) = (Vec::new(), MAX_CURVE_BYTES);
     for path in channel_files(input.path)? {
         let named = |source: Error| {
-            error!(
-                CurveFile,
-                "{file}: {source}",
-                file = path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-            )
-            .caused_by(source)
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            error!(CurveFile, "{file}: {source}").caused_by(source)
         };
         let bytes = file::read(&path, bytes_left).map_err(|e| named(e.into()))?;
         bytes_left -= bytes.len() as u64;
@@ -108,15 +100,8 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         (0..at_s.len()).filter(|&i| (from_s..=to_s).contains(&at_s[i])).collect();
     let time_s: Vec<f64> = common.iter().map(|&i| at_s[i]).collect();
     if motion_s.len() > 1 && !time_s.is_empty() {
-        columns.deflection_m =
-            interpolate(&motion_s, &deflection.values, &time_s).map_err(|e| {
-                error!(
-                    CurveFile,
-                    "expected {expected}, found {found}",
-                    expected = "common times",
-                    found = e
-                )
-            })?;
+        columns.deflection_m = interpolate(&motion_s, &deflection.values, &time_s)
+            .map_err(|e| error!(CurveFile, "expected common times, found {e}"))?;
     }
     columns.notes.push(format!(
         "times: the channels differ in them; the displacement was interpolated to {} of the force's",
@@ -140,13 +125,13 @@ fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
     };
     let bytes = file::read(&path, MAX_CURVE_BYTES)?;
     columns.files.push(ReadFile::of(&path, &bytes));
-    let text = decoded(&bytes).bytes;
+    let text = decoded(&bytes).text;
     described(&text, &mut columns.facts);
     comments(&text, &mut columns.facts)
 }
 
 /// Takes masses (kg) and velocities (m/s) of the test objects.
-fn described(bytes: &[u8], facts: &mut Metadata) {
+fn described(bytes: &str, facts: &mut Metadata) {
     let header = Header::read(bytes);
     let of = |what: &str, k: usize| {
         let text = |key: String| number(header.text(&key));
@@ -172,7 +157,7 @@ fn merged(first: Metadata, others: &[Metadata]) -> Metadata {
 }
 
 /// Takes the facts of lines `Comments :key: value`.
-fn comments(bytes: &[u8], facts: &mut Metadata) -> Result<(), Error> {
+fn comments(bytes: &str, facts: &mut Metadata) -> Result<(), Error> {
     for (at, line) in lines(bytes) {
         if let Some((key, value)) = line.split_once(':')
             && key.trim().eq_ignore_ascii_case("comments")
@@ -279,14 +264,12 @@ impl Channel {
         if found.values.len() == self.values.len() {
             Ok(found.values.clone())
         } else {
-            Err(named(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} times", found.values.len()),
-                found = format!("{} values", self.values.len()),
-                place = Place::Line(line),
-                remedy = "name the channel of its own times",
-                what = format!("the reference channel {}", found.code)
+            Err(named(miscounted(
+                Place::Line(line),
+                format_args!("the reference channel {}", found.code),
+                format_args!("{} times", found.values.len()),
+                format_args!("{} values", self.values.len()),
+                "name the channel of its own times",
             )))
         }
     }
@@ -306,7 +289,7 @@ impl Channel {
     /// The channel of a file; `None` if it is of another dimension.
     fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, Error> {
         let file = ReadFile::of(path, bytes);
-        let bytes = &decoded(bytes).bytes;
+        let bytes = &decoded(bytes).text;
         let header = Header::read(bytes);
         let code = header.text("channel code");
         let quantity = match code.get(12..14) {
@@ -316,17 +299,7 @@ impl Channel {
             _ => return Ok(None),
         };
         let (line, unit) = header.entry("unit");
-        let size = quantity.size_of(unit).ok_or_else(|| {
-            let known = quantity.dimension().known_units();
-            let place = Place::Line(line);
-            let unit = shown(unit);
-            let what = quantity.name();
-            error!(
-                CurveFile,
-                "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}",
-                guess::hint(&unit, &known)
-            )
-        })?;
+        let size = quantity.known_size_of(unit, Place::Line(line))?;
         let times = match quantity {
             Quantity::Time => Times::Even { first_s: 0.0, interval_s: 0.0, is_stated: true },
             Quantity::Deflection | Quantity::Force => header.times()?,
@@ -360,7 +333,7 @@ const NO_VALUE: &str = "NOVALUE";
 const HEADER_LINES: usize = 1_000;
 
 impl Header {
-    fn read(bytes: &[u8]) -> Self {
+    fn read(bytes: &str) -> Self {
         let entries = lines(bytes).take(HEADER_LINES).filter_map(|(at, line)| {
             let (name, value) = line.split_once(':')?;
             Some((at, name.trim().to_ascii_lowercase(), value.trim().to_string()))
@@ -380,15 +353,8 @@ impl Header {
 
     fn number(&self, name: &str) -> Result<f64, Error> {
         let (line, text) = self.entry(name);
-        number(text).ok_or_else(|| {
-            error!(
-                CurveFile,
-                "{place}: expected {expected}, found \"{found}\"",
-                expected = format!("\"{name} :\" with a number"),
-                found = shown(text),
-                place = Place::Line(line)
-            )
-        })
+        let what = format_args!("\"{name} :\" with a number");
+        number(text).ok_or_else(|| expected(Place::Line(line), what, text))
     }
 
     /// Of which channel the times are, or how they follow from an interval.
@@ -407,50 +373,28 @@ impl Header {
         let interval_s = self.number("sampling interval")?;
         if interval_s <= 0.0 {
             let (line, found) = self.entry("sampling interval");
-            let expected = "an interval above 0 in s";
-            let place = Place::Line(line);
-            return Err(error!(
-                CurveFile,
-                "{place}: expected {expected}, found \"{found}\"",
-                found = shown(found)
-            ));
+            return Err(expected(Place::Line(line), "an interval above 0 in s", found));
         }
         Ok(Times::Even { first_s, interval_s, is_stated })
     }
 
     /// The values, in SI, and their lines.
-    fn values(&self, bytes: &[u8], size: f64) -> Result<(Vec<f64>, Vec<u64>), Error> {
+    fn values(&self, bytes: &str, size: f64) -> Result<(Vec<f64>, Vec<u64>), Error> {
         let (mut values, mut at) = (Vec::new(), Vec::new());
         for (line, text) in lines(bytes).filter(|(_, t)| !t.contains(':') && !t.trim().is_empty()) {
-            let value = number(&text).ok_or_else(|| {
-                let place = Place::Line(line);
-                error!(
-                    CurveFile,
-                    "{place}: expected a number, found \"{found}\"",
-                    found = shown(&text)
-                )
-            })?;
-            values.push(value * size);
+            values.push(value(Place::Line(line), text)? * size);
             at.push(line);
-            if values.len() > MAX_POINTS {
-                return Err(error!(
-                    CurveFile,
-                    "the curve has more than {most} points: thin it",
-                    most = MAX_POINTS
-                ));
-            }
+            check_points(values.len())?;
         }
         let (line, declared) = self.entry("number of samples");
         match declared.parse::<usize>() {
             Ok(count) if count == values.len() => Ok((values, at)),
-            _ => Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = shown(declared),
-                found = format!("{} values", values.len()),
-                place = Place::Line(line),
-                remedy = "write the file anew, it may be cut",
-                what = "number of samples"
+            _ => Err(miscounted(
+                Place::Line(line),
+                "number of samples",
+                shown(declared),
+                format_args!("{} values", values.len()),
+                CUT,
             )),
         }
     }
@@ -476,31 +420,15 @@ fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel)
         .filter(is_asked)
         .partition(|channel| channel.quantity == Quantity::Deflection);
     let (mut deflections, mut forces) = (deflections.into_iter(), forces.into_iter());
-    match (
-        deflections.next(),
-        forces.next(),
-        deflections.next().is_some() || forces.next().is_some(),
-    ) {
-        (Some(deflection), Some(force), false) => Ok((deflection, force)),
-        (Some(_), Some(_), true) => Err(error!(
+    let first = (deflections.next(), forces.next());
+    let has_more = deflections.next().is_some() || forces.next().is_some();
+    match (first, asked) {
+        ((Some(deflection), Some(force)), _) if !has_more => Ok((deflection, force)),
+        ((Some(_), Some(_)), _) => Err(several_curves(&known)),
+        (_, Some(asked)) => Err(no_curve(asked, &known)),
+        (_, None) => Err(error!(
             CurveFile,
-            "the file holds several curves: choose one with --curve: {known}"
+            "expected a channel of displacement (code …DS…) and one of force (…FO…), found {known}"
         )),
-        _ => match asked {
-            Some(asked) => Err({
-                let asked = shown(asked);
-                error!(
-                    CurveFile,
-                    "the file has no curve \"{asked}\": it has {known}{}",
-                    guess::hint(&asked, &known)
-                )
-            }),
-            None => Err(error!(
-                CurveFile,
-                "expected {expected}, found {found}",
-                expected = "a channel of displacement (code …DS…) and one of force (…FO…)",
-                found = known
-            )),
-        },
     }
 }

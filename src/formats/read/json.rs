@@ -3,6 +3,7 @@
 use crate::error::{Error, error};
 use std::path::Path;
 
+use super::columns::too_few;
 use super::curve::{Metadata, ReadCurve, title};
 use super::{Input, MIN_POINTS, curve};
 use crate::curve::{ForceKind, Parameter};
@@ -31,7 +32,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, Error> {
 
 /// Whether the first byte that is not a blank opens an object.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    input.text.trim_ascii_start().starts_with(b"{")
+    input.text.trim_ascii_start().starts_with('{')
 }
 
 /// The declared force, with the body's beside it where the file has both; or the force that was
@@ -40,7 +41,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let damaged = |source| {
         error!(CurveFile, "{path}: {source}", path = input.path.display()).caused_by(source)
     };
-    let mut curve = parse(input.path, input.text)?;
+    let mut curve = parse(input.path, input.text.as_bytes())?;
     let both = curve.body_force_n.is_some();
     let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
     if let Some(asked) = input.options.force {
@@ -48,14 +49,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     }
     let points = curve.deflection_m.len();
     if points < MIN_POINTS {
-        let few = error!(
-            CurveFile,
-            "the curve has {}{of}: expected at least {least}",
-            crate::plural::counted(points, "point"),
-            least = MIN_POINTS,
-            of = ""
-        );
-        return Err(curve::content(input.path)(few));
+        return Err(curve::content(input.path)(too_few(points, "")));
     }
     if both {
         notes.push(match curve.body_force_n {

@@ -105,7 +105,7 @@ impl Quantity {
         }
     }
 
-    pub(super) fn dimension(self) -> &'static Dimension {
+    fn dimension(self) -> &'static Dimension {
         match self {
             Self::Deflection => &LENGTH,
             Self::Force => &FORCE,
@@ -131,25 +131,52 @@ impl Quantity {
 
     /// The only quantity that words of a name are of.
     fn within(name: &str) -> Option<Self> {
-        let name = name.to_lowercase();
-        let words = || name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
+        let named = Self::all_within(name);
+        let first = *named.first()?;
+        named.iter().all(|other| *other == first).then_some(first)
+    }
+
+    /// The quantities that words of a text are of; none if it speaks of an edge, a bound or a rate.
+    pub(super) fn all_within(text: &str) -> Vec<Self> {
+        let text = text.to_lowercase();
+        let words = || text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
         if words().any(|word| OTHERS.contains(&word)) {
-            return None;
+            return Vec::new();
         }
         let of_word = |word: &str| {
             let whole = WORDS.iter().find(|(_, names)| names.contains(&word)).map(|(q, _)| *q);
             let ending = || ENDINGS.iter().find(|(_, end)| word.ends_with(end)).map(|(q, _)| *q);
             whole.or_else(ending)
         };
-        let mut named = words().filter_map(of_word);
-        let first = named.next()?;
-        named.all(|other| other == first).then_some(first)
+        words().filter_map(of_word).collect()
     }
 
-    /// SI value of a unit of this quantity.
+    /// SI value of a unit of this quantity, also of one that states it, as `LENGTH/0.001` does.
     pub(super) fn size_of(self, unit: &str) -> Option<f64> {
+        if let Some((dimension, size)) = unit.split_once('/') {
+            let dimensions: &[&str] = match self {
+                Self::Deflection => &["LENGTH", "DISPLACEMENT"],
+                Self::Force => &["FORCE"],
+                Self::Time => &["TIME"],
+            };
+            let size = size.trim().parse().ok().filter(|size: &f64| size.is_normal());
+            let is_its = dimensions.contains(&&*dimension.trim().to_ascii_uppercase());
+            return size.filter(|size| is_its && *size > 0.0);
+        }
         // Micro is a letter of its own in texts that are no ASCII.
         self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
+    }
+
+    /// The same, or what is wrong with the unit.
+    pub(super) fn known_size_of(self, unit: &str, place: Place) -> Result<f64, Error> {
+        self.size_of(unit).ok_or_else(|| {
+            let (what, known, unit) = (self.name(), self.dimension().known_units(), shown(unit));
+            let hint = guess::hint(&unit, &known);
+            error!(
+                CurveFile,
+                "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{hint}"
+            )
+        })
     }
 }
 
@@ -219,24 +246,27 @@ impl Label {
     ) -> Result<f64, Error> {
         let what = self.quantity.name();
         match (&self.unit, given) {
-            (Some(unit), _) => self.quantity.size_of(unit).ok_or_else(|| {
-                let known = self.quantity.dimension().known_units();
-                { let unit = shown(unit); error!(CurveFile, "{place}: the unit \"{unit}\" of the {what} is not known: use one of {known}{}", guess::hint(&unit, &known)) }
-            }),
+            (Some(unit), _) => self.quantity.known_size_of(unit, place),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
                 let example = self.quantity.example();
-                Err(error!(CurveFile, "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI", found = shown(text)))
+                Err(error!(
+                    CurveFile,
+                    "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
+                    found = shown(text)
+                ))
             }
         }
     }
 }
 
-/// `name [unit]` or `name (unit)`, apart.
+/// `name [unit]`, `name (unit)` or T/HIS' `name <LENGTH/0.001>;`, apart.
 fn in_brackets(text: &str) -> Option<(&str, &str)> {
+    let text = text.trim_end_matches([';', ' ']);
     let open = match text.chars().last()? {
         ']' => '[',
         ')' => '(',
+        '>' => '<',
         _ => return None,
     };
     let at = text.rfind(open)?;
@@ -281,6 +311,9 @@ mod tests {
             t(text, Some((Force, Some("kN"))));
         }
         t("time [ms]", Some((Time, Some("ms"))));
+        t("Crush <LENGTH/0.001>;", Some((Deflection, Some("LENGTH/0.001"))));
+        assert_eq!(Force.size_of("FORCE/1000"), Some(1e3));
+        assert_eq!(Force.size_of("LENGTH/1000").or(Force.size_of("FORCE/0")), None);
         t("t_s", Some((Time, Some("s"))));
         t("deflection", Some((Deflection, None)));
         t("Force [lbf]", Some((Force, Some("lbf"))));

@@ -1,56 +1,41 @@
-//! Which columns of a table hold what: by their headers, by a row of units below, or as the user has named them.
+//! Which columns of a table hold what: by their headers, by a row of units below, by the title, or as the user has named
+//! them.
 
 use super::ColumnNames;
+use super::columns::LISTED;
 use super::curve::{Place, shown};
-use super::frame::unit_of;
 use super::label::{Label, Quantity};
+use super::table::{Row, Table, unit_of};
 use crate::error::{Error, error};
-use crate::table::Row;
 use crate::unit::UnitSystem;
 
-/// What a column without a unit lacks: a scenario cannot give units beside the file.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Missing {
-    OfColumn,
-    OfUnit,
+/// A column that is taken, or could be.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    /// Counted from 0.
+    pub field: usize,
+    pub quantity: Quantity,
+    /// SI value of its unit.
+    pub size: f64,
 }
 
-/// Columns that a message lists.
-const LISTED: usize = 20;
-
-/// A column that is taken, or could be.
-#[derive(Clone, Debug, PartialEq)]
-struct Column {
-    /// Counted from 0.
+/// A column with the name that it has in the file.
+#[derive(Clone, Debug)]
+struct Named {
     field: usize,
     name: String,
     label: Label,
     line: u64,
 }
 
-/// Which fields hold what.
-#[derive(Debug)]
-pub(super) struct Layout {
-    columns: Vec<Column>,
-    /// Columns that could have been taken instead.
-    others: Vec<Column>,
-}
-
-/// How well a column fits, best first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum MatchQuality {
-    Unit,
-    NoUnit,
-    UnknownUnit,
-}
-
-impl Column {
-    /// By its unit, and whether its whole name is that of the quantity.
-    fn fit(&self) -> (MatchQuality, bool) {
+impl Named {
+    /// How well it fits, best first: with a unit that is known, without one, with another; and whether its whole name
+    /// is that of the quantity.
+    fn fit(&self) -> (u8, bool) {
         let fit = match &self.label.unit {
-            None => MatchQuality::NoUnit,
-            Some(unit) if self.label.quantity.size_of(unit).is_some() => MatchQuality::Unit,
-            Some(_) => MatchQuality::UnknownUnit,
+            None => 1,
+            Some(unit) if self.label.quantity.size_of(unit).is_some() => 0,
+            Some(_) => 2,
         };
         (fit, Label::parse(&self.name).is_none())
     }
@@ -66,9 +51,9 @@ impl Column {
             Some(own) if size(own).is_some() && size(own) != size(unit) => {
                 return Err(error!(
                     CurveFile,
-                    "{place}: expected {expected}, found \"{found}\"",
-                    expected = format!("the unit of the header, {}", shown(own)),
+                    "{place}: expected the unit of the header, {own}, found \"{found}\"",
                     found = shown(unit),
+                    own = shown(own),
                     place = Place::Field { line: row.line, field: self.field + 1 }
                 ));
             }
@@ -78,183 +63,167 @@ impl Column {
     }
 }
 
-impl Layout {
-    /// By the header's names and the row of units below it, if there is one.
-    pub(super) fn of(
-        names: &[String],
-        line: u64,
-        units: Option<&Row>,
-        lack: Missing,
-        asked: &ColumnNames,
-    ) -> Result<Self, Error> {
-        let mut layout = Self { columns: Vec::new(), others: Vec::new() };
-        let named = |quantity: Quantity| match asked.of(quantity) {
-            Some(asked) => named(names, line, quantity, asked).map(Some),
-            None => Ok(None),
-        };
-        let named = Quantity::ALL.map(named);
-        for (quantity, named) in Quantity::ALL.into_iter().zip(named) {
-            if let Some(column) = named? {
-                layout.columns.push(column.with_unit(units)?);
-                continue;
-            }
-            if quantity == Quantity::Time && asked.is_without_times() {
-                continue;
-            }
-            let is_free = |field: usize| layout.columns.iter().all(|c| c.field != field);
-            let of_quantity = names.iter().enumerate().filter_map(|(field, name)| {
-                let label = Label::of_column(name).filter(|label| label.quantity == quantity)?;
-                is_free(field).then(|| Column { field, name: name.clone(), label, line })
-            });
-            let found: Vec<Column> =
-                of_quantity.map(|c| c.with_unit(units)).collect::<Result<_, _>>()?;
-            layout.take(quantity, found, (names, line), lack)?;
-        }
-        Ok(layout)
+/// The columns of a table, in the units that were given where they do not say their own; notes say which. Also
+/// whether a column took its unit from those.
+pub(super) fn layout(
+    table: &Table<'_>,
+    units: Option<UnitSystem>,
+    asked: &ColumnNames,
+    notes: &mut Vec<String>,
+) -> Result<(Vec<Column>, bool), Error> {
+    let is_bare = table.names.is_empty();
+    if is_bare && units.is_none() {
+        return Err(error!(
+            CurveFile,
+            "{place}: the header (the names of the columns) has no unit (\"{found}\"): write it as \"d_mm,force_kN\" above the values, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
+            found = shown(&table.first_row()),
+            place = Place::Line(table.line())
+        ));
     }
-
-    /// Takes the best of the columns that can be this quantity.
-    fn take(
-        &mut self,
-        quantity: Quantity,
-        mut found: Vec<Column>,
-        (names, line): (&[String], u64),
-        lack: Missing,
-    ) -> Result<(), Error> {
-        let place = Place::Line(line);
-        found.retain(|column| lack == Missing::OfUnit || column.label.unit.is_some());
-        found.sort_by_key(Column::fit);
-        let best = found.first().map(Column::fit);
-        let alike = found.iter().filter(|c| Some(c.fit()) == best);
-        let alike: Vec<String> = alike.map(|c| format!("\"{}\"", shown(&c.name))).collect();
-        if alike.len() > 1 && lack == Missing::OfUnit {
-            let (what, option) = (quantity.name(), quantity.option());
-            let found = alike[..alike.len().min(LISTED)].join(", ");
+    let numbered = || (1..=table.columns).map(|k| (table.line(), format!("column {k}")));
+    let names = if is_bare { numbered().collect() } else { table.names.clone() };
+    let wanted = [Quantity::Deflection, Quantity::Force];
+    // What the label of an axis does not say is the deflection, then the force.
+    let usual = |field: usize, name: &str| {
+        let quantity = *wanted.get(field)?;
+        Some(if is_bare { Label { quantity, unit: None } } else { Label::of_named(quantity, name) })
+    };
+    let label = |field: usize, name: &str| match (is_bare, table.has_axes()) {
+        (true, _) => usual(field, name),
+        (_, true) => {
+            Label::of_column(name).or_else(|| Label::of_axis(name)).or_else(|| usual(field, name))
+        }
+        _ => Label::of_column(name),
+    };
+    for (field, (quantity, which)) in wanted.into_iter().zip(["first", "second"]).enumerate() {
+        let is_asked = wanted.iter().any(|quantity| asked.of(*quantity).is_some());
+        let Some((line, name)) = table.names.get(field).filter(|_| table.has_axes() && !is_asked)
+        else {
+            continue;
+        };
+        if label(field, name).is_some_and(|label| label.quantity != quantity) {
             return Err(error!(
                 CurveFile,
-                "{place}: several columns could be the {what}: {found}; choose one with {option}, by its name or number"
+                "{place}: expected a {what} in the {which} column, found \"{found}\": name the columns by --deflection-column and --force-column, if the label is right",
+                found = shown(name),
+                place = Place::Line(*line),
+                what = quantity.name()
+            ));
+        }
+    }
+    let (mut taken, mut others): (Vec<Named>, Vec<Named>) = (Vec::new(), Vec::new());
+    let asked_for = Quantity::ALL.map(|quantity| match asked.of(quantity) {
+        Some(asked) => named(&names, quantity, asked).map(Some),
+        None => Ok(None),
+    });
+    for (quantity, asked_for) in Quantity::ALL.into_iter().zip(asked_for) {
+        if let Some(column) = asked_for? {
+            taken.push(column.with_unit(table.units.as_ref())?);
+            continue;
+        }
+        if quantity == Quantity::Time && asked.is_without_times() {
+            continue;
+        }
+        let is_free = |field: usize| taken.iter().all(|column| column.field != field);
+        let free = names.iter().enumerate().filter(|(field, _)| is_free(*field));
+        let of = |(field, (line, name)): (usize, &(u64, String)), label| {
+            Named { field, name: name.clone(), label, line: *line }.with_unit(table.units.as_ref())
+        };
+        let mut found = Vec::new();
+        for (field, named) in free.clone() {
+            if let Some(label) = label(field, &named.1).filter(|label| label.quantity == quantity) {
+                found.push(of((field, named), label)?);
+            }
+        }
+        if found.is_empty() && says(table, quantity) {
+            // Legends of curves, such as A1.
+            let is_legend = |(_, (_, name)): &(usize, &(u64, String))| {
+                Label::of_column(name).is_none() && !name.contains([' ', '_', '[', '(', '/'])
+            };
+            for column in free.filter(is_legend) {
+                found.push(of(column, Label { quantity, unit: None })?);
+            }
+        }
+        found.sort_by_key(Named::fit);
+        let best = found.first().map(Named::fit);
+        let alike = found.iter().filter(|column| Some(column.fit()) == best);
+        let alike: Vec<String> = alike.map(|c| format!("\"{}\"", shown(&c.name))).collect();
+        if alike.len() > 1 {
+            return Err(error!(
+                CurveFile,
+                "{place}: several columns could be the {what}: {found}; choose one with {option}, by its name or number",
+                found = alike[..alike.len().min(LISTED)].join(", "),
+                option = quantity.option(),
+                place = Place::Line(found[0].line),
+                what = quantity.name()
             ));
         }
         let mut found = found.into_iter();
         match found.next() {
-            Some(column) => self.columns.push(column),
+            Some(column) => taken.push(column),
             None if quantity == Quantity::Time => {}
             None => {
-                let usual = usize::from(quantity == Quantity::Force);
-                let found = shown(names.get(usual).map_or("", |name| name));
-                let remedy = match lack {
-                    Missing::OfUnit => {
-                        format!("; or say which column it is with {}", quantity.option())
-                    }
-                    Missing::OfColumn => String::new(),
-                };
-                let (wanted, example) = (quantity.name(), quantity.example());
+                let usual = names.get(usize::from(quantity == Quantity::Force));
                 return Err(error!(
                     CurveFile,
-                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"{remedy}"
+                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or say which column it is with {option}",
+                    example = quantity.example(),
+                    found = shown(usual.map_or("", |(_, name)| name)),
+                    option = quantity.option(),
+                    place = Place::Line(usual.map_or(table.line(), |(line, _)| *line)),
+                    wanted = quantity.name()
                 ));
             }
         }
-        self.others.extend(found);
-        Ok(())
+        others.extend(found);
     }
+    if !others.is_empty() {
+        let shown = |c: &Named| format!("\"{}\" ({})", shown(&c.name), c.label.quantity.name());
+        let others: Vec<String> = others.iter().map(shown).collect();
+        notes.push(format!("columns: not taken: {}", others.join(", ")));
+    }
+    let (mut columns, mut said, mut are_used) = (Vec::new(), Vec::new(), false);
+    for Named { field, name, label, line } in taken {
+        let size = label.size(&name, units, Place::Line(line))?;
+        columns.push(Column { field, quantity: label.quantity, size });
+        let what = format!("{} of \"{}\" in", label.quantity.name(), shown(&name));
+        said.push(match (&label.unit, units) {
+            (Some(unit), _) => format!("{what} {unit}"),
+            (None, Some(units)) => format!("{what} units {units} as given"),
+            (None, None) => continue,
+        });
+        are_used |= label.unit.is_none();
+    }
+    notes.push(format!("columns: {}", said.join(", ")));
+    Ok((columns, are_used))
+}
 
-    /// Deflection, then force, in the units that were given.
-    pub(super) fn without_header(
-        row: &Row,
-        units: Option<UnitSystem>,
-        asked: &ColumnNames,
-    ) -> Result<Self, Error> {
-        if units.is_none() {
-            return Err(error!(
-                CurveFile,
-                "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
-                example = "\"d_mm,force_kN\" above the values",
-                found = shown(&format!("{} {}", row.field(0), row.field(1))),
-                place = Place::Line(row.line),
-                what = "header (the names of the columns)"
-            ));
-        }
-        let names: Vec<String> =
-            (1..=row.fields().count()).map(|k| format!("column {k}")).collect();
-        let mut columns = Vec::new();
-        for (usual, quantity) in Quantity::ALL.into_iter().enumerate() {
-            let label = Label { quantity, unit: None };
-            match (asked.of(quantity), names.get(usual)) {
-                (Some(asked), _) => columns.push(named(&names, row.line, quantity, asked)?),
-                (None, Some(name)) if quantity != Quantity::Time => {
-                    columns.push(Column {
-                        field: usual,
-                        name: name.clone(),
-                        label,
-                        line: row.line,
-                    });
-                }
-                _ => {}
-            }
-        }
-        Ok(Self { columns, others: Vec::new() })
-    }
-
-    /// Which columns could have been taken instead, in one line.
-    pub(super) fn note(&self) -> Option<String> {
-        let shown = |column: &Column| {
-            format!("\"{}\" ({})", shown(&column.name), column.label.quantity.name())
-        };
-        let others: Vec<String> = self.others.iter().map(shown).collect();
-        (!others.is_empty()).then(|| format!("columns: not taken: {}", others.join(", ")))
-    }
-
-    /// What each field is and the SI value of its unit; says what was taken.
-    pub(super) fn sizes(
-        &self,
-        units: Option<UnitSystem>,
-        units_used: &mut bool,
-        notes: &mut Vec<String>,
-    ) -> Result<Vec<(Quantity, usize, f64)>, Error> {
-        let mut taken = Vec::new();
-        let mut said = Vec::new();
-        for Column { field, name, label, line } in &self.columns {
-            let place = Place::Line(*line);
-            taken.push((label.quantity, *field, label.size(name, units, place)?));
-            let name = shown(name);
-            said.push(match (&label.unit, units) {
-                (None, Some(units)) => {
-                    *units_used = true;
-                    format!("{} of \"{name}\" in units {units} as given", label.quantity.name())
-                }
-                (Some(unit), _) => {
-                    format!("{} of \"{name}\" in {unit}", label.quantity.name())
-                }
-                (None, None) => continue,
-            });
-        }
-        notes.push(format!("columns: {}", said.join(", ")));
-        Ok(taken)
-    }
+/// Whether a title says that the table has this quantity, as `Force vs displacement` does.
+fn says(table: &Table<'_>, quantity: Quantity) -> bool {
+    let says = |(_, title): &(u64, String)| Quantity::all_within(title).contains(&quantity);
+    quantity != Quantity::Time && table.titles.iter().any(says)
 }
 
 /// The column of that name, or of that number counted from 1.
-fn named(names: &[String], line: u64, quantity: Quantity, asked: &str) -> Result<Column, Error> {
+fn named(names: &[(u64, String)], quantity: Quantity, asked: &str) -> Result<Named, Error> {
     let asked = asked.trim();
-    let by_name = names.iter().position(|name| name == asked);
-    let by_case = || names.iter().position(|name| name.eq_ignore_ascii_case(asked));
+    let by_name = names.iter().position(|(_, name)| name == asked);
+    let by_case = || names.iter().position(|(_, name)| name.eq_ignore_ascii_case(asked));
     let by_number = || asked.parse::<usize>().ok()?.checked_sub(1).filter(|k| *k < names.len());
     match by_name.or_else(by_case).or_else(by_number) {
         Some(field) => {
-            let name = names[field].clone();
-            Ok(Column { field, label: Label::of_named(quantity, &name), name, line })
+            let (line, name) = names[field].clone();
+            Ok(Named { field, label: Label::of_named(quantity, &name), name, line })
         }
         None => {
-            let known: Vec<String> =
-                names.iter().take(LISTED).map(|n| format!("\"{}\"", shown(n))).collect();
+            let known = names.iter().take(LISTED).map(|(_, name)| format!("\"{}\"", shown(name)));
             Err(error!(
                 CurveFile,
                 "{place}: {option} \"{asked}\" is not a column: expected a number from 1, or one of {known}",
                 asked = shown(asked),
-                known = known.join(", "),
+                known = known.collect::<Vec<_>>().join(", "),
                 option = quantity.option(),
-                place = Place::Line(line)
+                place = Place::Line(names.first().map_or(1, |(line, _)| *line))
             ))
         }
     }

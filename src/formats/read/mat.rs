@@ -7,12 +7,10 @@
 //! `k_u`, one number, is the unloading stiffness.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::units;
-use super::curve::{Place, shown};
-use super::modelica::OURS;
+use super::columns::{Columns, LISTED, Places, check_curves, check_points, choose};
+use super::curve::{CUT, Place, expected, miscounted, shown, units};
+use super::modelica::{OURS, ours_of};
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Longest name of a matrix, with its zero byte.
@@ -26,15 +24,13 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     if is_later(input.bytes) {
-        let found = "one of a later version: save it with -v4";
         return Err(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a MAT file of version 4"
+            "expected a MAT file of version 4, found one of a later version: save it with -v4"
         ));
     }
     let matrices = matrices(input.bytes)?;
-    let table = choose(&matrices, input.options.curve.as_deref())?;
+    let table = chosen(&matrices, input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: matrix {} of the file", table.name)];
     let ours = table.name.strip_prefix(OURS);
     let system = match (ours.is_some(), input.options.units) {
@@ -161,13 +157,9 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
     let mut at = 0;
     while at < bytes.len() {
         let head = head(bytes, at).ok_or_else(|| {
-            error!(
-                CurveFile,
-                "{place}: expected {expected}, found \"{found}\"",
-                expected = "a matrix of a MAT file of version 4 (save it with -v4)",
-                found = format!("{} bytes of something else", bytes.len() - at),
-                place = Place::Byte(at)
-            )
+            let found = format!("{} bytes of something else", bytes.len() - at);
+            let what = "a matrix of a MAT file of version 4 (save it with -v4)";
+            expected(Place::Byte(at), what, &found)
         })?;
         let begin = at + HEAD + head.name;
         let name = bytes.get(at + HEAD..begin).unwrap_or_default();
@@ -176,14 +168,12 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
         let size = values.and_then(|n| n.checked_mul(head.number << usize::from(head.is_complex)));
         let end = size.and_then(|size| begin.checked_add(size)).filter(|end| *end <= bytes.len());
         let Some(end) = end else {
-            return Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} rows of {}", head.rows, head.columns),
-                found = format!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
-                place = Place::Byte(at),
-                remedy = "write the file anew, it may be cut",
-                what = format!("matrix {}", shown(&name))
+            return Err(miscounted(
+                Place::Byte(at),
+                format_args!("matrix {}", shown(&name)),
+                format_args!("{} rows of {}", head.rows, head.columns),
+                format_args!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
+                CUT,
             ));
         };
         if head.is_read {
@@ -203,44 +193,20 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
 }
 
 /// The matrix that was asked for, else ours, else the only one of two columns.
-fn choose<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
+fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
     let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2 && !m.is_text).collect();
-    let known = || fitting.iter().map(|m| shown(&m.name)).collect::<Vec<_>>().join(", ");
-    let by_name = |name: &str| fitting.iter().find(|m| m.name == name).copied();
-    let has_ours = fitting.iter().filter(|m| m.name.starts_with(OURS)).count();
-    let table = match (asked, by_name(OURS).filter(|_| has_ours == 1), &fitting[..]) {
-        (_, _, []) => {
-            let sizes =
-                matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));
-            let found = match matrices.len() {
-                0 => "none".into(),
-                _ => sizes.take(20).collect::<Vec<_>>().join(", "),
-            };
-            let expected = "a full matrix of doubles with two columns, such as fd_load";
-            return Err(error!(CurveFile, "expected {expected}, found {found}"));
-        }
-        (Some(asked), ..) => by_name(asked).ok_or_else(|| {
-            let asked = shown(asked);
-            let known = known();
-            error!(
-                CurveFile,
-                "the file has no curve \"{asked}\": it has {known}{}",
-                guess::hint(&asked, &known)
-            )
-        })?,
-        (None, Some(ours), _) => ours,
-        (None, None, [only]) => only,
-        (None, None, _) => {
-            return Err(error!(
-                CurveFile,
-                "the file holds several curves: choose one with --curve: {known}",
-                known = known()
-            ));
-        }
-    };
-    if table.rows > MAX_POINTS {
-        Err(error!(CurveFile, "the curve has more than {most} points: thin it", most = MAX_POINTS))
-    } else {
-        Ok(table)
+    if fitting.is_empty() {
+        let sizes =
+            matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));
+        let found = match matrices.len() {
+            0 => "none".into(),
+            _ => sizes.take(LISTED).collect::<Vec<_>>().join(", "),
+        };
+        let expected = "a full matrix of doubles with two columns, such as fd_load";
+        return Err(error!(CurveFile, "expected {expected}, found {found}"));
     }
+    let names = fitting.iter().map(|m| (m.name.clone(), String::new()));
+    let table = fitting[choose(names.clone(), asked.or(ours_of(names)))?];
+    check_points(table.rows)?;
+    Ok(table)
 }

@@ -9,10 +9,9 @@
 //! repeated as far behind the end) are removed. Each of these leaves a note.
 
 mod columns;
-pub(crate) mod csv;
 pub(crate) mod curve;
+mod deck;
 mod encoding;
-mod frame;
 mod iso_mme;
 pub(crate) mod json;
 mod label;
@@ -22,8 +21,9 @@ mod mat;
 mod modelica;
 mod modelica_package;
 mod radioss;
+mod table;
+mod tables;
 mod text;
-mod two_columns;
 
 use crate::error::{Error, error};
 use crate::guess;
@@ -39,6 +39,7 @@ pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
 pub(crate) use curve::ReadFile;
 use label::Quantity;
+pub(crate) use tables::history;
 
 /// One format of curves.
 #[derive(Debug)]
@@ -120,15 +121,15 @@ pub const READERS: &[Reader] = &[
         name: TABLES,
         extensions: &["csv", "tsv"],
         description: "columns below a header and titles, with commas, semicolons, tabs or blanks between",
-        recognise: csv::recognise,
-        read: Read::Columns(csv::read),
+        recognise: tables::recognise,
+        read: Read::Columns(tables::read),
     },
     Reader {
-        name: "two-columns",
+        name: CURVES,
         extensions: &["cur", "crv", "dat", "xy"],
-        description: "two columns below titles and labels, as T/HIS .cur files have them",
-        recognise: two_columns::recognise,
-        read: Read::Columns(two_columns::read),
+        description: "two columns below titles and labels, as in T/HIS .cur and LS-PrePost .crv files",
+        recognise: tables::recognise_pairs,
+        read: Read::Columns(tables::read_pairs),
     },
 ];
 
@@ -160,8 +161,9 @@ pub struct ColumnNames {
 
 /// The reader of predicted curves.
 const JSON: &str = "json";
-/// The reader that has columns to choose.
+/// The readers that have columns to choose.
 const TABLES: &str = "csv";
+const CURVES: &str = "two-columns";
 /// The table's times are not read.
 const NO_TIMES: &str = "none";
 
@@ -195,8 +197,8 @@ pub(super) struct Input<'a> {
     path: &'a Path,
     /// Empty for a folder.
     bytes: &'a [u8],
-    /// The same as a text in UTF-8.
-    text: &'a [u8],
+    /// The same as a text.
+    text: &'a str,
     options: &'a ReadOptions,
 }
 
@@ -207,8 +209,10 @@ const BEGINNING: usize = 64 << 10;
 
 impl Input<'_> {
     /// What is looked at to recognise a format.
-    fn beginning(&self) -> &[u8] {
-        &self.text[..self.text.len().min(BEGINNING)]
+    fn beginning(&self) -> &str {
+        let fits = |end: &usize| self.text.is_char_boundary(*end);
+        let end = (0..=self.text.len().min(BEGINNING)).rev().find(fits);
+        &self.text[..end.unwrap_or_default()]
     }
 }
 
@@ -222,6 +226,26 @@ pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
 /// # Errors
 /// It names the file, the place in it, what was expected there and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static Reader), Error> {
+    let (found, reader) = parse(path, options)?;
+    Ok((found.curve(path)?, reader))
+}
+
+/// What a file holds before it becomes one curve.
+enum Parsed {
+    Columns(Columns),
+    Curve(ReadCurve),
+}
+
+impl Parsed {
+    fn curve(self, path: &Path) -> Result<ReadCurve, Error> {
+        match self {
+            Self::Columns(columns) => columns.curve().map_err(curve::content(path)),
+            Self::Curve(curve) => Ok(curve),
+        }
+    }
+}
+
+fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader), Error> {
     let tests = if path.is_dir() { iso_mme::tests(path) } else { Vec::new() };
     let (bytes, own) = if !tests.is_empty() {
         iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
@@ -230,26 +254,23 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static R
         open(path).map(|(bytes, own)| (bytes, Some(own)))?
     };
     if bytes.starts_with(ZIP) {
-        let found = "a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV";
         return Err(curve::content(path)(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a curve"
+            "expected a curve, found a ZIP archive: unpack it and give the files in it (of ISO-MME the test's folder), or save the sheet of a workbook as CSV"
         )));
     }
     let text = encoding::decoded(&bytes);
-    let input = Input { path, bytes: &bytes, text: &text.bytes, options };
+    let input = Input { path, bytes: &bytes, text: &text.text, options };
     if bytes.is_empty() && own.is_some() {
-        let empty = error!(
+        return Err(curve::content(path)(error!(
             CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a curve",
-            found = "an empty file"
-        );
-        return Err(curve::content(path)(empty));
+            "expected a curve, found an empty file"
+        )));
     }
     let reader = reader(&input)?;
-    if let (Some(option), true) = (options.columns.option(), reader.name != TABLES) {
+    if let (Some(option), true) =
+        (options.columns.option(), ![TABLES, CURVES].contains(&reader.name))
+    {
         let format = reader.name;
         return Err(error!(
             CurveFile,
@@ -257,21 +278,25 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static R
             path = path.display()
         ));
     }
-    let mut curve = match reader.read {
+    let is_text = !matches!(reader.read, Read::Binary(_));
+    let text_note = text.note.filter(|_| is_text).map(String::from);
+    let mut found = match reader.read {
         Read::Binary(read) | Read::Columns(read) => {
             let mut columns = read(&input).map_err(curve::content(path))?;
             if options.columns.is_without_times() {
                 columns.time_s = None;
             }
-            columns.curve().map_err(curve::content(path))?
+            Parsed::Columns(columns)
         }
-        Read::Curve(read) => read(&input)?,
+        Read::Curve(read) => Parsed::Curve(read(&input)?),
     };
-    if !matches!(reader.read, Read::Binary(_)) {
-        curve.notes.extend(text.note.map(Into::into));
-    }
-    curve.files.splice(0..0, own);
-    Ok((curve, reader))
+    let (notes, files) = match &mut found {
+        Parsed::Columns(columns) => (&mut columns.notes, &mut columns.files),
+        Parsed::Curve(curve) => (&mut curve.notes, &mut curve.files),
+    };
+    notes.extend(text_note);
+    files.splice(0..0, own);
+    Ok((found, reader))
 }
 
 /// A curve that can drive an interface, as its file has it.
@@ -281,23 +306,29 @@ pub(crate) enum DrivingFile {
     Curve(Box<ForceCurve>, Vec<String>),
 }
 
-/// Reads a file of any format as the curve of an interface. A plain table with a header is taken as
-/// it stands; of a record over time the loading branch drives.
+/// Reads a file of any format as the curve of an interface. A plain table of increasing deflections from 0 is taken as it
+/// stands; of a record over time the loading branch drives.
 ///
 /// # Errors
 /// As of [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
-    let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
-    let plain = ((has("csv") || has("tsv")) && options.units.is_none()).then(|| csv::driving(path));
-    let plain = match plain {
-        Some(Ok(curve)) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
-        Some(Err(error)) => Some(error).filter(|error| error.is_about("points")),
-        None => None,
-    };
-    let (curve, reader) = read(path, options).map_err(|error| plain.unwrap_or(error))?;
+    let (found, reader) = parse(path, options)?;
     if reader.name == JSON {
         return json::predicted(path).map(|curve| DrivingFile::Predicted(Box::new(curve)));
     }
+    let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
+    let plain = match &found {
+        Parsed::Columns(columns) if (has("csv") || has("tsv")) && options.units.is_none() => {
+            Some(columns.as_they_stand())
+        }
+        _ => None,
+    };
+    let plain = match plain {
+        Some(Ok(curve)) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
+        Some(Err(error)) => Some(curve::content(path)(error).at_key("points")),
+        None => None,
+    };
+    let curve = found.curve(path).map_err(|error| plain.unwrap_or(error))?;
     let (curve, changes) = curve.driving().map_err(curve::content(path))?;
     Ok(DrivingFile::Curve(Box::new(curve), changes))
 }

@@ -5,13 +5,11 @@
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Metadata, stated_units, units};
-use super::curve::{Place, shown};
+use super::columns::{Columns, Places, check_curves, check_points, choose};
+use super::curve::{CUT, Metadata, Place, expected, miscounted, shown, stated_units, units, value};
 use super::label::{Label, Quantity};
-use super::text::{lines, number};
+use super::text::lines;
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 /// Name of the table and of the matrix that our exports write, in SI.
@@ -20,10 +18,7 @@ pub(super) const OURS: &str = "fd_load";
 const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    input
-        .text
-        .strip_prefix(b"#1")
-        .is_some_and(|rest| matches!(rest.first(), Some(b'\n' | b'\r' | b' ')))
+    input.text.strip_prefix("#1").is_some_and(|rest| rest.starts_with(['\n', '\r', ' ']))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
@@ -85,7 +80,7 @@ struct File {
 }
 
 impl File {
-    fn read(bytes: &[u8]) -> Result<Self, Error> {
+    fn read(bytes: &str) -> Result<Self, Error> {
         let mut file = Self { tables: Vec::new(), facts: Metadata::default(), units: None };
         for (at, line) in lines(bytes) {
             let (text, comment) = line.split_once('#').unwrap_or((&line, ""));
@@ -120,30 +115,16 @@ impl File {
         for (field, word) in words.enumerate() {
             let place = Place::Field { line, field: field + 1 };
             let Some(table) = self.tables.last_mut() else {
-                let expected = "a table such as \"double fd_load(4,2)\" in front of values";
-                return Err(error!(
-                    CurveFile,
-                    "{place}: expected {expected}, found \"{found}\"",
-                    found = shown(word)
-                ));
+                let what = "a table such as \"double fd_load(4,2)\" in front of values";
+                return Err(expected(place, what, word));
             };
-            let value = number(word).ok_or_else(|| {
-                error!(
-                    CurveFile,
-                    "{place}: expected a number, found \"{found}\"",
-                    found = shown(word)
-                )
-            })?;
+            let value = value(place.clone(), word)?;
             if table.values.len() == table.rows * table.columns {
-                let expected = format!(
+                let what = format_args!(
                     "no more than the {} rows of {} that table {} declares",
                     table.rows, table.columns, table.name
                 );
-                return Err(error!(
-                    CurveFile,
-                    "{place}: expected {expected}, found \"{found}\"",
-                    found = shown(word)
-                ));
+                return Err(expected(place, what, word));
             }
             if table.values.len() % table.columns == 0 {
                 table.lines.push(line);
@@ -157,51 +138,35 @@ impl File {
     fn check_last(&self) -> Result<(), Error> {
         let Some(table) = self.tables.last() else { return Ok(()) };
         if table.values.len() == table.rows * table.columns {
-            Ok(())
-        } else {
-            Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} rows of {}", table.rows, table.columns),
-                found = format!("{} values for it", table.values.len()),
-                place = Place::Line(table.line),
-                remedy = "write the file anew, it may be cut",
-                what = format!("table {}", table.name)
-            ))
+            return Ok(());
         }
+        Err(miscounted(
+            Place::Line(table.line),
+            format_args!("table {}", table.name),
+            format_args!("{} rows of {}", table.rows, table.columns),
+            format_args!("{} values for it", table.values.len()),
+            CUT,
+        ))
     }
 
     /// The table that was asked for, else ours, else the only one that can be a curve.
     fn choose(&self, asked: Option<&str>) -> Result<&Table, Error> {
         let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
-        let known = || fitting.iter().map(|t| t.name.clone()).collect::<Vec<_>>().join(", ");
         if fitting.is_empty() {
             let found = format!("{} others", self.tables.len());
             let expected = "a table of two columns, such as \"double fd_load(4,2)\"";
             return Err(error!(CurveFile, "expected {expected}, found {found}"));
         }
-        let by_name = |name: &str| fitting.iter().find(|t| t.name == name).copied();
-        // Several of ours are the curves of several speeds.
-        let ours = fitting.iter().filter(|t| t.name.starts_with(OURS)).count();
-        match (asked, by_name(OURS).filter(|_| ours == 1), &fitting[..]) {
-            (Some(asked), ..) => by_name(asked).ok_or_else(|| {
-                let asked = shown(asked);
-                let known = known();
-                error!(
-                    CurveFile,
-                    "the file has no curve \"{asked}\": it has {known}{}",
-                    guess::hint(&asked, &known)
-                )
-            }),
-            (None, Some(ours), _) => Ok(ours),
-            (None, None, [only]) => Ok(only),
-            (None, None, _) => Err(error!(
-                CurveFile,
-                "the file holds several curves: choose one with --curve: {known}",
-                known = known()
-            )),
-        }
+        let names = fitting.iter().map(|t| (t.name.clone(), String::new()));
+        Ok(fitting[choose(names.clone(), asked.or(ours_of(names)))?])
     }
+}
+
+/// Our table, if there is one; several of ours are the curves of several speeds.
+pub(super) fn ours_of(names: impl Iterator<Item = (String, String)>) -> Option<&'static str> {
+    let ours: Vec<String> =
+        names.map(|(name, _)| name).filter(|name| name.starts_with(OURS)).collect();
+    (ours == [OURS]).then_some(OURS)
 }
 
 /// Name, rows and columns, if the line declares a table.
@@ -215,15 +180,9 @@ fn declaration(text: &str, line: u64) -> Result<Option<(String, usize, usize)>, 
         let (rows, columns) = (rows.trim().parse().ok()?, columns.trim().parse().ok()?);
         (rows > 0 && columns > 0).then(|| (name.trim().to_string(), rows, columns))
     };
-    parse().map(Some).ok_or_else(|| {
-        error!(
-            CurveFile,
-            "{place}: expected {expected}, found \"{found}\"",
-            expected = "a table such as \"double fd_load(4,2)\"",
-            found = shown(text),
-            place = Place::Line(line)
-        )
-    })
+    parse()
+        .map(Some)
+        .ok_or_else(|| expected(Place::Line(line), "a table such as \"double fd_load(4,2)\"", text))
 }
 
 /// Refuses sizes that the file cannot hold: a value takes two bytes with its separator.
@@ -234,26 +193,17 @@ fn check_size(
     bytes: usize,
     line: u64,
 ) -> Result<(), Error> {
-    if rows > MAX_POINTS {
-        return Err(error!(
-            CurveFile,
-            "the curve has more than {most} points: thin it",
-            most = MAX_POINTS
-        ));
-    }
+    check_points(rows)?;
     if rows.checked_mul(columns).is_some_and(|values| values <= bytes / 2 + 1) {
-        Ok(())
-    } else {
-        Err(error!(
-            CurveFile,
-            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-            declared = format!("{rows} rows of {columns}"),
-            found = format!("{bytes} bytes"),
-            place = Place::Line(line),
-            remedy = "correct the size",
-            what = format!("table {}", shown(name))
-        ))
+        return Ok(());
     }
+    Err(miscounted(
+        Place::Line(line),
+        format_args!("table {}", shown(name)),
+        format_args!("{rows} rows of {columns}"),
+        format_args!("{bytes} bytes"),
+        "correct the size",
+    ))
 }
 
 /// SI values of the units that a comment such as `d [m], F [N]` names.
@@ -261,7 +211,7 @@ fn sizes(comment: &str) -> Option<(f64, f64)> {
     let of = |wanted: Quantity| {
         comment.split([',', ';']).find_map(|text| {
             let label = Label::parse(text).filter(|label| label.quantity == wanted)?;
-            wanted.dimension().size_of(&label.unit?)
+            wanted.size_of(&label.unit?)
         })
     };
     Some((of(Quantity::Deflection)?, of(Quantity::Force)?))

@@ -4,12 +4,10 @@
 //! 200 points of a curve.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Metadata, title};
-use super::curve::{Place, shown};
-use super::text::{lines, number};
+use super::columns::{Columns, Places, check_curves, check_points, choose};
+use super::curve::{CUT, Metadata, Place, miscounted, shown, title, value};
+use super::text::lines;
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
@@ -20,19 +18,24 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let packages = packages(input.text)?;
-    let package = choose(&packages, input.options.curve.as_deref())?;
+    if packages.is_empty() {
+        return Err(error!(
+            CurveFile,
+            "expected a package that crumple export wrote (constant Real d[…], f[…]), found none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file"
+        ));
+    }
+    let names = packages.iter().map(|package| (package.name.clone(), String::new()));
+    let package = &packages[choose(names, input.options.curve.as_deref())?];
     for array in [&package.d, &package.f] {
         array.check()?;
     }
     if package.d.values.len() != package.f.values.len() {
-        return Err(error!(
-            CurveFile,
-            "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-            declared = format!("{} forces", package.f.values.len()),
-            found = format!("{} deflections", package.d.values.len()),
-            place = Place::Line(package.f.line),
-            remedy = "write the file anew",
-            what = "constant f"
+        return Err(miscounted(
+            Place::Line(package.f.line),
+            "constant f",
+            format_args!("{} forces", package.f.values.len()),
+            format_args!("{} deflections", package.d.values.len()),
+            "write the file anew",
         ));
     }
     let mut notes = vec![
@@ -63,18 +66,11 @@ struct Array {
 impl Array {
     fn check(&self) -> Result<(), Error> {
         if self.is_closed && self.values.len() == self.declared {
-            Ok(())
-        } else {
-            Err(error!(
-                CurveFile,
-                "{place}: {what} declares {declared}, but the file has {found}: {remedy}",
-                declared = format!("{} values", self.declared),
-                found = self.values.len(),
-                place = Place::Line(self.line),
-                remedy = "write the file anew, it may be cut",
-                what = format!("constant {}", self.name)
-            ))
+            return Ok(());
         }
+        let what = format_args!("constant {}", self.name);
+        let declared = format_args!("{} values", self.declared);
+        Err(miscounted(Place::Line(self.line), what, declared, self.values.len(), CUT))
     }
 }
 
@@ -88,7 +84,7 @@ struct Package {
 }
 
 /// The packages that hold a table.
-fn packages(text: &[u8]) -> Result<Vec<Package>, Error> {
+fn packages(text: &str) -> Result<Vec<Package>, Error> {
     let (mut packages, mut facts) = (Vec::<Package>::new(), Metadata::default());
     // The array that goes on in the next line.
     let mut open: Option<&'static str> = None;
@@ -146,53 +142,10 @@ impl Array {
         for (field, word) in text.split(',').enumerate().filter(|(_, word)| !word.trim().is_empty())
         {
             let place = Place::Field { line, field: field + 1 };
-            let value = number(word).ok_or_else(|| {
-                error!(
-                    CurveFile,
-                    "{place}: expected a number, found \"{found}\"",
-                    found = shown(word)
-                )
-            })?;
-            self.values.push(value);
-            if self.values.len() > MAX_POINTS {
-                return Err(error!(
-                    CurveFile,
-                    "the curve has more than {most} points: thin it",
-                    most = MAX_POINTS
-                ));
-            }
+            self.values.push(value(place, word)?);
+            check_points(self.values.len())?;
         }
         self.is_closed = is_closed;
         Ok(())
-    }
-}
-
-/// The package that was asked for, or the only one.
-fn choose<'a>(packages: &'a [Package], asked: Option<&str>) -> Result<&'a Package, Error> {
-    let known = || packages.iter().map(|p| shown(&p.name)).collect::<Vec<_>>().join(", ");
-    let by_name = |asked: &str| packages.iter().find(|p| p.name == asked.trim());
-    match (asked, packages) {
-        (_, []) => Err(error!(
-            CurveFile,
-            "expected {expected}, found {found}",
-            expected = "a package that crumple export wrote (constant Real d[…], f[…])",
-            found =
-                "none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file"
-        )),
-        (None, [only]) => Ok(only),
-        (None, _) => Err(error!(
-            CurveFile,
-            "the file holds several curves: choose one with --curve: {known}",
-            known = known()
-        )),
-        (Some(asked), _) => by_name(asked).ok_or_else(|| {
-            let asked = shown(asked);
-            let known = known();
-            error!(
-                CurveFile,
-                "the file has no curve \"{asked}\": it has {known}{}",
-                guess::hint(&asked, &known)
-            )
-        }),
     }
 }

@@ -1,47 +1,55 @@
 //! Curve of a Radioss deck: a function `/FUNCT/id`.
 //!
-//! Behind the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. Lines
-//! that begin with `#` or `$` are comments. Units are those of a comment (`units: mm-t-s`) or of `/BEGIN`, where
+//! Behind the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. A
+//! `/MOVE_FUNCT/id` scales and then shifts the function of that number. Lines that begin with `#` or `$` are
+//! comments. Units are those of a comment (`units: mm-t-s`) or of `/BEGIN`, where
 //! the fourth line has mass, length and time, by name or by their size in SI.
 
 use super::Input;
-use super::columns::{Columns, MAX_POINTS, Places, check_curves};
-use super::curve::{Metadata, stated_units, title, units};
-use super::curve::{Place, shown};
-use super::lsdyna::Fields;
+use super::columns::{Columns, check_curves, choose};
+use super::curve::Place;
+use super::deck::{DeckCurve, Fields, Said, WIDTH};
 use super::text::{lines, number};
 use crate::error::{Error, error};
-use crate::guess;
 use crate::unit::UnitSystem;
 
 const REMEDY: &str = " (or in a comment of the file: \"# units: mm-t-s\")";
 
-/// Columns of a field.
-const WIDTH: usize = 20;
-/// Functions that a message lists.
-const LISTED: usize = 20;
-
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     let is_comment = |line: &str| line.trim().is_empty() || line.starts_with(['#', '$']);
     let first = lines(input.beginning()).find(|(_, line)| !is_comment(line));
-    first.is_some_and(|(_, line)| is_keyword(&line))
+    first.is_some_and(|(_, line)| is_keyword(line))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
-    let found = deck.choose(input.options.curve.as_deref())?;
-    let mut notes = vec![format!("curve: /FUNCT/{} of the deck", found.id)];
-    let system = units(found.units, input.options.units, REMEDY, &mut notes)?;
-    let (length, force) = (system.length_m, system.force());
-    Ok(Columns {
-        deflection_m: found.points.iter().map(|(x, _)| x * length).collect(),
-        force_n: found.points.iter().map(|(_, y)| y * force).collect(),
-        facts: found.facts,
-        title: title(&found.title, &mut notes),
-        units: Some(system),
-        notes,
-        ..Columns::at(Places::Lines(found.lines))
-    })
+    if deck.functions.is_empty() {
+        let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
+        return Err(error!(CurveFile, "expected a /FUNCT, found {found}"));
+    }
+    let names = deck.functions.iter().map(|f| (f.curve.id.clone(), f.curve.title.clone()));
+    let at = choose(names, input.options.curve.as_deref())?;
+    let Function { line, keyword, unit, mut curve } = deck.functions.swap_remove(at);
+    if keyword != FUNCTION || unit.is_some() {
+        return Err(error!(
+            CurveFile,
+            "{place}: expected /FUNCT/{id} with points between which it is straight, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
+            id = curve.id,
+            place = Place::Line(line),
+            unit = unit.map(|unit| format!("/{unit}")).unwrap_or_default()
+        ));
+    }
+    curve.notes.push(format!("curve: /FUNCT/{} of the deck", curve.id));
+    for Move { line, scale, shift, .. } in deck.moves.iter().filter(|m| m.id == curve.id) {
+        for (x, y) in &mut curve.points {
+            (*x, *y) = (scale.0 * *x + shift.0, scale.1 * *y + shift.1);
+        }
+        curve.notes.push(format!(
+            "scale: /MOVE_FUNCT of line {line}: abscissas times {} plus {}, ordinates times {} plus {}",
+            scale.0, shift.0, scale.1, shift.1
+        ));
+    }
+    curve.columns(input.options.units, REMEDY)
 }
 
 /// Whether a line is one of `/NAME/…`.
@@ -49,17 +57,25 @@ fn is_keyword(line: &str) -> bool {
     line.strip_prefix('/').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_uppercase()))
 }
 
-/// A function of the deck, as it is written.
-#[derive(Clone, Debug, Default)]
-struct Found {
-    id: String,
-    title: String,
-    points: Vec<(f64, f64)>,
-    lines: Vec<u64>,
-    /// What the comments in front of it say.
-    facts: Metadata,
-    units: Option<(UnitSystem, u64)>,
+/// A function of the deck.
+struct Function {
+    line: u64,
+    /// `FUNCT`, or another that begins so and is not read.
+    keyword: String,
+    /// Number of units of its own.
+    unit: Option<String>,
+    curve: DeckCurve,
 }
+
+/// What `/MOVE_FUNCT/id` makes of a function: scaled first, then shifted.
+struct Move {
+    id: String,
+    line: u64,
+    scale: (f64, f64),
+    shift: (f64, f64),
+}
+
+const FUNCTION: &str = "FUNCT";
 
 /// What the next line is.
 #[derive(Clone, Copy, PartialEq)]
@@ -70,46 +86,50 @@ enum Next {
     Point,
     /// So many lines of `/BEGIN` before that of the units.
     Begin(u8),
+    /// So many lines of `/MOVE_FUNCT` before that of the factors.
+    Move(u8),
 }
 
 /// The functions of a deck, and what its comments say.
 #[derive(Default)]
 struct Deck {
-    functions: Vec<Found>,
-    facts: Metadata,
-    units: Option<(UnitSystem, u64)>,
+    functions: Vec<Function>,
+    moves: Vec<Move>,
+    said: Said,
 }
 
 impl Deck {
-    fn read(text: &[u8]) -> Result<Self, Error> {
+    fn read(text: &str) -> Result<Self, Error> {
         let mut deck = Self::default();
         let mut next = Next::Other;
         for (at, line) in lines(text) {
-            if let Some(comment) = line.strip_prefix(['#', '$']) {
-                let comment = comment.trim_start_matches(['#', '$']);
-                deck.units = stated_units(comment).map(|units| (units, at)).or(deck.units);
-                deck.facts.take(&line[..1], comment, Place::Line(at))?;
-                continue;
+            if line.starts_with(['#', '$']) {
+                deck.said.comment(line, at)?;
+            } else if is_keyword(line) {
+                next = deck.keyword(line, at);
+                check_curves(deck.functions.len().max(deck.moves.len()))?;
+            } else {
+                next = deck.line(next, line, at)?;
             }
-            if is_keyword(&line) {
-                next = deck.keyword(&line);
-                check_curves(deck.functions.len())?;
-                continue;
-            }
-            next = deck.line(next, &line, at)?;
         }
         Ok(deck)
     }
 
     /// What follows a keyword.
-    fn keyword(&mut self, line: &str) -> Next {
-        let mut parts = line.trim_end().split('/').skip(1);
-        match parts.next() {
-            Some("BEGIN") => Next::Begin(2),
-            Some("FUNCT") => {
-                let id = parts.next().unwrap_or_default().trim().to_string();
-                let (facts, units) = (self.facts, self.units);
-                self.functions.push(Found { id, facts, units, ..Found::default() });
+    fn keyword(&mut self, line: &str, at: u64) -> Next {
+        let mut parts = line.split('/').skip(1).map(|part| part.trim().to_string());
+        let keyword = parts.next().unwrap_or_default();
+        let id = parts.next().unwrap_or_default();
+        match keyword.as_str() {
+            "BEGIN" => Next::Begin(2),
+            "MOVE_FUNCT" => {
+                self.moves.push(Move { id, line: at, scale: (1.0, 1.0), shift: (0.0, 0.0) });
+                Next::Move(1)
+            }
+            _ if keyword.starts_with(FUNCTION) => {
+                let unit = parts.next().filter(|unit| !unit.is_empty() && unit != "0");
+                let curve = DeckCurve { id, said: self.said, ..DeckCurve::default() };
+                self.functions.push(Function { line: at, keyword, unit, curve });
                 Next::Title
             }
             _ => Next::Other,
@@ -118,76 +138,31 @@ impl Deck {
 
     /// Takes a line that is neither comment nor keyword; gives what the one behind it is.
     fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, Error> {
-        let Some(function) = self.functions.last_mut() else {
-            return Ok(match next {
-                Next::Begin(0) => {
-                    self.units = self.units.or(begin_units(line).map(|units| (units, at)));
-                    Next::Other
-                }
-                Next::Begin(more) => Next::Begin(more - 1),
-                _ => Next::Other,
-            });
-        };
-        match next {
-            Next::Title => {
-                function.title = line.trim().into();
+        match (next, self.functions.last_mut(), self.moves.last_mut()) {
+            (Next::Begin(0), None, _) => {
+                self.said.units = self.said.units.or(begin_units(line).map(|units| (units, at)));
+                Ok(Next::Other)
+            }
+            (Next::Begin(more), ..) => Ok(more.checked_sub(1).map_or(Next::Other, Next::Begin)),
+            (Next::Move(0), _, Some(last)) => {
+                let fields = Fields::of(line, at, WIDTH);
+                let number = |field| fields.number(field, true);
+                let or_one = |value: f64| if value == 0.0 { 1.0 } else { value };
+                last.scale = (or_one(number(0)?), or_one(number(1)?));
+                last.shift = (number(2)?, number(3)?);
+                Ok(Next::Other)
+            }
+            (Next::Move(more), ..) => Ok(more.checked_sub(1).map_or(Next::Other, Next::Move)),
+            (Next::Title, Some(function), _) => {
+                function.curve.title = line.trim().into();
                 Ok(Next::Point)
             }
-            Next::Point if !line.trim().is_empty() => {
-                let fields = Fields::of(line, at, WIDTH);
-                function.points.push((fields.number(0, false)?, fields.number(1, false)?));
-                function.lines.push(at);
-                if function.points.len() > MAX_POINTS {
-                    Err(error!(
-                        CurveFile,
-                        "the curve has more than {most} points: thin it",
-                        most = MAX_POINTS
-                    ))
-                } else {
-                    Ok(Next::Point)
-                }
+            (Next::Point, Some(function), _) if function.keyword == FUNCTION => {
+                function.curve.point(line, at)?;
+                Ok(Next::Point)
             }
-            other => Ok(other),
+            _ => Ok(next),
         }
-    }
-
-    /// The function of that number, or the only one.
-    fn choose(&mut self, asked: Option<&str>) -> Result<Found, Error> {
-        let known = || {
-            let shown = |f: &Found| format!("{} (\"{}\")", shown(&f.id), shown(&f.title));
-            self.functions.iter().take(LISTED).map(shown).collect::<Vec<_>>().join(", ")
-        };
-        let at = match (asked, self.functions.len()) {
-            (_, 0) => {
-                let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
-                return Err(error!(
-                    CurveFile,
-                    "expected {expected}, found {found}",
-                    expected = "a /FUNCT"
-                ));
-            }
-            (None, 1) => 0,
-            (None, _) => {
-                return Err(error!(
-                    CurveFile,
-                    "the file holds several curves: choose one with --curve: {known}",
-                    known = known()
-                ));
-            }
-            (Some(asked), _) => {
-                let by_id = self.functions.iter().position(|f| f.id == asked.trim());
-                by_id.ok_or_else(|| {
-                    let asked = shown(asked);
-                    let known = known();
-                    error!(
-                        CurveFile,
-                        "the file has no curve \"{asked}\": it has {known}{}",
-                        guess::hint(&asked, &known)
-                    )
-                })?
-            }
-        };
-        Ok(self.functions.swap_remove(at))
     }
 }
 

@@ -21,12 +21,10 @@ fn fortran(text: &str) -> Option<String> {
     Some(format!("{}E{}", &text[..sign], &text[sign..]))
 }
 
-/// The lines of a text, counted from 1, without line ends; a character that was cut is replaced.
-pub(super) fn lines(text: &[u8]) -> impl Iterator<Item = (u64, std::borrow::Cow<'_, str>)> {
-    text.split(|&b| b == b'\n').enumerate().map(|(k, line)| {
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        (k as u64 + 1, String::from_utf8_lossy(line))
-    })
+/// The lines of a text, counted from 1, without line ends.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (u64, &str)> {
+    let lines = text.split('\n').map(|line| line.strip_suffix('\r').unwrap_or(line));
+    (1..).zip(lines)
 }
 
 #[cfg(test)]
