@@ -1,6 +1,7 @@
 //! The engine of fixed steps: against the independent reference on random chains, its orders,
 //! dampers and resistance against closed forms, and what a run says of itself.
 
+use crate::common::within_tolerance;
 use crumple::curve::Envelope;
 use crumple::multibody::{
     Body, Chain, Damping, EnvelopeEnd, ForceLaw, Interface, Method, Record, Resistance, Run,
@@ -295,7 +296,7 @@ fn linear(stiffness: f64) -> ForceLaw {
 
 /// `x'' + 2ζω x' + ω² x = 0` while pressed: `v = v₀ e^{−ζωt} (cos ω_d t − ζω/ω_d sin ω_d t)`.
 #[test]
-fn a_damped_spring_follows_its_closed_form() {
+pub fn a_damped_spring_follows_its_closed_form() {
     let (mass, stiffness, v0) = (24.0 * TONNES, 40.0 * MEGA, 40.0_f64 / 3.0);
     let omega = (stiffness / mass).sqrt();
     let zeta = 0.2;
@@ -316,12 +317,12 @@ fn a_damped_spring_follows_its_closed_form() {
     let (long, short) = (error(2e-5), error(1e-5));
     let order = (long / short).log2();
     // With the speed of the middle of the step for the damper the scheme stays symmetric.
-    assert!((order - 2.0).abs() < 0.1, "order {order}: {long:e}, {short:e} m/s");
-    assert!(short < 1e-5, "{short:e} m/s");
+    within_tolerance(order - 2.0, 0.1);
+    within_tolerance(short, 1e-5);
     let reference = run(&chain, &settings().with_method(Method::Reference));
     let differs = |row: usize| reference.bodies[0].v_m_per_s[row] - exact(reference.time_s[row]);
     let worst = (0..60).map(|row| differs(row).abs()).fold(0.0, f64::max);
-    assert!(worst < 1e-9, "{worst:e} m/s");
+    within_tolerance(worst, 1e-9);
 }
 
 /// Damped energy is in the ledger, by both methods the same.
@@ -378,7 +379,7 @@ fn dampers_of_couplings_are_of_the_second_order() {
 
 /// `v = v₀ − μ g t` far above the speed over which the sign is smoothed.
 #[test]
-fn a_braked_body_slows_down_evenly() {
+pub fn a_braked_body_slows_down_evenly() {
     let resistance = Resistance { braking: 0.15, ..Resistance::default() };
     let body = Body { resistance, ..Body::new("car", 20.0 * TONNES, 15.0) };
     let chain = Chain::new(vec![body], Vec::new()).unwrap();
@@ -388,7 +389,7 @@ fn a_braked_body_slows_down_evenly() {
         let rate = 0.15 * STANDARD_GRAVITY_M_PER_S2;
         for (t, v) in run.time_s.iter().zip(&run.bodies[0].v_m_per_s) {
             // Rounding of 150 000 steps.
-            assert!((v - (15.0 - rate * t)).abs() < 1e-10, "{method:?}: {v} m/s at {t} s");
+            within_tolerance(v - (15.0 - rate * t), 1e-10);
         }
         let ledger = run.ledger;
         let taken = ledger.initial_kinetic_j - ledger.kinetic_j;

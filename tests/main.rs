@@ -41,4 +41,5 @@ mod slurm;
 mod stride;
 mod sweep;
 mod trains;
+mod verification;
 mod wrong_input;

@@ -295,6 +295,52 @@ fn the_train_set_is_compared_with_fe() {
     assert!(error.contains("the scenario has no [reference]"), "{error}");
 }
 
+/// A gap in another unit, a coupler that leaves the crush out, a contact that repeats, and a reference
+/// whose nodes or times are others.
+#[test]
+fn what_does_not_fit_in_a_train_is_said() {
+    let said = |run: &Value| run["warnings"].to_string();
+    let vehicles = "inner = \"inner\"\nvehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"20t\" } ]";
+    let curves = |inner: &str| {
+        format!(
+            "nose = {{ {STAGES}, unloading = \"40MN/m\" }}\ninner = {{ {STAGES}, unloading = \"40MN/m\", {inner} }}\n\
+             pull = {{ stages = [ {{ stroke = \"500mm\", from = \"0kN\", to = \"5MN\" }} ], law = \"elastic\", gap = \"10mm\" }}"
+        )
+    };
+    let of =
+        |inner: &str| run(&scenario(&curves(inner), vehicles, "[wall]").replace("300ms", "900ms"));
+    let far = said(&of("gap = \"32m\""));
+    assert!(far.contains("interface A1|A2 never touches: its gap of 32 m stays open"), "{far}");
+    let near = of("gap = \"32mm\"");
+    assert!(!said(&near).contains("never touches"), "{}", said(&near));
+    let coupled = of("gap = \"1mm\", tension = \"pull\"");
+    let travel = said(&coupled);
+    assert!(
+        travel.contains("interface A1|A2: after a crush of 0.")
+            && travel.contains("of free travel"),
+        "{travel}"
+    );
+    for run in [&near, &coupled] {
+        for interface in run["summary"]["interfaces"].as_array().unwrap() {
+            assert!(interface["restitution"].as_f64().is_none_or(|e| e <= 1.0), "{interface}");
+        }
+    }
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = std::fs::read_to_string(demo.join("train-set.toml")).unwrap();
+    let compared = |text: &str| {
+        std::fs::write(demo.join("changed.toml"), text).unwrap();
+        let arguments = ["compare", "--train", "changed.toml", "--nsdm-seeds", "0", "--json", "-q"];
+        json(&crumple_ok(demo, &arguments))["warnings"].to_string()
+    };
+    assert_eq!(compared(&text), "null");
+    let swapped = text.replace("A2 = 900002, A3 = 900003", "A2 = 900003, A3 = 900002");
+    let swapped = compared(&swapped);
+    assert!(swapped.contains("FE's record of A2 fits the run's A3"), "{swapped}");
+    let late = compared(&text.replace("until =", "contact = \"12ms\"\nuntil ="));
+    assert!(late.contains("fits better by") && late.contains("when it is moved by +"), "{late}");
+}
+
 /// The mean deceleration of the summary is that of the histories: from the contact to where the
 /// contact force has ended or changed its sign.
 #[test]

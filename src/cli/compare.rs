@@ -349,6 +349,10 @@ fn trains(
             1 => String::new(),
             _ => format!("{}: ", train.scenario.display()),
         };
+        for warning in &train.comparison.warnings {
+            warned = true;
+            options.warn(&format!("{of_train}{warning}"));
+        }
         for row in &train.comparison.rows {
             for warning in &row.warnings {
                 warned = true;

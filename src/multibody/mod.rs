@@ -68,6 +68,12 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
         }
     }
     run.warnings.extend(beyond_ends(chain, &run));
+    run.warnings.extend(untouched(chain, &run));
+    run.warnings.extend(free_travel(chain, &run));
+    // Contacts that repeat, and neighbours that push, would make a ratio of what is not one impact.
+    for history in &mut run.interfaces {
+        history.restitution = history.restitution.filter(|ratio| *ratio <= MOST_RESTITUTION);
+    }
     run.warnings.extend(still_loaded(chain, &run, grid.output_s(grid.outputs)));
     Ok(run)
 }
@@ -119,6 +125,50 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
                     interface.name
                 ));
             }
+        }
+    }
+    warnings
+}
+
+/// Of interfaces whose gap never closes.
+fn untouched(chain: &Chain, run: &Run) -> Vec<String> {
+    let both = chain.interfaces().iter().zip(&run.interfaces);
+    let never = both.filter(|(interface, history)| {
+        interface.gap_m > 0.0 && history.max_deflection_m <= 0.0 && history.peak_force_n <= 0.0
+    });
+    let said = |(interface, _): (&Interface, _)| {
+        format!(
+            "interface {} never touches: its gap of {} m stays open up to the end of the run; is the gap in another unit, or duration too short?",
+            interface.name, interface.gap_m
+        )
+    };
+    never.map(said).collect()
+}
+
+/// An elastic contact gives 1 but for rounding.
+const MOST_RESTITUTION: f64 = 1.0 + 1e-4;
+/// Free travel of a coupling after the crush, in m, that deserves a warning.
+const FREE_TRAVEL_M: f64 = 0.05;
+
+/// Of couplings that pull from the length at first, though what lies between was crushed.
+fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (interface, history) in chain.interfaces().iter().zip(&run.interfaces) {
+        let Some(tension) = &interface.tension else { continue };
+        let largest_m = history.max_deflection_m;
+        // The deflection at which the force has gone on the way back, by halving.
+        let (mut gone_m, mut pressed_m) = (0.0, largest_m);
+        for _ in 0..50 {
+            let middle_m = 0.5 * (gone_m + pressed_m);
+            let is_gone = interface.law.force_n(middle_m, largest_m) <= 0.0;
+            *(if is_gone { &mut gone_m } else { &mut pressed_m }) = middle_m;
+        }
+        let travel_m = gone_m + interface.gap_m + tension.slack_m;
+        if gone_m > FREE_TRAVEL_M && history.restitution.is_some() {
+            warnings.push(format!(
+                "interface {}: after a crush of {largest_m:.3} m its coupling pulls only from the length at first on, after {travel_m:.3} m of free travel; a real one would pull sooner, or be broken",
+                interface.name
+            ));
         }
     }
     warnings

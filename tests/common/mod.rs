@@ -79,6 +79,22 @@ pub fn entries(folder: &Path) -> Vec<String> {
     names
 }
 
+thread_local! {
+    static HELD: std::cell::RefCell<Vec<f64>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+/// Holds a deviation against its tolerance, and keeps their ratio for docs/verification.md.
+#[track_caller]
+pub fn within_tolerance(deviation: f64, tolerance: f64) {
+    assert!(deviation.abs() <= tolerance, "{deviation:e} exceeds {tolerance:e}");
+    HELD.with_borrow_mut(|held| held.push(deviation.abs() / tolerance));
+}
+
+/// The ratios held since the last call, on this thread.
+pub fn held() -> Vec<f64> {
+    HELD.take()
+}
+
 /// Whether this run also repeats what only watches: `.ci/thorough` sets it.
 pub fn is_thorough() -> bool {
     std::env::var_os("CRUMPLE_THOROUGH").is_some()

@@ -3,6 +3,7 @@
 #![no_main]
 
 mod deck;
+mod files;
 mod model;
 mod reader;
 mod scenario;
@@ -27,6 +28,10 @@ const OTHERS: &[(&str, Target)] = &[
     ("study", study::target),
     ("model", model::target),
     ("scenario", scenario::target),
+    ("curve", files::curve),
+    ("database", files::database),
+    ("plan", files::plan),
+    ("results", files::results),
 ];
 
 static CHOSEN: OnceLock<Box<dyn Fn(&[u8]) + Send + Sync>> = OnceLock::new();

@@ -361,6 +361,24 @@ def model(name, fitted):
         "fitted": fitted, "fitted_body": fitted}).encode()
 
 
+POINTS = [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2e6)]
+
+
+def curves():
+    """The same curve in the text formats that are read; the first byte is the ending's number."""
+    def rows(separator, shape="%g%s%g\n"):
+        return "".join(shape % (d, separator, f) for d, f in POINTS)
+    k = "*KEYWORD\n*DEFINE_CURVE\n         1\n" + "".join("%20.6f%20.6f\n" % p for p in POINTS) + "*END\n"
+    rad = "#RADIOSS STARTER\n/BEGIN\n/FUNCT/1\nnose\n" + "".join("%20.6f%20.6f\n" % p for p in POINTS) + "/END\n"
+    record = "t_s,d_m,force_N\n" + "".join("%g,%g,%g\n" % (0.01 * i, d, f) for i, (d, f) in enumerate(POINTS))
+    crv = "Curveplot\nnose\nd\nf\ncurve #pts=%d\n" % len(POINTS) + rows(" ") + "endcurve\n"
+    texts = [(0, "d_m,force_N\n" + rows(",")), (0, record), (0, "Test 12\nWeg;Kraft\nmm;kN\n" + rows(";")),
+             (1, "# x\n" + rows("\t")), (2, json.dumps({"deflection_m": [d for d, _ in POINTS],
+                                                     "force_N": [f for _, f in POINTS]})),
+             (3, k), (4, rad), (7, crv)]
+    return [bytes([number]) + text.encode() for number, text in texts]
+
+
 def main(folder):
     text = [nodout, rcforc, rwforc, secforc, glstat, matsum, spcforc, bndout, nodfor, sleout, swforc,
             abstat, curvout, deforc, jntforc, rbdout, elout, eloutdet]
@@ -374,6 +392,12 @@ def main(folder):
     files["model"] = [model(name, fitted) for name, fitted in (
         ("nearest", "nearest"), ("linear", "linear"), ("registered", "registered"),
         ("rate", {"rate": {"sensitivity_sqrt_s_per_m": 0.03}}))]
+    files["curve"] = curves()
+    databases = pathlib.Path(__file__).parents[2] / "fixtures" / "databases"
+    files["database"] = [path.read_bytes() for path in sorted(databases.glob("*.h5"))]
+    seeds = pathlib.Path(__file__).parent / "seeds"
+    for target in ("plan", "results"):
+        files[target] = [path.read_bytes() for path in sorted((seeds / target).iterdir())]
     for target, contents in files.items():
         corpus = pathlib.Path(folder) / target
         corpus.mkdir(parents=True, exist_ok=True)

@@ -14,6 +14,7 @@ use crate::error::{Error, KeyPath, error};
 use crate::file;
 use crate::history::EntityId;
 use crate::scenario::{CheckedScenario, ReferenceTable, Sources};
+use crate::signal::interpolate;
 use crate::solver::{self, Selection, WantedId};
 use methods::methods;
 use row::row;
@@ -29,6 +30,9 @@ pub struct TrainComparison {
     pub fe: BTreeMap<String, Vec<f64>>,
     /// Time by the clock that FE took for the train, in s, if the run's folder tells.
     pub fe_time_s: Option<f64>,
+    /// What of the reference does not fit the scenario.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// One row per method.
     pub rows: Vec<TrainRow>,
 }
@@ -167,8 +171,62 @@ fn compared(
         time_s: time_s.to_vec(),
         fe: fe.velocities.iter().map(|(n, v)| (n.clone(), v[..states].to_vec())).collect(),
         fe_time_s: fe.wall_time_s,
+        warnings: rows.first().map_or(Vec::new(), |row| misfits(fe, time_s, row)),
         rows,
     })
+}
+
+/// Another order of the nodes, or another time of the contact, that fits so much better is said.
+const SWAPPED: f64 = 0.5;
+const SHIFTED: f64 = 0.6;
+/// Times by which FE's record is shifted to see whether it fits better, in s.
+const SHIFTS_S: (f64, i32) = (0.001, 50);
+
+/// Vehicles of the reference whose nodes may be swapped, and a record that begins at another time than
+/// the contact; seen by the run of the first method.
+fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let off =
+        |fe: &[f64], ours: &[f64]| -> f64 { fe.iter().zip(ours).map(|(a, b)| (a - b).abs()).sum() };
+    for (i, (one, own)) in fe.velocities.iter().enumerate() {
+        for (other, others) in &fe.velocities[i + 1..] {
+            let (Some(a), Some(b)) = (row.velocities.get(one), row.velocities.get(other)) else {
+                continue;
+            };
+            let (straight, crossed) = (off(own, a) + off(others, b), off(own, b) + off(others, a));
+            if crossed < SWAPPED * straight {
+                warnings.push(format!(
+                    "reference: FE's record of {one} fits the run's {other}, and that of {other} its {one}: their nodes may be swapped"
+                ));
+            }
+        }
+    }
+    let shifted = |shift_s: f64| -> f64 {
+        let own: Vec<f64> = fe.time_s.iter().map(|t| t + shift_s).collect();
+        let common: Vec<usize> = (0..time_s.len())
+            .filter(|&i| time_s[i] >= own[0] && time_s[i] <= own[own.len() - 1])
+            .collect();
+        let at: Vec<f64> = common.iter().map(|&i| time_s[i]).collect();
+        let of = |(name, speeds): &(String, Vec<f64>)| {
+            let ours = row.velocities.get(name)?;
+            let fe = interpolate(&own, speeds, &at).ok()?;
+            let ours: Vec<f64> = common.iter().map(|&i| ours[i]).collect();
+            Some(off(&fe, &ours) / at.len().max(1) as f64)
+        };
+        fe.velocities.iter().filter_map(of).sum()
+    };
+    let best = (-SHIFTS_S.1..=SHIFTS_S.1)
+        .map(|k| f64::from(k) * SHIFTS_S.0)
+        .map(|shift_s| (shifted(shift_s), shift_s))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((error, shift_s)) = best.filter(|(error, _)| *error < SHIFTED * shifted(0.0)) {
+        warnings.push(format!(
+            "reference: FE's record fits better by {:.0} % when it is moved by {:+.0} ms: look at contact in [reference]",
+            100.0 * (1.0 - error / shifted(0.0)),
+            shift_s * 1e3
+        ));
+    }
+    warnings
 }
 
 /// FE's motion of a train: time from the first contact on, speeds positive in the direction

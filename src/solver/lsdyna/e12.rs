@@ -98,22 +98,51 @@ mod tests {
     use super::*;
     use crate::solver::lsdyna::line::{Field, real};
 
-    /// Every exponent with mantissas of all lengths: the same bits as the general parser.
+    fn is_nearest(text: &str) {
+        let field: &[u8; 12] = text.as_bytes().try_into().unwrap();
+        let expected: f64 = text.trim_start().parse().unwrap();
+        match parse(field) {
+            Some(value) => assert_eq!(value.to_bits(), expected.to_bits(), "{text}"),
+            None => {
+                let exponent: i32 = text[9..].parse().unwrap();
+                assert!(!(-17..=27).contains(&exponent), "{text}");
+            }
+        }
+    }
+
+    /// Every mantissa, every exponent and both signs: what the standard library reads. A mantissa below
+    /// 10⁶ and a scale that is a double are multiplied or divided with one rounding, so that the
+    /// two need not be tried in all pairs.
     #[test]
-    fn equals_the_general_parser() {
-        let mut state = 1u64;
-        for round in 0..40_000u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            let number = (state >> 33) % 1_000_000;
-            let exponent = (round % 199) as i32 - 99;
-            let sign = if state & 1 == 0 { ' ' } else { '-' };
-            let digits = format!("{number:06}");
-            let text = format!("{sign}{}.{}E{exponent:+03}", &digits[..1], &digits[1..]);
-            let field: &[u8; 12] = text.as_bytes().try_into().unwrap();
-            let Field::Real(expected) = real(field) else { panic!("{text}") };
-            match parse(field) {
-                Some(value) => assert_eq!(value.to_bits(), expected.to_bits(), "{text}"),
-                None => assert!(!(-17..=27).contains(&exponent), "{text}"),
+    fn equals_the_standard_library() {
+        for number in 0..1_000_000_u32 {
+            let exponent = (number % 45) as i32 - 17;
+            let (whole, decimals) = (number / 100_000, number % 100_000);
+            let sign = if number & 1 == 0 { ' ' } else { '-' };
+            is_nearest(&format!("{sign}{whole}.{decimals:05}E{exponent:+03}"));
+        }
+        for exponent in -99..=99 {
+            for number in (0..1_000_000_u32).step_by(9_973).chain([999_999]) {
+                let (whole, decimals) = (number / 100_000, number % 100_000);
+                for sign in [' ', '-'] {
+                    is_nearest(&format!("{sign}{whole}.{decimals:05}E{exponent:+03}"));
+                }
+            }
+        }
+    }
+
+    /// Any other byte at any place: no number, or the general parser's.
+    #[test]
+    fn a_wrong_byte_is_no_other_number() {
+        for text in [b" 1.23456E+07", b"-9.99999E-17", b" 0.00000E+00"] {
+            for (place, byte) in (0..12).flat_map(|place| (0..=255).map(move |byte| (place, byte)))
+            {
+                let mut field = *text;
+                field[place] = byte;
+                if let Some(value) = parse(&field) {
+                    let Field::Real(expected) = real(&field) else { panic!("{field:?}") };
+                    assert_eq!(value.to_bits(), expected.to_bits(), "{field:?}");
+                }
             }
         }
     }

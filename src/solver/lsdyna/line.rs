@@ -269,6 +269,46 @@ mod tests {
         assert_eq!(free_real(b"192E+09"), Field::Real(192e9));
     }
 
+    /// Every shape that a column can hold, of digits that differ and of digits that carry: what the
+    /// standard library reads once the exponent has its letter.
+    #[test]
+    fn every_shape_equals_the_standard_library() {
+        let exponents =
+            ["", "E+05", "E-5", "E+105", "e-12", "D+03", "d-03", "+07", "-101", "+300", "-320"];
+        let mut shapes = 0;
+        for (sign, before, behind) in ["", "-", "+"].into_iter().flat_map(|sign| {
+            (0..5).flat_map(move |before| (0..9).map(move |behind| (sign, before, behind)))
+        }) {
+            for digits in ["123456789", "999999999", "000000000", "100000000", "000000001"] {
+                for exponent in exponents {
+                    for blanks in ["", "  "] {
+                        let (whole, decimals) = (&digits[..before], &digits[9 - behind..]);
+                        let text = format!("{blanks}{sign}{whole}.{decimals}{exponent}{blanks}");
+                        let letter = match exponent.bytes().next() {
+                            Some(b'+' | b'-') => format!("E{exponent}"),
+                            _ => exponent.to_uppercase().replace('D', "E"),
+                        };
+                        let plain: Result<f64, _> =
+                            format!("{sign}{whole}.{decimals}{letter}").parse();
+                        match (real(text.as_bytes()), plain) {
+                            (Field::Real(value), Ok(expected)) => {
+                                assert_eq!(value.to_bits(), expected.to_bits(), "{text}");
+                            }
+                            (Field::NotFinite(value), Ok(expected)) => {
+                                assert_eq!(value, expected, "{text}")
+                            }
+                            (found, plain) => {
+                                assert!(found == Field::Bad && plain.is_err(), "{text}: {found:?}")
+                            }
+                        }
+                        shapes += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(shapes, 3 * 5 * 9 * 5 * 11 * 2);
+    }
+
     #[test]
     fn a_real_that_was_cut_is_not_whole() {
         for whole in ["1.5000E+00", "-0.5D-03", "0.00+00", "-1.5000-345", "***", "NaN"] {

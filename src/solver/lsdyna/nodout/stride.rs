@@ -284,3 +284,37 @@ impl Stride {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every size of a file and place in it, for periods and tails of all small sizes, against
+    /// counting; and the largest numbers of all.
+    #[test]
+    fn states_are_counted_as_by_hand() {
+        let stride = |period: u64, tail: usize| Stride {
+            blocks: Vec::new(),
+            period,
+            lines: 3,
+            tail: vec![b'\n'; tail],
+            wanted: Vec::new(),
+        };
+        for (period, tail) in (1..12_u64).flat_map(|p| (0..p).map(move |t| (p, t))) {
+            let stride = stride(period, tail as usize);
+            for (size, at) in (0..40_u64).flat_map(|size| (0..45).map(move |at| (size, at))) {
+                let by_hand = (1..).take_while(|k| at + k * period - tail <= size).count();
+                assert_eq!(stride.count(size, at), by_hand, "{period} {tail} {size} {at}");
+                let place = stride.place(Place { line: 7, byte: at }, by_hand);
+                assert_eq!(
+                    (place.line, place.byte),
+                    (7 + 3 * by_hand as u64, at + by_hand as u64 * period)
+                );
+                assert!(by_hand == 0 || place.byte <= size + tail);
+            }
+        }
+        assert_eq!(stride(1, 0).count(u64::MAX, 0), usize::MAX);
+        assert_eq!(stride(u64::MAX, 0).count(u64::MAX, 0), 1);
+        assert_eq!(stride(u64::MAX, 0).count(u64::MAX, 1), 0);
+    }
+}

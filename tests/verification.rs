@@ -1,0 +1,226 @@
+//! docs/verification.md: numbered cases with their sources, tolerances and what was found, written by
+//! the tests that hold them.
+//!
+//! CRUMPLE_WRITE_DOCS=1 cargo test --locked --release --test all verification -- --include-ignored
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use crate::common::{held, root, samples_by_kind};
+use crate::{engine, known_solutions};
+use crumple::solver::{self, Selection};
+
+/// A case with a closed form: the test that holds it, what it is, and where it comes from.
+type Closed = ((&'static str, fn()), &'static str, &'static str);
+
+/// A test and its name.
+macro_rules! named {
+    ($($path:tt)*) => { (stringify!($($path)*), $($path)* as fn()) };
+}
+
+const CLOSED: [Closed; 10] = [
+    (
+        named!(known_solutions::case_1_constant_force_against_a_wall),
+        "A constant force stops a body at a wall",
+        "d = m v²/2F, t = m v/F",
+    ),
+    (
+        named!(known_solutions::case_2_linear_spring_against_a_wall),
+        "A linear spring stops a body at a wall",
+        "d = v √(m/k), t = (π/2) √(m/k), F = v √(m k)",
+    ),
+    (
+        named!(known_solutions::case_3_two_bodies_with_constant_force),
+        "Two bodies with a constant force between them",
+        "d = μ v²/2F, common velocity m₁ v/(m₁ + m₂)",
+    ),
+    (
+        named!(known_solutions::case_4_unloading_gives_the_restitution),
+        "Unloading on a line",
+        "e² = (F²/2k)/(μ v²/2)",
+    ),
+    (
+        named!(known_solutions::case_5_free_chain_of_two_way_springs),
+        "A free chain of springs that push and pull",
+        "v(t) = Σ q cos(ωt) φ, ω = 2 √(k/m) sin(jπ/2N)",
+    ),
+    (
+        named!(known_solutions::case_6_wall_curve_and_doubled_pair_curve_move_alike),
+        "A body at a wall and one of a pair",
+        "same force, deflection doubled, at twice the speed",
+    ),
+    (
+        named!(known_solutions::case_7_mass_and_force_scale_together),
+        "Mass and force scaled together",
+        "the motion does not change",
+    ),
+    (
+        named!(known_solutions::orders_of_convergence_are_two_and_four),
+        "Orders of the two schemes on a spring",
+        "halving the step divides the error by 4, and by 16",
+    ),
+    (
+        named!(engine::a_damped_spring_follows_its_closed_form),
+        "A spring with a damper",
+        "v = v₀ e^(−ζωt) (cos ω_d t − ζω/ω_d sin ω_d t)",
+    ),
+    (named!(engine::a_braked_body_slows_down_evenly), "A body that brakes", "v = v₀ − μ g t"),
+];
+
+/// A second implementation that must agree: the test, what is compared, with what, and how closely.
+const SECOND: [(&str, &str, &str, &str, &str); 13] = [
+    (
+        "engine",
+        "verlet_moves_random_chains_as_the_reference_does",
+        "random chains of 1 to 16 bodies",
+        "our own reference method, which integrates exactly piece by piece",
+        "limits in the test, of all chains",
+    ),
+    (
+        "clients",
+        "forest_is_as_accurate_as_scikit_learn_on_the_fe_table",
+        "errors of the forest on the FE table",
+        "scikit-learn",
+        "in the test",
+    ),
+    (
+        "clients",
+        "onnx_runtime_predicts_the_same",
+        "predictions of an exported forest",
+        "ONNX Runtime",
+        "in the test",
+    ),
+    (
+        "clients",
+        "objective_rating_metrics_and_numpy_rate_the_same",
+        "ratings of two signals (ISO/TS 18571)",
+        "objective-rating-metrics, NumPy",
+        "in the test",
+    ),
+    ("clients", "pyisomme_rates_the_same", "ratings of two signals", "pyisomme", "in the test"),
+    (
+        "clients",
+        "exudyn_moves_eight_cars_against_eight_alike",
+        "a train of 16 vehicles",
+        "Exudyn",
+        "in the test",
+    ),
+    (
+        "fmu",
+        "the_c_law_is_ours_bit_by_bit",
+        "the C source of the FMU",
+        "the Rust law",
+        "bit by bit",
+    ),
+    (
+        "fmu",
+        "one_mass_moves_as_in_our_own_runs",
+        "an FMU in a co-simulation",
+        "FMPy",
+        "in the test",
+    ),
+    (
+        "exports",
+        "calculix_moves_a_mass_as_our_elastic_run",
+        "an exported spring",
+        "CalculiX",
+        "in the test",
+    ),
+    (
+        "exports",
+        "rumoca_moves_a_mass_as_our_run",
+        "an exported Modelica model",
+        "Rumoca",
+        "in the test",
+    ),
+    ("binout", "lasso_reads_the_same", "values of binouts", "lasso-python", "equal"),
+    ("clients", "h5py_reads_what_db_show_prints", "values of databases", "h5py", "equal"),
+    (
+        "openradioss",
+        "t01_and_text_of_every_run_agree",
+        "T01 of our own FE runs",
+        "the text files of the same runs",
+        "six digits",
+    ),
+];
+
+fn hold(made: &str) {
+    let path = root().join("docs/verification.md");
+    if std::env::var_os("CRUMPLE_WRITE_DOCS").is_some() {
+        std::fs::write(&path, made).unwrap();
+    }
+    let there = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        there == made,
+        "docs/verification.md is not what the tests say; see tests/verification.rs"
+    );
+}
+
+/// Of every kind of solver file: how many real ones are read, and the versions that wrote them.
+fn real_files(page: &mut String) {
+    let mut kinds: BTreeMap<String, (usize, BTreeSet<String>)> = BTreeMap::new();
+    for (kind, files) in samples_by_kind() {
+        for path in files.values() {
+            let nothing = Selection { audit: false, ..Selection::nothing() };
+            let Ok(sections) = solver::read_sections(path, None, &nothing) else { continue };
+            let (count, versions) = kinds.entry(kind.clone()).or_default();
+            *count += 1;
+            for section in sections {
+                let version = section.version.or(section.solver);
+                versions.extend(
+                    version.map(|v| v.split_whitespace().take(3).collect::<Vec<_>>().join(" ")),
+                );
+            }
+        }
+    }
+    for format in solver::FORMATS {
+        kinds.entry((*format).to_string()).or_default();
+    }
+    for (kind, (count, versions)) in kinds {
+        let versions: Vec<String> = versions.into_iter().collect();
+        let versions = match (count, versions.is_empty()) {
+            (0, _) => "**no real file has validated it**".into(),
+            (_, true) => "the files do not say".into(),
+            _ => versions.join(", "),
+        };
+        writeln!(page, "| {kind} | {count} | {versions} |").unwrap();
+    }
+}
+
+#[test]
+#[ignore = "needs ../shared (the real files)"]
+fn the_page_says_what_the_tests_find() {
+    let mut page = String::from(
+        "# Verification\n\nNumbered cases, each held by a test of that name. A deviation is given as a share of its tolerance, rounded up; \
+         above 1 the test fails.\n\n## Closed forms\n\nTolerances are half a unit of the last digit that the case prints (7 to 8 digits), and \
+         1e-9 m/s and m for the reference method.\n\n| no. | case | source | values compared | largest deviation / tolerance | test |\n|---|---|---|---|---|---|\n",
+    );
+    for (k, ((name, test), case, source)) in CLOSED.into_iter().enumerate() {
+        held();
+        test();
+        let found = held();
+        assert!(!found.is_empty(), "{case} compares nothing");
+        let worst = found.iter().copied().fold(0.0_f64, f64::max);
+        writeln!(
+            page,
+            "| {} | {case} | {source} | {} | {:.1} | `{name}` |",
+            k + 1,
+            found.len(),
+            (worst * 10.0).ceil() / 10.0
+        )
+        .unwrap();
+    }
+    page += "\n## Second implementations\n\n| no. | what | against | tolerance | test |\n|---|---|---|---|---|\n";
+    for (k, (file, test, what, against, tolerance)) in SECOND.into_iter().enumerate() {
+        let source = std::fs::read_to_string(root().join(format!("tests/{file}.rs"))).unwrap();
+        assert!(source.contains(&format!("fn {test}(")), "tests/{file}.rs has no {test}");
+        let no = CLOSED.len() + k + 1;
+        writeln!(page, "| {no} | {what} | {against} | {tolerance} | `{file}::{test}` |").unwrap();
+    }
+    page += "\n## Real files\n\nFiles of public projects and of our own runs, read without a problem or with the problem that their project \
+             names; `fixtures/samples` has those whose licence lets us hand them on.\n\n| kind | files | written by |\n|---|---|---|\n";
+    real_files(&mut page);
+    page += "\n## What no test can see\n\nA clock of the force that is off by less than about 3 ms; force, mass and speed that are wrong \
+             together; one design that replaces another at a single speed and has the same title, level and order of peaks.\n";
+    hold(&page);
+}
