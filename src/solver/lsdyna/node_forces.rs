@@ -3,7 +3,7 @@
 
 use super::ascii::Body;
 use super::label_values::{Labelled, Widths, components, fields, labelled};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::ProblemCode;
 use crate::solver::states::{StateReader, TableId};
@@ -163,9 +163,12 @@ impl Body for NodeForces {
             self.current = None;
             self.begins = true;
             let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
-            match at.map(|at| real(&text[at..])) {
+            let time = at.and_then(|at| {
+                super::printed_time(&text[at..], super::TIME, &mut self.widths, line, states)
+            });
+            match time {
                 // Every kind of boundary condition has a heading of its own at one time.
-                Some(Field::Real(time)) => {
+                Some(time) => {
                     if states.pending_time() != Some(time) {
                         states.begin(Some(time), line.into());
                     }
