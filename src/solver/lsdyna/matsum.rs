@@ -82,6 +82,7 @@ impl Body for Matsum {
         }
         if let Some(rest) = text.strip_prefix(STATE) {
             self.part = None;
+            states.set_time_digits(5);
             // Five digits: two states may print one time, so the line begins a state.
             let time = super::printed_time(rest, TIME, &mut self.widths, line, states);
             match time.filter(|_| rest.len() >= WIDTH) {

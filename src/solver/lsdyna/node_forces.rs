@@ -42,6 +42,8 @@ const MAX_BLOCKS: usize = 200;
 
 /// What the two files differ in.
 pub(crate) struct Layout {
+    /// Digits of the time.
+    pub time_digits: i32,
     /// Begins a state; the time stands behind `t=`.
     pub state: &'static [u8],
     /// Name of the block that a heading begins, such as a group; `None` for other lines.
@@ -162,6 +164,7 @@ impl Body for NodeForces {
         let done = if text.starts_with(self.layout.state) {
             self.current = None;
             self.begins = true;
+            states.set_time_digits(self.layout.time_digits);
             let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
             let time = at.and_then(|at| {
                 super::printed_time(&text[at..], super::TIME, &mut self.widths, line, states)
