@@ -402,7 +402,7 @@ fn every_group_is_read() {
     let notes = section(&path, "rwforc").notes;
     assert_eq!(
         notes[1],
-        "of 3 the run recorded no tangential impulses: their forces are the normal ones alone"
+        "no tangential impulses are recorded of 3: the forces there are the normal ones alone"
     );
     // The variables of one object may stand in several groups: no force is then half of one.
     fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();

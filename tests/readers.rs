@@ -972,3 +972,26 @@ fn details_of_elements_in_all_their_forms() {
         }
     }
 }
+
+/// The time of a state that has lost a digit is no other time.
+#[test]
+fn a_time_that_lost_digits_is_named() {
+    let nodes = |time: &str| state(1, time) + TRANSLATIONS + &row("7", "1.50000E+00", 12);
+    let text = nodes("0.0000000E+00") + &nodes("1.0000000E-03") + &nodes("2.500000E-03");
+    let file = read("nodout", &(text + &nodes("3.0000000E-03")));
+    assert_eq!(&file.time[..], [0.0, 1e-3, 3e-3]);
+    assert!(codes(&file).contains(&ProblemCode::BadLine));
+
+    let part = |time: &str| {
+        format!(
+            "\n time ={time:>13}\n mat.#=    1             inten=   2.5000E+00     kinen=   1.0000E+00\n"
+        )
+    };
+    let text = part("0.0000E+00") + &part("1.0000E+00") + &part("2.500E+00") + &part("3.0000E+00");
+    let file = read("matsum", &text);
+    assert_eq!(&file.time[..], [0.0, 1.0, 3.0]);
+    assert!(codes(&file).contains(&ProblemCode::BadLine));
+    // The first one is said by those below.
+    let text = part("0.500E+00") + &part("1.0000E+00") + &part("2.0000E+00");
+    assert_eq!(read("matsum", &text).problems[0].line, Some(4));
+}

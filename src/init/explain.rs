@@ -66,19 +66,21 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
         .filter(|(_, e)| e.residual < RELATED)
         .collect();
     let least = explained.iter().map(|(_, e)| e.residual).fold(f64::INFINITY, f64::min);
-    let largest = |sections: bool| {
+    let largest = |files: &[&str]| {
         let of_kind = || {
             let following =
                 explained.iter().filter(|(_, e)| e.residual <= FOLLOWS.max(2.0 * least));
-            following.filter(move |(force, _)| (force.file == "secforc") == sections)
+            following.filter(move |(force, _)| files.contains(&force.file))
         };
         let most = of_kind().map(|(force, _)| size(force)).fold(0.0, f64::max);
         // The survey has them by size: of equal ones a wall's comes before an interface's.
         let equal = of_kind().filter(|(force, _)| size(force) >= (1.0 - EQUAL) * most);
         equal.min_by_key(|(force, _)| rank(force)).map(|(_, e)| e.clone())
     };
-    // A section carries only what passes through it, so it stands for no contact that is there.
-    largest(false).or_else(|| largest(true))
+    // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither stands for
+    // a contact that is there.
+    let [contacts, bodies, sections] = [&["rwforc", "rcforc"][..], &["rbdout"], &["secforc"]];
+    largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections))
 }
 
 /// What can be said where no force explains a run: two bodies whose velocities change against each

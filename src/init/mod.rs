@@ -71,7 +71,7 @@ pub struct UserHints {
 /// A force as `FILE:ID[:SIDE][:COMPONENT]`, such as `rcforc:3:surfa`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GivenForce {
-    /// One of `rwforc`, `rcforc`, `secforc`.
+    /// One of `rwforc`, `rcforc`, `secforc`, `rbdout`.
     pub(crate) file: String,
     /// Number of the wall, interface or section.
     pub(crate) id: i64,

@@ -63,20 +63,8 @@ pub(crate) fn resolve(
     (kept, problems)
 }
 
-/// Digits of a printed time at least.
-const FEWEST_DIGITS: i32 = 4;
 /// Steps of the last digit by which neighbours lie apart where an equal time is the same state.
 const STEPS: f64 = 10.0;
-
-/// Digits that a file's times are printed with: those of the time that has most.
-pub(crate) fn digits(time: &[f64]) -> i32 {
-    let of = |t: &f64| {
-        let text = format!("{t:e}");
-        let mantissa = text.split('e').next().unwrap_or_default();
-        mantissa.bytes().filter(u8::is_ascii_digit).count() as i32
-    };
-    time.iter().map(of).max().unwrap_or(0).max(FEWEST_DIGITS)
-}
 
 /// Whether two states of one time are the same one: neighbours at other times are much further
 /// away than the last of the times' digits can tell.

@@ -7,8 +7,11 @@ use super::ascii;
 use super::node_forces::{Layout, NodeForces};
 use crate::solver::format::Format;
 
-const LAYOUT: Layout =
-    Layout { state: b" n o d a l   f o r c e/e n e r g y    o u t p u t", block: heading };
+const LAYOUT: Layout = Layout {
+    time_digits: 6,
+    state: b" n o d a l   f o r c e/e n e r g y    o u t p u t",
+    block: heading,
+};
 
 /// Headings are "velocity boundary condition forces/…", "pressure boundary condition …",
 /// "discrete nodal point forces": the first word tells them apart.

@@ -3,6 +3,7 @@
 //! Seen only with states that list no curve.
 
 use super::ascii::{self, Body};
+use super::label_values::Widths;
 use super::line::{Line, integer, is_whole_real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -21,6 +22,7 @@ pub(crate) const FORMAT: Format =
 #[derive(Default)]
 struct Curvout {
     table: Option<TableId>,
+    widths: Widths,
 }
 
 impl Body for Curvout {
@@ -30,7 +32,10 @@ impl Body for Curvout {
             return;
         }
         if line.text.starts_with(STATE) {
-            let time = super::at_time(line.text);
+            let text = super::at_time(line.text);
+            let time = text.and_then(|text| {
+                super::printed_time(text, super::TIME, &mut self.widths, line, states)
+            });
             states.begin(time, line.into());
             if time.is_none() {
                 states.damage(line, None, "expected \"( at time … )\"".into());

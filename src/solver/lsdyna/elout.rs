@@ -11,6 +11,7 @@
 //! that looks like erosion cannot fill the memory.
 
 use super::ascii::{self, Body};
+use super::label_values::Widths;
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -89,6 +90,7 @@ struct Elout {
     /// Behind a heading: a row that the state already has is the first of the next one.
     begins: bool,
     unread: Option<Place>,
+    widths: Widths,
 }
 
 impl Body for Elout {
@@ -146,7 +148,10 @@ impl Elout {
         let step = memchr::memmem::find(line.text, b"s t e p").map(|at| at + 7);
         let to = memchr::memmem::find(line.text, b"( at time");
         let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
-        let time = super::at_time(line.text).filter(|_| line.is_heading());
+        let text = super::at_time(line.text).filter(|_| line.is_heading());
+        let time = text.and_then(|text| {
+            super::printed_time(text, super::TIME, &mut self.widths, line, states)
+        });
         self.quantity = Some(quantity);
         self.begins = true;
         let is_same = states.is_pending()

@@ -18,17 +18,25 @@ pub(crate) struct Labelled {
 /// How wide the numbers behind each label of a file are, and where that was first seen.
 #[derive(Default)]
 pub(crate) struct Widths {
-    of: Vec<(String, isize, Place)>,
+    of: Vec<Width>,
     /// Labels come in the same order in every state.
     next: usize,
+}
+
+struct Width {
+    label: String,
+    excess: isize,
+    /// Where it was first seen, and whether more than once.
+    place: Place,
+    is_confirmed: bool,
 }
 
 /// Labels whose widths are noted; real files have about thirty.
 const MAX_LABELS: usize = 1_000;
 
 impl Widths {
-    /// Whether a number that is so much wider than usual can be that of the label. If it is as wide as usual and the
-    /// first was not, that one is said.
+    /// Whether a number that is so much wider than usual can be that of the label. A first one that those below do not
+    /// confirm is said.
     pub(crate) fn allow(
         &mut self,
         label: &str,
@@ -36,23 +44,29 @@ impl Widths {
         line: &Line<'_>,
         states: &mut StateReader<'_>,
     ) -> bool {
-        let is_it = |at: &usize| self.of.get(*at).is_some_and(|of| of.0 == label);
+        let is_it = |at: &usize| self.of.get(*at).is_some_and(|of| of.label == label);
         let hint = Some(self.next).filter(is_it);
-        let Some(at) = hint.or_else(|| self.of.iter().position(|of| of.0 == label)) else {
+        let Some(at) = hint.or_else(|| self.of.iter().position(|of| of.label == label)) else {
             if self.of.len() < MAX_LABELS {
-                self.of.push((label.to_string(), excess, line.into()));
+                let (label, place) = (label.to_string(), line.into());
+                self.of.push(Width { label, excess, place, is_confirmed: false });
             }
             return true;
         };
         self.next = (at + 1) % self.of.len();
-        let (_, known, place) = &mut self.of[at];
-        if excess == 0 && *known != 0 {
+        let known = &mut self.of[at];
+        if excess == known.excess {
+            known.is_confirmed = true;
+            return true;
+        }
+        let is_first_odd = known.excess != 0 && (excess == 0 || !known.is_confirmed);
+        if is_first_odd {
             let message =
                 format!("the number of \"{label}\" is not as wide as those below: was it cut?");
-            states.problems.add(ProblemCode::BadLine, Some(*place), None, message);
-            *known = 0;
+            states.problems.add(ProblemCode::BadLine, Some(known.place), None, message);
+            (known.excess, known.place, known.is_confirmed) = (excess, line.into(), false);
         }
-        excess == *known
+        is_first_odd
     }
 }
 

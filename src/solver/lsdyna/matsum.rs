@@ -3,7 +3,7 @@
 use super::ascii::Skipped;
 use super::ascii::{self, Body};
 use super::label_values::{Labelled, Widths, fields, labelled};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
 use crate::solver::problem::Place;
@@ -11,6 +11,8 @@ use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" time =";
 const PART: &[u8] = b" mat.#=";
+/// Digits, point and exponent of a time.
+const TIME: usize = 10;
 /// Begins what may stand below the parts.
 const BELOW: &[u8] = b"Maximum mass increase";
 /// Width of every number, right behind its label.
@@ -80,12 +82,12 @@ impl Body for Matsum {
         }
         if let Some(rest) = text.strip_prefix(STATE) {
             self.part = None;
+            states.set_time_digits(5);
             // Five digits: two states may print one time, so the line begins a state.
-            match real(rest) {
-                Field::Real(time) if rest.len() >= WIDTH => {
-                    states.begin(Some(time), line.into());
-                }
-                _ => {
+            let time = super::printed_time(rest, TIME, &mut self.widths, line, states);
+            match time.filter(|_| rest.len() >= WIDTH) {
+                Some(time) => states.begin(Some(time), line.into()),
+                None => {
                     states.begin(None, line.into());
                     states.damage(line, None, "expected a time".into());
                 }

@@ -29,16 +29,34 @@ pub(super) mod spcforc;
 pub(super) mod swforc;
 
 use super::states::StateReader;
+use label_values::Widths;
 
-/// The time in `( at time … )` of a state's heading.
-fn at_time(line: &[u8]) -> Option<f64> {
+/// What stands in `( at time … )` of a state's heading.
+fn at_time(line: &[u8]) -> Option<&[u8]> {
     const AT: &[u8] = b"( at time";
     let from = memchr::memmem::find(line, AT)? + AT.len();
     let to = from + memchr::memchr(b')', line.get(from..)?)?;
-    match line::real(&line[from..to]) {
-        line::Field::Real(time) => Some(time),
-        _ => None,
+    line.get(from..to)
+}
+
+/// Digits, point and exponent of a printed time: `0.00000E+00`.
+const TIME: usize = 11;
+
+/// The time that a heading holds; `None` if it has lost some of its `usual` columns, or of those that others have.
+fn printed_time(
+    text: &[u8],
+    usual: usize,
+    widths: &mut Widths,
+    line: &line::Line<'_>,
+    states: &mut StateReader<'_>,
+) -> Option<f64> {
+    let text = text.trim_ascii();
+    let line::Field::Real(time) = line::real(text) else { return None };
+    if !line::is_whole_real(text) {
+        return text.iter().all(|b| !b.is_ascii_alphabetic()).then_some(time);
     }
+    let width = text.strip_prefix(b"-").unwrap_or(text).len();
+    widths.allow("time", width as isize - usual as isize, line, states).then_some(time)
 }
 
 /// Begins the state whose line ends with its time, `rest`, in `width` columns.

@@ -3,7 +3,7 @@
 
 use super::ascii::Body;
 use super::label_values::{Labelled, Widths, components, fields, labelled};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::problem::ProblemCode;
 use crate::solver::states::{StateReader, TableId};
@@ -42,6 +42,8 @@ const MAX_BLOCKS: usize = 200;
 
 /// What the two files differ in.
 pub(crate) struct Layout {
+    /// Digits of the time.
+    pub time_digits: i32,
     /// Begins a state; the time stands behind `t=`.
     pub state: &'static [u8],
     /// Name of the block that a heading begins, such as a group; `None` for other lines.
@@ -162,10 +164,14 @@ impl Body for NodeForces {
         let done = if text.starts_with(self.layout.state) {
             self.current = None;
             self.begins = true;
+            states.set_time_digits(self.layout.time_digits);
             let at = memchr::memmem::find(text, b"t=").map(|at| at + 2);
-            match at.map(|at| real(&text[at..])) {
+            let time = at.and_then(|at| {
+                super::printed_time(&text[at..], super::TIME, &mut self.widths, line, states)
+            });
+            match time {
                 // Every kind of boundary condition has a heading of its own at one time.
-                Some(Field::Real(time)) => {
+                Some(time) => {
                     if states.pending_time() != Some(time) {
                         states.begin(Some(time), line.into());
                     }

@@ -8,8 +8,11 @@ use super::line::integer;
 use super::node_forces::{Layout, NodeForces};
 use crate::solver::format::Format;
 
-const LAYOUT: Layout =
-    Layout { state: b" n o d a l   f o r c e   g r o u p    o u t p u t", block: heading };
+const LAYOUT: Layout = Layout {
+    time_digits: 4,
+    state: b" n o d a l   f o r c e   g r o u p    o u t p u t",
+    block: heading,
+};
 const GROUP: &[u8] = b" nodal group output number";
 
 fn heading(line: &[u8]) -> Option<String> {

@@ -4,7 +4,7 @@
 
 use super::ascii::{self, Body};
 use super::label_values::{Widths, numbers};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
 use crate::solver::states::{StateReader, TableId};
@@ -17,6 +17,8 @@ const HEADINGS: [&[u8]; 5] = [b"1", b"global", b"principal or user defined", b"a
 /// Behind the label, fields of 12; in rows of direction cosines of 15.
 const WIDTH: usize = 12;
 const ROW_WIDTH: usize = 15;
+/// Digits, point and exponent of a time.
+const TIME: usize = 12;
 
 /// Labels of lines, with their components in global and in local directions.
 const LINES: [(&[u8], &[&str], &[&str]); 7] = [
@@ -77,10 +79,9 @@ impl Rbdout {
         if text.starts_with(STATE) {
             self.body = None;
             let at = memchr::memmem::find(text, b"time=").map(|at| at + 5);
-            let time = match at.map(|at| real(&text[at..])) {
-                Some(Field::Real(time)) => Some(time),
-                _ => None,
-            };
+            let time = at.and_then(|at| {
+                super::printed_time(&text[at..], TIME, &mut self.widths, line, states)
+            });
             states.begin(time, line.into());
             return time.map(drop);
         }

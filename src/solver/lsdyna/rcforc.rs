@@ -1,6 +1,7 @@
 //! `rcforc`: resultant forces of contact interfaces, one line per side and state.
 
 use super::ascii::{self, Body};
+use super::label_values::Widths;
 use super::line::{Field, Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
 use crate::solver::format::Format;
@@ -58,6 +59,7 @@ struct Rcforc {
     /// Whether a row had moments: then a row without them is cut.
     moments: bool,
     undefined: Vec<i64>,
+    widths: Widths,
 }
 
 impl Body for Rcforc {
@@ -93,8 +95,10 @@ impl Rcforc {
         let text = line.text;
         let parsed = time_at(text).and_then(|at| {
             let id = integer(text.get(id_from..at)?)?;
-            let (time, fields) = in_columns(text, at).or_else(|| by_labels(text, at))?;
-            Some((id, time, fields))
+            let usual = in_columns(text, at);
+            let excess = isize::from(usual.is_none());
+            let (time, fields) = usual.or_else(|| by_labels(text, at))?;
+            self.widths.allow("row", excess, line, states).then_some((id, time, fields))
         });
         let Some((id, time, fields)) = parsed else {
             self.damage(id_from, line, states);

@@ -395,7 +395,7 @@ impl StateReader {
             let ids: Vec<String> = ids.iter().take(5).map(|(_, id)| id.to_string()).collect();
             let more = if ids.len() == 5 { " and others" } else { "" };
             files[file].notes.push(format!(
-                "of {}{more} the run recorded no tangential impulses: their forces are the normal ones alone",
+                "no tangential impulses are recorded of {}{more}: the forces there are the normal ones alone",
                 ids.join(", ")
             ));
         }

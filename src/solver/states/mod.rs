@@ -24,6 +24,9 @@ use table::Table;
 pub(crate) const ABSENT_CELLS: usize = 10_000_000;
 pub(crate) const ABSENT_PER_PRESENT: usize = 20;
 
+/// Digits of times in most files.
+const TIME_DIGITS: i32 = 6;
+
 /// Labels kept of a file of labels; real ones have about thirty.
 const MAX_LABELS: usize = 500;
 
@@ -68,6 +71,8 @@ pub(crate) struct StateReader<'a> {
     /// Places of the kept states' beginnings, and their cycles where the file has them.
     places: Vec<Place>,
     cycles: Vec<Option<i64>>,
+    /// Digits that the file prints of times.
+    time_digits: i32,
     pub problems: Diagnostics,
 }
 
@@ -91,6 +96,7 @@ impl<'a> StateReader<'a> {
             absent_cells: 0,
             places: Vec::new(),
             cycles: Vec::new(),
+            time_digits: TIME_DIGITS,
             problems: Diagnostics::default(),
         }
     }
@@ -98,6 +104,11 @@ impl<'a> StateReader<'a> {
     /// Leaves out the first `count` whole states.
     pub(crate) fn skip(&mut self, count: usize) {
         self.skip = count;
+    }
+
+    /// Says how many digits of times the file prints, if fewer than most.
+    pub(crate) fn set_time_digits(&mut self, digits: i32) {
+        self.time_digits = digits;
     }
 
     /// Says that a state without rows is whole.

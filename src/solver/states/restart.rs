@@ -1,7 +1,5 @@
 //! Leaves out the states that a restart wrote again.
 
-use std::cell::OnceCell;
-
 use super::StateReader;
 use crate::solver::restart;
 
@@ -10,13 +8,9 @@ impl StateReader<'_> {
         let cycles = &self.cycles;
         // Times have few digits: a cycle that does not rise tells the same state, or a time that is
         // known far better than states lie apart.
-        let digits = OnceCell::new();
         let is_same = |above: usize, below: usize| match (cycles[above], cycles[below]) {
             (Some(above), Some(below)) => Some(below <= above),
-            _ => {
-                let digits = *digits.get_or_init(|| restart::digits(&self.time));
-                Some(restart::is_known_apart(&self.time, above, below, digits))
-            }
+            _ => Some(restart::is_known_apart(&self.time, above, below, self.time_digits)),
         };
         let places = &self.places;
         let place = |i: usize| places.get(i).copied();

@@ -15,6 +15,7 @@ mod stride;
 use std::io;
 
 use super::ascii::{self, Body};
+use super::label_values::Widths;
 use super::line::{Field, Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
@@ -59,6 +60,8 @@ const ROTATIONS: [&str; 9] = [
 /// one column rule for E12.5 and E12.4. The blank of column 10 counts as the id's.
 const ID_WIDTH: usize = 10;
 const FIELD_WIDTH: usize = 12;
+/// Digits, point and exponent of a time.
+const TIME: usize = 13;
 
 fn signature(line: &[u8]) -> bool {
     line.starts_with(STATE)
@@ -79,6 +82,7 @@ struct Nodout {
     new_start: Option<Place>,
     /// How states are laid out, from the last one that was read line by line.
     stride: Option<Stride>,
+    widths: Widths,
 }
 
 #[derive(Clone, Copy)]
@@ -171,11 +175,15 @@ impl Nodout {
 
     /// Cycle number right after `s t e p`, time between `( at time` and `)`.
     fn state_line(
-        &self,
+        &mut self,
         line: &Line<'_>,
         states: &mut StateReader<'_>,
     ) -> Option<(i64, f64, Place)> {
-        let parsed = cycle_and_time(line.text).map(|(cycle, time)| (cycle, time, line.into()));
+        let parsed = cycle_and_time(line.text).filter(|_| {
+            let text = super::at_time(line.text).unwrap_or_default();
+            super::printed_time(text, TIME, &mut self.widths, line, states).is_some()
+        });
+        let parsed = parsed.map(|(cycle, time)| (cycle, time, line.into()));
         if parsed.is_none() {
             // Without its time the block cannot be placed: what was pending ends here.
             states.begin(None, line.into());
