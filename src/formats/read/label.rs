@@ -228,20 +228,23 @@ impl Label {
         given: Option<UnitSystem>,
         place: Place,
     ) -> Result<f64, Error> {
-        let what = self.quantity.name();
         match (&self.unit, given) {
             (Some(unit), _) => self.quantity.known_size_of(unit, place),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
-                let example = self.quantity.example();
-                Err(error!(
-                    CurveFile,
-                    "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
-                    found = shown(text)
-                ))
+                Err(no_unit(place, self.quantity.name(), text, self.quantity.example()))
             }
         }
     }
+}
+
+/// Neither the file nor the user says the unit.
+pub(super) fn no_unit(place: Place, what: &str, found: &str, example: &str) -> Error {
+    let found = shown(found);
+    error!(
+        CurveFile,
+        "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI"
+    )
 }
 
 /// `name [unit]`, `name (unit)` or T/HIS' `name <LENGTH/0.001>;`, apart.

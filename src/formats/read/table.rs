@@ -191,18 +191,15 @@ impl<'a> Table<'a> {
     pub(super) fn of(text: &'a str, purpose: Purpose, asked: &[&str]) -> Self {
         let first: Vec<(u64, &str)> =
             lines(text).filter(|(_, line)| has_content(line)).take(MOST_TITLES + 2).collect();
-        let mut best: Option<(Fit, usize, Separator, Vec<String>)> = None;
+        let is_header = |names: &[String]| names_all(names, purpose, asked);
+        let candidates = (0..first.len().min(MOST_TITLES))
+            .flat_map(|k| Separator::OF_TABLES.into_iter().map(move |separator| (k, separator)))
+            .filter_map(|(k, separator)| {
+                let (fit, names) = fit(&first[k..], separator, &is_header)?;
+                Some((fit, k, separator, names))
+            });
         // A header above numbers wins wherever it stands; else the first line that fits at all.
-        let rank = |fit: Fit, k: usize| (fit != Fit::Header, k, fit);
-        for k in 0..first.len().min(MOST_TITLES) {
-            for separator in Separator::OF_TABLES {
-                let is_header = |names: &[String]| names_all(names, purpose, asked);
-                let Some((fit, names)) = fit(&first[k..], separator, &is_header) else { continue };
-                if best.as_ref().is_none_or(|(other, at, ..)| rank(fit, k) < rank(*other, *at)) {
-                    best = Some((fit, k, separator, names));
-                }
-            }
-        }
+        let best = candidates.min_by_key(|(fit, k, ..)| (*fit != Fit::Header, *k, *fit));
         let (fit, k, separator, names) = best.unwrap_or_else(|| {
             // Nothing fits: what is wrong with the first line is said of it.
             let line = first.first().map_or("", |(_, line)| line);
