@@ -9,7 +9,7 @@ use crate::common::{entries, root};
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 37] = [
+const MAY_NAME: [(&str, &[&str]); 36] = [
     ("plural", &[]),
     ("guess", &[]),
     ("error", &["guess"]),
@@ -20,14 +20,13 @@ const MAY_NAME: [(&str, &[&str]); 37] = [
     ("plot", &[]),
     ("signal", &["piecewise"]),
     ("file", &[]),
-    ("table", &[]),
     ("hdf5", &["file"]),
     ("manifest", &["guess", "file"]),
     ("stream", &[]),
     ("forest", &["stream"]),
     ("solver", &["guess", "plural", "signal", "history", "file", "unit"]),
     ("curve", &["plural", "signal", "piecewise", "history", "unit"]),
-    ("rating", &["guess", "curve", "signal", "history", "table"]),
+    ("rating", &["guess", "curve", "signal", "history"]),
     ("study", &["guess", "curve", "solver", "history", "manifest", "file", "unit"]),
     ("history_hdf5", &["solver", "history", "hdf5", "file", "unit"]),
     ("dataset", &["curve", "unit"]),
@@ -51,7 +50,6 @@ const MAY_NAME: [(&str, &[&str]); 37] = [
             "forest",
             "curve",
             "signal",
-            "table",
             "hdf5",
             "file",
             "unit",
@@ -123,7 +121,6 @@ const MAY_NAME: [(&str, &[&str]); 37] = [
             "curve",
             "signal",
             "history",
-            "table",
             "plot",
             "unit",
         ],

@@ -192,6 +192,26 @@ fn tables_with_blanks_and_tabs_under_any_name() {
         table(name, format!("A [m] B [N]\n{si}").as_bytes(), &odd);
         let error = refused(name, si.as_bytes(), &given(None));
         assert!(error.contains("has no unit") && error.contains("--units"), "{error}");
+        // The header's order counts, and a damaged first row is not a title.
+        let swapped: String = POINTS.iter().map(|(d, f)| format!("{f} {d}\n")).collect();
+        for head in ["load displacement\n", "load displacement\nN m\n"] {
+            let text = format!("{head}{swapped}");
+            let read = read_bytes(name, text.as_bytes(), &given(Some("SI")));
+            match read {
+                Ok((curve, _)) => is_points(&curve, &text),
+                Err(error) => assert!(
+                    error.contains(
+                        "line 1: expected a deflection in the first column, found \"load\""
+                    ),
+                    "{error}"
+                ),
+            }
+        }
+        let text = format!("d_m force_N\n{}", si.replacen("0  0", "0  1O", 1));
+        let error = refused(name, text.as_bytes(), &given(None));
+        assert!(error.contains("line 2, field 2: expected a number, found \"1O\""), "{error}");
+        let text = format!("36 km/h\n{si}");
+        is_points(&read_bytes(name, text.as_bytes(), &given(Some("SI"))).unwrap().0, &text);
         let error = refused(name, si.replace("1000000", "x").as_bytes(), &given(Some("SI")));
         assert!(error.contains("line 3, field 2: expected a number, found \"x\""), "{error}");
     }

@@ -95,7 +95,7 @@ impl Address {
             if let Some(value) = last.strip_prefix("scale=") {
                 scale = factor(value)?;
             } else if let Some(value) = last.strip_prefix("time=") {
-                unit = Some(TimeUnit::named(value).ok_or_else(|| {
+                unit = Some(unit_named(value).ok_or_else(|| {
                     format!("\"{value}\" is not a unit of time here: write s, ms or us")
                 })?);
             } else {
@@ -148,46 +148,23 @@ impl<'a> History<'a> {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum TimeUnit {
-    S,
-    Ms,
-    Us,
+/// A unit of times, and its length in s.
+type TimeUnit = (&'static str, f64);
+
+const TIME_UNITS: [TimeUnit; 3] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
+
+fn unit_named(name: &str) -> Option<TimeUnit> {
+    TIME_UNITS.into_iter().find(|(unit, _)| *unit == name)
 }
 
-impl TimeUnit {
-    const ALL: [Self; 3] = [Self::S, Self::Ms, Self::Us];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::S => "s",
-            Self::Ms => "ms",
-            Self::Us => "us",
-        }
-    }
-
-    fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|u| u.name() == name)
-    }
-
-    /// Its length in s.
-    fn seconds(self) -> f64 {
-        match self {
-            Self::S => 1.0,
-            Self::Ms => 1e-3,
-            Self::Us => 1e-6,
-        }
-    }
-
-    /// The unit that the name of a column ends with: `time_ms`, `time [ms]`, `t (ms)`, `Time <TIME/0.001>;`.
-    fn at_the_end_of(name: &str) -> Option<Self> {
-        let name = name.trim_end_matches([')', ']', ' ', ';', '>']);
-        let (_, unit) = name.rsplit_once(['_', '(', '[', ' ', '/'])?;
-        let size = unit.parse::<f64>().ok().filter(|_| name.contains('<'));
-        let by_size = || Self::ALL.into_iter().find(|u| Some(u.seconds()) == size);
-        // Both signs for micro.
-        Self::named(&unit.to_lowercase().replace(['µ', 'μ'], "u")).or_else(by_size)
-    }
+/// The unit that the name of a column ends with: `time_ms`, `time [ms]`, `t (ms)`, `Time <TIME/0.001>;`.
+fn unit_at_the_end_of(name: &str) -> Option<TimeUnit> {
+    let name = name.trim_end_matches([')', ']', ' ', ';', '>']);
+    let (_, unit) = name.rsplit_once(['_', '(', '[', ' ', '/'])?;
+    let size = unit.parse::<f64>().ok().filter(|_| name.contains('<'));
+    let by_size = || TIME_UNITS.into_iter().find(|(_, seconds)| Some(*seconds) == size);
+    // Both signs for micro.
+    unit_named(&unit.to_lowercase().replace(['µ', 'μ'], "u")).or_else(by_size)
 }
 
 /// What signals may be.
@@ -342,13 +319,13 @@ impl Wanted<'_> {
             failed(format!("{path}: {error}{how}"))
         })?;
         let (line, time_name) = &read.time_name;
-        let said = TimeUnit::at_the_end_of(time_name);
+        let said = unit_at_the_end_of(time_name);
         if self.address.unit.is_none()
-            && let Some(unit) = said.filter(|unit| *unit != TimeUnit::S)
+            && let Some(unit) = said.filter(|(_, seconds)| *seconds != 1.0)
         {
             return Err(failed(format!(
                 "{path}: line {line}, column 1 (\"{time_name}\"): expected a time in s: write {path},time={}",
-                unit.name()
+                unit.0
             )));
         }
         let signal = self.signal(&read.name, &read.time, &read.values)?;
@@ -405,7 +382,7 @@ impl Wanted<'_> {
 
     /// The signal in s and scaled.
     fn signal(&self, column: &str, time: &[f64], values: &[f64]) -> Result<Signal, Failure> {
-        let seconds = self.address.unit.unwrap_or(TimeUnit::S).seconds();
+        let seconds = self.address.unit.map_or(1.0, |(_, seconds)| seconds);
         let name = format!("{}: {column}", self.path.display());
         let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect();
         Signal::new(&name, scaled(time, seconds), scaled(values, self.address.scale))

@@ -159,7 +159,7 @@ impl Columns {
         }
         self.check_finite()?;
         if self.time_s.is_none() {
-            let mut points = Points::of(&self)?;
+            let mut points = Points::of(&self);
             let crush_m = self.facts.max_deflection_m;
             let table = points.loading_then_unloading(crush_m, &mut self.notes)?;
             (self.deflection_m, self.force_n) = table.iter().map(|p| (p.d, p.f)).unzip();
@@ -222,14 +222,12 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Points {
-    fn of(columns: &Columns) -> Result<Self, Error> {
-        let most = (
-            largest(columns.deflection_m.iter().copied()).abs(),
-            largest(columns.force_n.iter().copied()).abs(),
-        );
+    fn of(columns: &Columns) -> Self {
+        let most = |values: &[f64]| largest(values.iter().copied()).abs();
+        let most = (most(&columns.deflection_m), most(&columns.force_n));
         let pairs = columns.deflection_m.iter().zip(&columns.force_n).enumerate();
         let list = pairs.map(|(i, (&d, &f))| Point { d, f, place: columns.places.of(i) }).collect();
-        Ok(Self { list, most })
+        Self { list, most }
     }
 
     /// The loading branch from (0, 0), then the unloading branch if there is one.
@@ -265,18 +263,13 @@ impl Points {
         let on_side = self.list.iter().filter(|p| p.d * side > 0.0);
         let push = on_side.map(|p| p.f).sum::<f64>();
         let push = if push < 0.0 { -1.0 } else { 1.0 };
-        match (side < 0.0, push < 0.0) {
-            (true, true) => {
-                notes.push("sign: the curve lies in the third quadrant; deflection and force are turned, positive in compression".into());
-            }
-            (true, false) => {
-                notes.push("sign: the deflection is turned, positive in compression".into());
-            }
-            (false, true) => {
-                notes.push("sign: the force is turned, positive in compression".into());
-            }
+        let what = match (side < 0.0, push < 0.0) {
+            (true, true) => "the curve lies in the third quadrant; deflection and force are turned",
+            (true, false) => "the deflection is turned",
+            (false, true) => "the force is turned",
             (false, false) => return,
-        }
+        };
+        notes.push(format!("sign: {what}, positive in compression"));
         for point in &mut self.list {
             // A negative zero would only puzzle readers.
             point.d = point.d * side + 0.0;

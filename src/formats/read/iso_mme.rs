@@ -55,7 +55,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     let is_header = |line: &str| line.to_ascii_lowercase().starts_with("channel code");
     input.path.is_dir()
         || has_extension(input.path, "mme")
-        || lines(input.beginning()).any(|(_, line)| is_header(&line))
+        || lines(input.beginning()).any(|(_, line)| is_header(line))
 }
 
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {

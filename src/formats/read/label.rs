@@ -14,103 +14,88 @@ pub(super) enum Quantity {
     Time,
 }
 
-/// Names of each quantity, without blanks and marks, in lower case.
-const NAMES: [(Quantity, &[&str]); 3] = [
-    (Quantity::Deflection, &["d", "x", "s", "u", "xdisplacement"]),
-    (
-        Quantity::Force,
-        &["f", "fx", "fy", "fz", "contactforce", "bodyforce", "normalforce", "xforce"],
-    ),
-    (Quantity::Time, &["t"]),
-];
+/// What a quantity is called: words with blanks between, in lower case.
+struct Terms {
+    name: &'static str,
+    example: &'static str,
+    option: &'static str,
+    dimension: &'static Dimension,
+    /// Its dimension in labels that state the size of their unit.
+    stated: &'static str,
+    /// Its names, without blanks and marks.
+    names: &'static str,
+    /// Its names, also as words within the name of a column.
+    words: &'static str,
+    /// The end of other words, such as Standardkraft and Traversenweg.
+    ending: Option<&'static str>,
+}
 
-/// Words of each quantity, in lower case: names by themselves, and within the name of a column.
-const WORDS: [(Quantity, &[&str]); 3] = [
-    (
-        Quantity::Deflection,
-        &[
-            "deflection",
-            "displacement",
-            "disp",
-            "crush",
-            "stroke",
-            "compression",
-            "deformation",
-            "intrusion",
-            "travel",
-            "extension",
-            "weg",
-            "verschiebung",
-            "verformung",
-            "stauchung",
-        ],
-    ),
-    (Quantity::Force, &["force", "load", "kraft"]),
-    (Quantity::Time, &["time", "zeit"]),
-];
+const DEFLECTION: Terms = Terms {
+    name: "deflection",
+    example: "d_m or d_mm",
+    option: "--deflection-column",
+    dimension: &LENGTH,
+    stated: "length displacement",
+    names: "d x s u xdisplacement",
+    words: "deflection displacement disp crush stroke compression deformation intrusion travel extension weg verschiebung verformung stauchung",
+    ending: Some("weg"),
+};
 
-/// Words that end others, such as Standardkraft and Traversenweg.
-const ENDINGS: [(Quantity, &str); 2] = [(Quantity::Deflection, "weg"), (Quantity::Force, "kraft")];
+const LOAD: Terms = Terms {
+    name: "force",
+    example: "force_N or force_kN",
+    option: "--force-column",
+    dimension: &FORCE,
+    stated: "force",
+    names: "f fx fy fz contactforce bodyforce normalforce xforce",
+    words: "force load kraft",
+    ending: Some("kraft"),
+};
+
+const TIMES: Terms = Terms {
+    name: "time",
+    example: "t_s or t_ms",
+    option: "--time-column",
+    dimension: &TIME,
+    stated: "time",
+    names: "t",
+    words: "time zeit",
+    ending: None,
+};
 
 /// With one of these words a name is that of another quantity: an edge, a bound, a rate.
-const OTHERS: [&str; 18] = [
-    "low",
-    "lo",
-    "lower",
-    "high",
-    "hi",
-    "upper",
-    "min",
-    "max",
-    "std",
-    "deviation",
-    "error",
-    "tolerance",
-    "rate",
-    "target",
-    "setpoint",
-    "command",
-    "nominal",
-    "soll",
-];
+const OTHERS: &str = "low lo lower high hi upper min max std deviation error tolerance rate target setpoint command nominal soll";
+
+/// Whether a word is one of several with blanks between.
+fn is_one(word: &str, of: &str) -> bool {
+    of.split(' ').any(|one| one == word)
+}
 
 impl Quantity {
     /// In the order in which an axis is asked for them.
     pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
+    fn terms(self) -> &'static Terms {
+        match self {
+            Self::Deflection => &DEFLECTION,
+            Self::Force => &LOAD,
+            Self::Time => &TIMES,
+        }
+    }
+
     /// Its name in messages.
     pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Deflection => "deflection",
-            Self::Force => "force",
-            Self::Time => "time",
-        }
+        self.terms().name
     }
 
     /// What its column could be called.
     pub(super) fn example(self) -> &'static str {
-        match self {
-            Self::Deflection => "d_m or d_mm",
-            Self::Force => "force_N or force_kN",
-            Self::Time => "t_s or t_ms",
-        }
+        self.terms().example
     }
 
     /// The option that names its column.
     pub(super) fn option(self) -> &'static str {
-        match self {
-            Self::Deflection => "--deflection-column",
-            Self::Force => "--force-column",
-            Self::Time => "--time-column",
-        }
-    }
-
-    fn dimension(self) -> &'static Dimension {
-        match self {
-            Self::Deflection => &LENGTH,
-            Self::Force => &FORCE,
-            Self::Time => &TIME,
-        }
+        self.terms().option
     }
 
     /// SI value of its unit in a system.
@@ -125,8 +110,11 @@ impl Quantity {
     fn named(name: &str) -> Option<Self> {
         let plain: String =
             name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-        let mut all = NAMES.iter().chain(&WORDS);
-        all.find(|(_, names)| names.contains(&&*plain)).map(|(quantity, _)| *quantity)
+        let is_named = |quantity: &Self| {
+            let Terms { names, words, .. } = quantity.terms();
+            is_one(&plain, names) || is_one(&plain, words)
+        };
+        Self::ALL.into_iter().find(is_named)
     }
 
     /// The only quantity that words of a name are of.
@@ -140,13 +128,13 @@ impl Quantity {
     pub(super) fn all_within(text: &str) -> Vec<Self> {
         let text = text.to_lowercase();
         let words = || text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
-        if words().any(|word| OTHERS.contains(&word)) {
+        if words().any(|word| is_one(word, OTHERS)) {
             return Vec::new();
         }
         let of_word = |word: &str| {
-            let whole = WORDS.iter().find(|(_, names)| names.contains(&word)).map(|(q, _)| *q);
-            let ending = || ENDINGS.iter().find(|(_, end)| word.ends_with(end)).map(|(q, _)| *q);
-            whole.or_else(ending)
+            let is_whole = |quantity: &Self| is_one(word, quantity.terms().words);
+            let is_end = |q: &Self| q.terms().ending.is_some_and(|end| word.ends_with(end));
+            Self::ALL.into_iter().find(is_whole).or_else(|| Self::ALL.into_iter().find(is_end))
         };
         words().filter_map(of_word).collect()
     }
@@ -154,23 +142,19 @@ impl Quantity {
     /// SI value of a unit of this quantity, also of one that states it, as `LENGTH/0.001` does.
     pub(super) fn size_of(self, unit: &str) -> Option<f64> {
         if let Some((dimension, size)) = unit.split_once('/') {
-            let dimensions: &[&str] = match self {
-                Self::Deflection => &["LENGTH", "DISPLACEMENT"],
-                Self::Force => &["FORCE"],
-                Self::Time => &["TIME"],
-            };
             let size = size.trim().parse().ok().filter(|size: &f64| size.is_normal());
-            let is_its = dimensions.contains(&&*dimension.trim().to_ascii_uppercase());
+            let is_its = is_one(&dimension.trim().to_ascii_lowercase(), self.terms().stated);
             return size.filter(|size| is_its && *size > 0.0);
         }
         // Micro is a letter of its own in texts that are no ASCII.
-        self.dimension().size_of(&unit.replace(['µ', 'μ'], "u"))
+        self.terms().dimension.size_of(&unit.replace(['µ', 'μ'], "u"))
     }
 
     /// The same, or what is wrong with the unit.
     pub(super) fn known_size_of(self, unit: &str, place: Place) -> Result<f64, Error> {
         self.size_of(unit).ok_or_else(|| {
-            let (what, known, unit) = (self.name(), self.dimension().known_units(), shown(unit));
+            let (what, known, unit) =
+                (self.name(), self.terms().dimension.known_units(), shown(unit));
             let hint = guess::hint(&unit, &known);
             error!(
                 CurveFile,
@@ -244,20 +228,23 @@ impl Label {
         given: Option<UnitSystem>,
         place: Place,
     ) -> Result<f64, Error> {
-        let what = self.quantity.name();
         match (&self.unit, given) {
             (Some(unit), _) => self.quantity.known_size_of(unit, place),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
-                let example = self.quantity.example();
-                Err(error!(
-                    CurveFile,
-                    "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
-                    found = shown(text)
-                ))
+                Err(no_unit(place, self.quantity.name(), text, self.quantity.example()))
             }
         }
     }
+}
+
+/// Neither the file nor the user says the unit.
+pub(super) fn no_unit(place: Place, what: &str, found: &str, example: &str) -> Error {
+    let found = shown(found);
+    error!(
+        CurveFile,
+        "{place}: the {what} has no unit (\"{found}\"): write it as {example}, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI"
+    )
 }
 
 /// `name [unit]`, `name (unit)` or T/HIS' `name <LENGTH/0.001>;`, apart.

@@ -3,8 +3,8 @@
 
 use super::ColumnNames;
 use super::columns::LISTED;
-use super::curve::{Place, shown};
-use super::label::{Label, Quantity};
+use super::curve::{Place, expected, shown};
+use super::label::{Label, Quantity, no_unit};
 use super::table::{Row, Table, unit_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
@@ -49,13 +49,9 @@ impl Named {
             _ if unit.is_empty() => {}
             None => (self.label.unit, self.line) = (Some(unit.into()), row.line),
             Some(own) if size(own).is_some() && size(own) != size(unit) => {
-                return Err(error!(
-                    CurveFile,
-                    "{place}: expected the unit of the header, {own}, found \"{found}\"",
-                    found = shown(unit),
-                    own = shown(own),
-                    place = Place::Field { line: row.line, field: self.field + 1 }
-                ));
+                let place = Place::Field { line: row.line, field: self.field + 1 };
+                let what = format_args!("the unit of the header, {}", shown(own));
+                return Err(expected(place, what, unit));
             }
             Some(_) => {}
         }
@@ -73,12 +69,9 @@ pub(super) fn layout(
 ) -> Result<(Vec<Column>, bool), Error> {
     let is_bare = table.names.is_empty();
     if is_bare && units.is_none() {
-        return Err(error!(
-            CurveFile,
-            "{place}: the header (the names of the columns) has no unit (\"{found}\"): write it as \"d_mm,force_kN\" above the values, or give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI",
-            found = shown(&table.first_row()),
-            place = Place::Line(table.line())
-        ));
+        let (place, what) = (Place::Line(table.line()), "header (the names of the columns)");
+        let example = "\"d_mm,force_kN\" above the values";
+        return Err(no_unit(place, what, &table.first_row(), example));
     }
     let numbered = || (1..=table.columns).map(|k| (table.line(), format!("column {k}")));
     let names = if is_bare { numbered().collect() } else { table.names.clone() };

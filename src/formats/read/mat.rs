@@ -41,7 +41,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         (_, given) => units(None, given, "", &mut notes)?,
     };
     let mut columns = Columns::at(Places::Rows);
-    let rows = table.rows;
+    let rows = table.head.rows;
     columns.deflection_m = table.values(0, rows).map(|v| v * system.length_m).collect();
     columns.force_n = table.values(rows, rows).map(|v| v * system.force()).collect();
     // Further curves of one file have numbers behind their names.
@@ -49,12 +49,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         let name = format!("{name}{}", ours.unwrap_or_default());
         matrices.iter().find(move |m| m.name == name)
     };
-    if let Some(facts) = beside("facts").filter(|m| m.is_text) {
+    if let Some(facts) = beside("facts").filter(|m| m.head.is_text) {
         for (line, text) in facts.texts().enumerate() {
             columns.facts.take("facts:", &text, Place::Row(line + 1))?;
         }
     }
-    let stiffness = beside("k_u").filter(|m| m.rows * m.columns == 1);
+    let stiffness = beside("k_u").filter(|m| m.head.rows * m.head.columns == 1);
     let stiffness = stiffness.and_then(|m| m.values(0, 1).next());
     let stiffness = stiffness.map(|k| k * system.force() / system.length_m);
     let stiffness = stiffness.filter(|k| *k > 0.0 && k.is_finite());
@@ -74,13 +74,10 @@ fn is_later(bytes: &[u8]) -> bool {
     bytes.starts_with(b"MATLAB ")
 }
 
-/// A full matrix of doubles; of a text, one for each character.
+/// A matrix; of a text, one value for each character.
 struct Matrix<'a> {
-    is_text: bool,
+    head: Head,
     name: String,
-    rows: usize,
-    columns: usize,
-    is_big: bool,
     bytes: &'a [u8],
 }
 
@@ -89,7 +86,7 @@ impl Matrix<'_> {
     fn values(&self, from: usize, count: usize) -> impl Iterator<Item = f64> {
         self.bytes.chunks_exact(8).skip(from).take(count).map(|bytes| {
             let bytes = <[u8; 8]>::try_from(bytes).unwrap_or_default();
-            if self.is_big { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) }
+            if self.head.is_big { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) }
         })
     }
 }
@@ -100,10 +97,10 @@ const MOST_TEXT: usize = 1_000;
 impl Matrix<'_> {
     /// The rows of a text.
     fn texts(&self) -> impl Iterator<Item = String> {
-        let (rows, columns) = (self.rows.min(MOST_TEXT), self.columns.min(MOST_TEXT));
+        let (rows, columns) = (self.head.rows.min(MOST_TEXT), self.head.columns.min(MOST_TEXT));
         let character = |code: f64| char::from_u32(code as u32).unwrap_or(' ');
         (0..rows).map(move |row| {
-            let code = |column: usize| self.values(column * self.rows + row, 1).next();
+            let code = |column: usize| self.values(column * self.head.rows + row, 1).next();
             let line: String = (0..columns).filter_map(code).map(character).collect();
             line.trim_end().to_string()
         })
@@ -177,14 +174,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
             ));
         };
         if head.is_read {
-            found.push(Matrix {
-                is_text: head.is_text,
-                name: name.into_owned(),
-                rows: head.rows,
-                columns: head.columns,
-                is_big: head.is_big,
-                bytes: &bytes[begin..end],
-            });
+            found.push(Matrix { head, name: name.into_owned(), bytes: &bytes[begin..end] });
         }
         check_curves(found.len())?;
         at = end;
@@ -194,10 +184,12 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
 
 /// The matrix that was asked for, else ours, else the only one of two columns.
 fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
-    let fitting: Vec<&Matrix> = matrices.iter().filter(|m| m.columns == 2 && !m.is_text).collect();
+    let fitting: Vec<&Matrix> =
+        matrices.iter().filter(|m| m.head.columns == 2 && !m.head.is_text).collect();
     if fitting.is_empty() {
-        let sizes =
-            matrices.iter().map(|m| format!("{} ({} x {})", shown(&m.name), m.rows, m.columns));
+        let sizes = matrices
+            .iter()
+            .map(|m| format!("{} ({} x {})", shown(&m.name), m.head.rows, m.head.columns));
         let found = match matrices.len() {
             0 => "none".into(),
             _ => sizes.take(LISTED).collect::<Vec<_>>().join(", "),
@@ -207,6 +199,6 @@ fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Mat
     }
     let names = fitting.iter().map(|m| (m.name.clone(), String::new()));
     let table = fitting[choose(names.clone(), asked.or(ours_of(names)))?];
-    check_points(table.rows)?;
+    check_points(table.head.rows)?;
     Ok(table)
 }

@@ -83,7 +83,7 @@ impl File {
     fn read(bytes: &str) -> Result<Self, Error> {
         let mut file = Self { tables: Vec::new(), facts: Metadata::default(), units: None };
         for (at, line) in lines(bytes) {
-            let (text, comment) = line.split_once('#').unwrap_or((&line, ""));
+            let (text, comment) = line.split_once('#').unwrap_or((line, ""));
             if text.trim().is_empty() {
                 file.facts.take("#", comment.trim_start_matches('#'), Place::Line(at))?;
                 let stated = stated_units(comment).map(|units| (units, at));

@@ -10,7 +10,7 @@
 //! and another may follow; `NAME #pts=N` begins one of a `Curveplot` file, whose labels are those of all its curves.
 
 use super::columns::check_curves;
-use super::curve::{CUT, Place, expected, miscounted, shown};
+use super::curve::{CUT, Place, expected, miscounted, shown, value};
 use super::label::{Label, Quantity, is_unit};
 use super::text::{lines, number};
 use crate::error::{Error, error};
@@ -191,18 +191,15 @@ impl<'a> Table<'a> {
     pub(super) fn of(text: &'a str, purpose: Purpose, asked: &[&str]) -> Self {
         let first: Vec<(u64, &str)> =
             lines(text).filter(|(_, line)| has_content(line)).take(MOST_TITLES + 2).collect();
-        let mut best: Option<(Fit, usize, Separator, Vec<String>)> = None;
+        let is_header = |names: &[String]| names_all(names, purpose, asked);
+        let candidates = (0..first.len().min(MOST_TITLES))
+            .flat_map(|k| Separator::OF_TABLES.into_iter().map(move |separator| (k, separator)))
+            .filter_map(|(k, separator)| {
+                let (fit, names) = fit(&first[k..], separator, &is_header)?;
+                Some((fit, k, separator, names))
+            });
         // A header above numbers wins wherever it stands; else the first line that fits at all.
-        let rank = |fit: Fit, k: usize| (fit != Fit::Header, k, fit);
-        for k in 0..first.len().min(MOST_TITLES) {
-            for separator in Separator::OF_TABLES {
-                let is_header = |names: &[String]| names_all(names, purpose, asked);
-                let Some((fit, names)) = fit(&first[k..], separator, &is_header) else { continue };
-                if best.as_ref().is_none_or(|(other, at, ..)| rank(fit, k) < rank(*other, *at)) {
-                    best = Some((fit, k, separator, names));
-                }
-            }
-        }
+        let best = candidates.min_by_key(|(fit, k, ..)| (*fit != Fit::Header, *k, *fit));
         let (fit, k, separator, names) = best.unwrap_or_else(|| {
             // Nothing fits: what is wrong with the first line is said of it.
             let line = first.first().map_or("", |(_, line)| line);
@@ -269,10 +266,11 @@ impl<'a> Table<'a> {
                 comment = Some((at, label(trimmed.trim_start_matches(['$', '#']))));
             } else if is_pair(line) {
                 let titles = std::mem::take(&mut heads);
+                check_last(&titles)?;
                 let name = if titles.len() == 4 { titles.last() } else { titles.first() };
                 tables.push(Self {
                     name: name.map_or(String::new(), |(_, text)| text.clone()),
-                    names: axes(&titles, comment.take()),
+                    names: axes(&titles, comment.take(), line),
                     titles,
                     units: None,
                     fit: Fit::Numbers,
@@ -313,6 +311,7 @@ impl<'a> Table<'a> {
         let is_plain = |row: Row| row.fields.iter().all(|field| field.parse::<f64>().is_ok());
         self.separator == Separator::Blanks
             && self.titles.is_empty()
+            && self.units.is_none()
             && self.columns == 2
             && self.rows().take(HEADS).all(is_plain)
     }
@@ -476,10 +475,32 @@ pub(super) fn unit_of(field: &str) -> &str {
     within('[', ']').or_else(|| within('(', ')')).unwrap_or(field).trim()
 }
 
-/// The names of the two axes of a curve, as far as the lines above it say them.
-fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>) -> Vec<(u64, String)> {
+/// Refuses a line above the rows that begins as they do: its second number is damaged. `36 km/h` is a title.
+pub(super) fn check_last(heads: &[(u64, String)]) -> Result<(), Error> {
+    let Some((line, head)) = heads.last() else { return Ok(()) };
+    let is_word = |text: &str| {
+        let has = |of: fn(char) -> bool| text.contains(of);
+        has(char::is_alphabetic) && !has(|c| c.is_ascii_digit()) && text.parse::<f64>().is_err()
+    };
+    match Separator::Any.fields(head).0[..] {
+        [first, second] if number(first).is_some() && !is_word(second) => {
+            value(Place::Field { line: *line, field: 2 }, second).map(|_| ())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The names of the two axes of a curve, as far as the lines above its first row say them.
+fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>, row: &str) -> Vec<(u64, String)> {
     if let [_, x, y, _] = heads {
         return vec![x.clone(), y.clone()];
+    }
+    let header = heads.last().and_then(|(line, text)| {
+        let names = Separator::Blanks.names(text, row)?;
+        names_all(&names, Purpose::Curve, &[]).then(|| names.into_iter().map(|n| (*line, n)))
+    });
+    if let Some(header) = header {
+        return header.collect();
     }
     let comment = comment.filter(|_| heads.is_empty());
     let named = heads.iter().chain(&comment).flat_map(|(line, text)| {

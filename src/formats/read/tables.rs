@@ -6,7 +6,7 @@ use super::curve::{Metadata, Place, expected, shown, stated_units, title};
 use super::encoding::decoded;
 use super::label::{Label, Quantity};
 use super::layout::layout;
-use super::table::{Fit, Purpose, Row, Table, is_pair};
+use super::table::{Fit, Purpose, Row, Table, check_last, is_pair};
 use super::text::lines;
 use crate::error::{Error, error};
 use crate::guess;
@@ -43,6 +43,9 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut table = Table::of(input.text, Purpose::Curve, &input.options.columns.all());
     if let (Fit::Numbers, Some((line, comment))) = (table.fit, last_comment(input, &table)) {
         table.named_by(line, comment);
+    }
+    if table.fit == Fit::Numbers {
+        check_last(&table.titles)?;
     }
     let name = table.titles.first().map_or(String::new(), |(_, title)| title.clone());
     let notes = table.note().into_iter().collect();
