@@ -86,11 +86,9 @@ static int fails_of(const char *call, int file, int error) {
     }
     snprintf(link, sizeof link, "/proc/self/fd/%d", file);
     long length = syscall(SYS_readlink, link, path, sizeof path - 1);
-    if (length < 0) {
-        return 0;
-    }
-    path[length] = 0;
-    return fails_at(call, path, error);
+    path[length < 0 ? 0 : length] = 0;
+    /* A pipe has no path. */
+    return path[0] == '/' && fails_at(call, path, error);
 }
 
 /* How much of so much is read or written at once. */
@@ -147,9 +145,10 @@ char *realpath(const char *restrict path, char *restrict to) {
     return fails_at("realpath", path, EIO) ? NULL : REAL(real_t, "realpath")(path, to);
 }
 
-/* Of an empty path it looks at the file. */
+/* Of an empty path it looks at the file. Without one it is asked whether it is there. */
 int statx(int f, const char *restrict path, int flags, unsigned mask, struct statx *restrict to) {
-    int fails = *path ? fails_at("statx", path, EIO) : fails_of("statx", f, EIO);
+    const char *volatile asked = path;
+    int fails = asked && (*path ? fails_at("statx", path, EIO) : fails_of("statx", f, EIO));
     return fails ? -1 : syscall(SYS_statx, f, path, flags, mask, to);
 }
 
