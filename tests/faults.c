@@ -6,6 +6,7 @@
  * on, with `kill` the process ends there. With `short` none fails, but each reads or writes a part only.
  * With `memory` allocations of FAULTS_BYTES and more are counted instead. */
 #define _GNU_SOURCE
+#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -176,8 +177,13 @@ int open64(const char *path, int flags, ...) {
     return file;
 }
 
-void *opendir(const char *path) {
-    return fails_at("opendir", path, EIO) ? NULL : REAL(void *(*)(const char *), "opendir")(path);
+DIR *opendir(const char *path) {
+    return fails_at("opendir", path, EIO) ? NULL : REAL(DIR *(*)(const char *), "opendir")(path);
+}
+
+struct dirent64 *readdir64(DIR *folder) {
+    int fails = fails_of("readdir", dirfd(folder), EIO);
+    return fails ? NULL : REAL(struct dirent64 *(*)(DIR *), "readdir64")(folder);
 }
 
 static void *mapped(void *to, size_t n, int allowed, int flags, int f, off_t o) {

@@ -135,7 +135,8 @@ impl Trial<'_> {
                 return Err(format!("{} is neither old nor new; it said {said}", path.display()));
             }
         }
-        let is_work = |name: &str| [".part", ".lock", ".sums"].iter().any(|end| name.ends_with(end));
+        let is_work =
+            |name: &str| [".part", ".lock", ".sums"].iter().any(|end| name.ends_with(end));
         for path in now.keys().filter(|p| !before.contains_key(*p) && !after.contains_key(*p)) {
             if !is_work(&path.to_string_lossy()) {
                 return Err(format!("{} is left; it said {said}", path.display()));
