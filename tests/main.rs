@@ -14,6 +14,7 @@ mod ends;
 mod engine;
 mod examples;
 mod exports;
+mod faults;
 mod files;
 mod fmu;
 mod forest;

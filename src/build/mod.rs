@@ -11,7 +11,7 @@ use crate::clock;
 use crate::curve::{Case, Origin};
 use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
-use crate::file::WriterLock;
+use crate::file::{WriterLock, is_file};
 use crate::study::{self, LocatedRun, Study};
 use previous::{Named, Previous};
 
@@ -98,8 +98,8 @@ pub fn build(
 ) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
-    let mut database =
-        if path.is_file() { Database::read_as_it_is(path)? } else { Database::default() };
+    let is_there = is_file(path).map_err(|source| Error::io(path, source))?;
+    let mut database = if is_there { Database::read_as_it_is(path)? } else { Database::default() };
     let located: Vec<Result<LocatedRun<'_>, Error>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
     let previous = previous(&study, &located, &database);
@@ -138,7 +138,7 @@ pub fn build(
     let changed = !previous.left.is_empty()
         || !moved.is_empty()
         || runs.iter().any(|run| matches!(run.outcome, RunOutcome::Built));
-    if changed || !path.is_file() {
+    if changed || !is_there {
         database.write(path)?;
     }
     Ok(BuildReport {

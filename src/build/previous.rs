@@ -110,7 +110,7 @@ impl Named<'_> {
         }
         found.retain(|(_, _, manifest), _| {
             let (then, now) = (Path::new(manifest), Path::new(self.manifest));
-            then == now || !then.exists() || file::is_same(then, now)
+            then == now || then.try_exists().is_ok_and(|is| !is) || file::is_same(then, now)
         });
         let same = |cases: &[&Case]| {
             let source_hash = cases.iter().filter_map(|case| case.source_hash());

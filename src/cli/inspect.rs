@@ -327,7 +327,7 @@ pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
         }
         for folder in found.runs {
             let mut files = output_files(&folder).map_err(failed)?;
-            files.extend(match decks::find(&folder) {
+            files.extend(match decks::find(&folder).map_err(failed)? {
                 Search::None => Vec::new(),
                 Search::One(deck) => vec![deck],
                 Search::Several(decks) => decks,

@@ -146,7 +146,9 @@ impl GlobalOptions {
     /// Refuses to write over a file of a kind that cannot be made again by the same command: what is
     /// worth keeping may stand under a name that was mistyped. `own` is the kind that the command writes.
     fn keep_others(self, output: &Path, own: FileKind) -> Result<(), Failure> {
-        let is_there = std::fs::metadata(output).is_ok_and(|m| m.is_file() && m.len() > 0);
+        let there = file::if_there(std::fs::metadata(output));
+        let there = there.map_err(|source| crate::error::Error::io(output, source))?;
+        let is_there = there.is_some_and(|m| m.is_file() && m.len() > 0);
         if self.overwrite || is_stdout(output) || !is_there {
             return Ok(());
         }

@@ -10,6 +10,10 @@ use crate::database::{self, CasePath, Database};
 use crate::error::{Error, error};
 use crate::file::{WriterLock, is_same};
 
+fn is_there(database: &Path) -> Result<bool, Error> {
+    database.try_exists().map_err(|source| Error::io(database, source))
+}
+
 /// What happens to a case whose name another curve has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OnConflict {
@@ -55,7 +59,7 @@ pub(crate) fn merge(
 ) -> Result<Joined, Error> {
     let _lock = WriterLock::take(output)?;
     let is_input = inputs.iter().any(|input| is_same(input, output));
-    if output.exists() && !is_input {
+    if !is_input && is_there(output)? {
         return Err(error!(
             Database,
             "{} is there already: name it among the databases that are joined, or write to another file",
@@ -97,7 +101,7 @@ pub(crate) fn copy(
     let chosen = selection.find(path, &source)?;
     let chosen: HashSet<CasePath> = chosen.into_iter().map(CasePath::of).collect();
     let is_itself = target.database.is_none() || is_same(path, output);
-    let there = match (is_itself, output.exists()) {
+    let there = match (is_itself, is_there(output)?) {
         (true, _) => source.clone(),
         (false, true) => Database::read(output)?,
         (false, false) => Database::default(),

@@ -53,7 +53,6 @@ pub(super) fn listed(items: &BTreeSet<Item>) -> String {
 
 /// Attributes, datasets, groups and types of a file that are not the layout's.
 pub(super) fn found(opened: &Opened<'_>) -> Result<BTreeSet<Item>, Error> {
-    let damaged = |e: hdf5::Error| super::damaged(opened.path, "/", e);
     let ours = opened.groups()?;
     let mut foreign = Foreign(BTreeSet::new());
     let mut walk = || -> Result<(), hdf5::Error> {
@@ -70,7 +69,7 @@ pub(super) fn found(opened: &Opened<'_>) -> Result<BTreeSet<Item>, Error> {
         }
         Ok(())
     };
-    walk().map_err(damaged)?;
+    opened.check("/", walk())?;
     Ok(foreign.0)
 }
 

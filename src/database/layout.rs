@@ -15,7 +15,7 @@ use crate::curve::{
 };
 use crate::error::{Error, error};
 use crate::file;
-use crate::hdf5::{self, AttrValue, File, FileBuilder, Group, OpenError, declared_bytes};
+use crate::hdf5::{self, AttrValue, Fault, File, FileBuilder, Group, OpenError, declared_bytes};
 use crate::unit::{Speed, SpeedKind};
 
 /// Value of the root attribute `format`.
@@ -260,6 +260,7 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
 pub(crate) struct Opened<'a> {
     pub path: &'a Path,
     pub file: File,
+    fault: Fault,
     /// Version of its layout.
     pub version: i64,
     /// Bytes of values that datasets may still declare.
@@ -281,12 +282,12 @@ fn not_hdf5(path: &Path, detail: impl Display) -> Error {
 
 /// Opens a database file; values are not read yet.
 pub(crate) fn open(path: &Path) -> Result<Opened<'_>, Error> {
-    let file = hdf5::open(path).map_err(|e| match e {
+    let (file, fault) = hdf5::open(path).map_err(|e| match e {
         OpenError::Io(source) => Error::io(path, source),
         OpenError::InUse => error!(Locked, "{}: {e}", path.display()),
         other => not_hdf5(path, other),
     })?;
-    Opened::of(path, file)
+    Opened::of(path, file, fault)
 }
 
 /// A group that holds cases, as it is found in a file.
@@ -309,8 +310,9 @@ pub(crate) struct FoundCase {
 
 impl<'a> Opened<'a> {
     /// The database in an open file; `path` is for messages.
-    pub(crate) fn of(path: &'a Path, file: File) -> Result<Self, Error> {
+    pub(crate) fn of(path: &'a Path, file: File, fault: Fault) -> Result<Self, Error> {
         let attrs = file.root().attrs();
+        fault.check().map_err(|source| Error::io(path, source))?;
         let attrs =
             attrs.map_err(|e| not_hdf5(path, format_args!("this is not an HDF5 file ({e})")))?;
         if attrs.get("format").and_then(AttrValue::as_str) != Some(FORMAT) {
@@ -329,14 +331,15 @@ impl<'a> Opened<'a> {
             ));
         }
         let left = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(file.file_size());
-        Ok(Self { path, file, version: found, left: Cell::new(left) })
+        Ok(Self { path, file, fault, version: found, left: Cell::new(left) })
     }
 
     fn damaged(&self, place: &str, detail: impl Display) -> Error {
         super::damaged(self.path, place, detail)
     }
 
-    fn check<T>(&self, place: &str, result: Result<T, hdf5::Error>) -> Result<T, Error> {
+    pub(crate) fn check<T>(&self, place: &str, result: Result<T, hdf5::Error>) -> Result<T, Error> {
+        self.fault.check().map_err(|source| Error::io(self.path, source))?;
         result.map_err(|e| self.damaged(place, e))
     }
 
@@ -702,7 +705,14 @@ mod tests {
         let count = |work: &dyn Fn(&Opened<'_>)| {
             let read = Arc::new(AtomicU64::new(0));
             let source = Counting { bytes: bytes.clone(), read: read.clone() };
-            work(&Opened::of(Path::new("a.h5"), File::from_source(source).unwrap()).unwrap());
+            work(
+                &Opened::of(
+                    Path::new("a.h5"),
+                    File::from_source(source).unwrap(),
+                    Fault::default(),
+                )
+                .unwrap(),
+            );
             read.load(Ordering::Relaxed)
         };
         let all = count(&|opened| assert!(decode_opened(opened).unwrap() == database));

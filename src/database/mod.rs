@@ -36,7 +36,7 @@ use std::path::Path;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
-use crate::file::{accepts_changed, write_whole};
+use crate::file::{accepts_changed, is_file, write_whole};
 use layout::{Content, FoundCase};
 
 /// The cases of one database file.
@@ -121,7 +121,7 @@ impl Database {
     /// If the target cannot be written, and if
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        if path.is_file() {
+        if is_file(path).map_err(|source| Error::io(path, source))? {
             let foreign = foreign::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);

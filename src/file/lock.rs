@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::explained;
+use super::{explained, target_of};
 use crate::error::{Error, error};
 
 /// Held while a database or the result of a sweep is read, changed and written back.
@@ -32,7 +32,7 @@ impl WriterLock {
             .caused_by(source)
         };
         // A link and its target are one file.
-        let real = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
+        let real = target_of(target).map_err(error)?;
         let mut name = real.file_name().unwrap_or_default().to_os_string();
         name.push(".lock");
         let path = real.with_file_name(name);

@@ -6,7 +6,7 @@ mod write;
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use lock::WriterLock;
@@ -111,6 +111,31 @@ pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
 pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
     let message = format!("not enough memory to read {bytes} bytes");
     io::Error::new(io::ErrorKind::OutOfMemory, message)
+}
+
+/// What was asked of a path, or `None` if nothing is there, or not what was asked for. A fault stays an error:
+/// who takes it for an absence starts a database anew, or reads half of a run.
+pub(crate) fn if_there<T>(asked: io::Result<T>) -> io::Result<Option<T>> {
+    use io::ErrorKind::{InvalidFilename, NotADirectory, NotFound, PermissionDenied};
+    match asked {
+        Ok(found) => Ok(Some(found)),
+        // An error of ours, such as of a pipe, has no number.
+        Err(e) if e.raw_os_error().is_none() => Ok(None),
+        Err(e) => match e.kind() {
+            InvalidFilename | NotADirectory | NotFound | PermissionDenied => Ok(None),
+            _ => Err(e),
+        },
+    }
+}
+
+/// Whether there is a file at `path`.
+pub(crate) fn is_file(path: &Path) -> io::Result<bool> {
+    Ok(if_there(fs::metadata(path))?.is_some_and(|meta| meta.is_file()))
+}
+
+/// The file that is written at `path`: a link is followed, so that its target is and not the link.
+pub(crate) fn target_of(path: &Path) -> io::Result<PathBuf> {
+    Ok(if_there(fs::canonicalize(path))?.unwrap_or_else(|| path.to_path_buf()))
 }
 
 /// Whether two paths name the same existing file.

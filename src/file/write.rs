@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::lock::{is_at, lock};
-use super::{explained, folder_of};
+use super::{explained, folder_of, if_there, target_of};
 use crate::error::{Error, error};
 
 /// The error of a file that cannot be written; what was there before still is.
@@ -29,7 +29,7 @@ pub(crate) fn write_all_whole(files: &[(&Path, &[u8])]) -> Result<(), Error> {
     let mut prepared: Vec<(&Path, Draft)> = Vec::new();
     for (path, bytes) in files {
         let failed = |source| not_written(path, source);
-        let target = target_of(path);
+        let target = target_of(path).map_err(failed)?;
         if prepared.iter().any(|(_, draft)| draft.target == target) {
             return Err(failed(io::Error::new(
                 io::ErrorKind::InvalidInput,
@@ -95,11 +95,6 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
     Ok(Some(draft))
 }
 
-/// The file that is replaced: a link is followed, so that its target is and not the link.
-fn target_of(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
-}
-
 /// Longer names of targets are shortened to their hash: names of files have up to 255 bytes.
 const MAX_NAME_BYTES: usize = 200;
 
@@ -114,23 +109,22 @@ struct Draft {
 
 impl Draft {
     fn beside(path: &Path) -> io::Result<Self> {
-        let existing = match fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => {
+        let existing = match if_there(fs::metadata(path))? {
+            Some(meta) if meta.is_dir() => {
                 let message = "this is a folder: name a file in it";
                 return Err(io::Error::new(io::ErrorKind::IsADirectory, message));
             }
-            Ok(meta) if !meta.is_file() => {
+            Some(meta) if !meta.is_file() => {
                 let message = "this is a device or a pipe, which takes no file of this kind";
                 return Err(io::Error::new(io::ErrorKind::Unsupported, message));
             }
-            Ok(meta) => Some(meta.permissions()),
-            Err(_) => None,
+            there => there.map(|meta| meta.permissions()),
         };
         if existing.as_ref().is_some_and(fs::Permissions::readonly) {
             let message = "the file is read-only: name another, or allow writing it";
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
         }
-        let target = target_of(path);
+        let target = target_of(path)?;
         let name = target.file_name().unwrap_or_default();
         let mut own = OsString::from(".crumple-");
         if name.len() <= MAX_NAME_BYTES {

@@ -6,13 +6,15 @@
 pub(crate) mod skeleton;
 pub(crate) mod table;
 
+use std::fs;
 use std::io;
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 use crate::file;
 pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
-    FileLocking, Group,
+    FileLocking, FormatError, Group, ReadSeekSource, Source,
 };
 
 /// Why a file is not opened as HDF5.
@@ -37,16 +39,50 @@ pub(crate) enum OpenError {
     },
 }
 
+/// The first read of an open file that the operating system failed. The library leaves out the attributes that
+/// it cannot read, without a word: who has asked for some asks here whether they are all.
+#[derive(Clone, Default)]
+pub(crate) struct Fault(Arc<OnceLock<String>>);
+
+impl Fault {
+    /// Fails if a read has failed.
+    pub(crate) fn check(&self) -> io::Result<()> {
+        self.0.get().map_or(Ok(()), |fault| Err(io::Error::other(fault.clone())))
+    }
+}
+
+/// A file that notes its fault.
+struct Noting(ReadSeekSource<fs::File>, Fault);
+
+impl Source for Noting {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+
+    fn read_at(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
+        let read = self.0.read_at(offset, bytes);
+        if let Err(FormatError::Source(fault)) = &read {
+            self.1.0.get_or_init(|| fault.clone());
+        }
+        read
+    }
+}
+
 /// Opens an HDF5 file for reading; values are not read yet.
-pub(crate) fn open(path: &Path) -> Result<File, OpenError> {
-    file::open(path)?;
+pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
+    let file = file::open(path)?;
     if !hdf5_pure::is_hdf5(path)? {
         return Err(OpenError::NoSignature);
     }
-    File::open_streaming(path).map_err(|e| match e {
-        Error::FileMarkedInUse(_) | Error::FileLocked(_) => OpenError::InUse,
-        other => OpenError::Damaged { detail: other.to_string() },
-    })
+    let fault = Fault::default();
+    let source = ReadSeekSource::new(file).map_err(|e| io::Error::other(e.to_string()))?;
+    let opened = File::from_source(Noting(source, fault.clone()));
+    fault.check()?;
+    match opened {
+        Ok(file) => Ok((file, fault)),
+        Err(Error::FileMarkedInUse(_) | Error::FileLocked(_)) => Err(OpenError::InUse),
+        Err(other) => Err(OpenError::Damaged { detail: other.to_string() }),
+    }
 }
 
 /// Bytes of a dataset's values, at least as many as they take as doubles.
@@ -54,6 +90,3 @@ pub(crate) fn declared_bytes(dataset: &Dataset) -> Result<u64, Error> {
     let size = dataset.element_size()?.max(8);
     Ok(dataset.shape()?.iter().fold(size, |bytes, &n| bytes.saturating_mul(n)))
 }
-
-#[cfg(test)]
-pub(crate) use hdf5_pure::{FormatError, Source};

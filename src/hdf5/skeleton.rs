@@ -155,7 +155,7 @@ mod tests {
                 (0..rows * columns).flat_map(|i| value(k, i).to_le_bytes()).collect();
             write_all_at(&file, &bytes, offsets[k]).unwrap();
         }
-        let read = hdf5::open(&path).unwrap();
+        let (read, _) = hdf5::open(&path).unwrap();
         for (k, (rows, columns)) in shapes.into_iter().enumerate() {
             let dataset = read.dataset(&format!("d{k}")).unwrap();
             assert_eq!(dataset.shape().unwrap(), [rows as u64, columns as u64]);

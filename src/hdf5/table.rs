@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
 use super::skeleton::{Skeleton, write_all_at};
-use super::{AttrValue, Dataset, File, FileBuilder, OpenError, declared_bytes};
+use super::{AttrValue, Dataset, Fault, File, FileBuilder, OpenError, declared_bytes};
 use crate::error::{Error, error};
 use crate::file::write_at;
 
@@ -177,6 +177,7 @@ fn dataset_names(columns: &[&str]) -> Vec<String> {
 pub(crate) struct Table {
     path: PathBuf,
     file: File,
+    fault: Fault,
     /// The columns' datasets: a dataset is looked up among all others by its name, so once.
     datasets: Vec<Dataset>,
     /// The columns in their order.
@@ -186,11 +187,12 @@ pub(crate) struct Table {
 impl Table {
     /// Opens a table whose root attribute `format` is `format`; values are not read yet.
     pub(crate) fn open(path: &Path, format: &str) -> Result<Self, Error> {
-        let file = super::open(path).map_err(|source| match source {
+        let (file, fault) = super::open(path).map_err(|source| match source {
             OpenError::Io(source) => Error::io(path, source),
             source => error!(Other, "{}: {source}", path.display()),
         })?;
-        let mut table = Self { path: path.into(), file, datasets: Vec::new(), columns: Vec::new() };
+        let mut table =
+            Self { path: path.into(), file, fault, datasets: Vec::new(), columns: Vec::new() };
         match table.attribute("format")? {
             Some(Attribute::Text(found)) if found == format => {}
             _ => return Err(table.damaged("format", format!("this is not a {format}"))),
@@ -227,7 +229,9 @@ impl Table {
 
     /// An attribute of the file, if it has it.
     pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, Error> {
-        let mut all = self.file.root().attrs().map_err(|e| self.damaged(name, e.to_string()))?;
+        let all = self.file.root().attrs();
+        self.fault.check().map_err(|source| Error::io(&self.path, source))?;
+        let mut all = all.map_err(|e| self.damaged(name, e.to_string()))?;
         Ok(match all.remove(name) {
             Some(AttrValue::VarLenString(text) | AttrValue::String(text)) => {
                 Some(Attribute::Text(text))

@@ -61,7 +61,7 @@ pub(crate) fn convert(
 /// What cannot be read as HDF5 to its root counts as such, since a table may be damaged.
 pub(crate) fn is_other_hdf5(path: &Path) -> bool {
     let format = match hdf5::open(path) {
-        Ok(file) => {
+        Ok((file, _)) => {
             let attributes = file.root().attrs().ok();
             attributes.and_then(|a| Some(a.get("format")?.as_str()?.to_string()))
         }

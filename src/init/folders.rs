@@ -134,8 +134,8 @@ fn without_files(folder: &Path) -> Reason {
     }
     match decks::find(folder) {
         _ if is_empty => Reason::Empty,
-        Search::None => Reason::NoSolverFiles,
-        Search::One(_) | Search::Several(_) => Reason::OnlyDeck,
+        Ok(Search::One(_) | Search::Several(_)) => Reason::OnlyDeck,
+        Ok(Search::None) | Err(_) => Reason::NoSolverFiles,
     }
 }
 

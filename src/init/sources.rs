@@ -182,7 +182,7 @@ impl Source {
 
     fn parts(&self) -> Vec<PathBuf> {
         match self.section {
-            Some(_) => solver::family(&self.path),
+            Some(_) => solver::family(&self.path).unwrap_or_else(|_| vec![self.path.clone()]),
             None => vec![self.path.clone()],
         }
     }
@@ -212,8 +212,8 @@ fn deck_of(folder: &Path) -> Option<(PathBuf, Box<Deck>)> {
     let above = std::fs::canonicalize(folder).ok().and_then(|path| Some(path.parent()?.into()));
     let folders = [Some(PathBuf::from(folder)), above];
     let found = folders.into_iter().flatten().find_map(|folder| match decks::find(&folder) {
-        Search::One(path) => Some(path),
-        Search::None | Search::Several(_) => None,
+        Ok(Search::One(path)) => Some(path),
+        _ => None,
     })?;
     let deck = decks::read_deck(&found).ok()?;
     Some((found, Box::new(deck)))

@@ -1,7 +1,7 @@
 //! The deck of a run: found beside its files, read with its includes, held against them.
 
 use std::collections::HashMap;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::lsdyna::deck::{self, Deck, DeckInterface, TitledEntity};
@@ -41,13 +41,21 @@ pub fn read_deck(path: &Path) -> Result<Deck, Error> {
 pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Error> {
     let io = |source| Error::io(path, source);
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut included = Vec::new();
+    let (mut included, mut fault) = (Vec::new(), None);
     let mut open = |name: &str| -> Option<Box<dyn BufRead>> {
         // Names are often written on Windows.
         let path = folder.join(name.replace('\\', "/"));
-        let file = file::open(&path).ok()?;
-        included.push(path);
-        Some(Box::new(BufReader::new(file)))
+        match file::if_there(file::open(&path)) {
+            Ok(file) => {
+                let file = file?;
+                included.push(path);
+                Some(Box::new(BufReader::new(file)))
+            }
+            Err(source) => {
+                fault = Some(Error::io(&path, source));
+                None
+            }
+        }
     };
     let mut file = BufReader::new(file::open(path).map_err(io)?);
     let head = file.fill_buf().map_err(io)?;
@@ -55,7 +63,7 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Er
         return Err(io(std::io::Error::other(what)));
     }
     let deck = deck::parse_deck(&mut file, &mut open).map_err(io)?;
-    Ok((deck, included))
+    fault.map_or(Ok((deck, included)), Err)
 }
 
 /// The files that a deck itself includes.
@@ -66,14 +74,14 @@ fn includes(path: &Path) -> Vec<deck::Include> {
 }
 
 /// Looks for the main deck in a folder: the one that no other of the folder includes.
-pub(crate) fn find(folder: &Path) -> Search {
-    let Ok(entries) = folder.read_dir() else { return Search::None };
-    let mut candidates: Vec<PathBuf> = entries
-        .filter_map(Result::ok)
-        .take(MAX_NAMES)
-        .map(|entry| entry.path())
-        .filter(|path| has_ending(path) && is_deck(path))
-        .collect();
+pub(crate) fn find(folder: &Path) -> io::Result<Search> {
+    let mut candidates = Vec::new();
+    for entry in folder.read_dir()?.take(MAX_NAMES) {
+        let path = entry?.path();
+        if has_ending(&path) && is_deck(&path)? {
+            candidates.push(path);
+        }
+    }
     candidates.sort();
     if candidates.len() > 1 && candidates.len() <= MAX_DECKS {
         let included: Vec<String> = candidates
@@ -86,19 +94,19 @@ pub(crate) fn find(folder: &Path) -> Search {
             !included.iter().any(|i| Path::new(i).file_name().map(|n| n.to_string_lossy()) == name)
         });
     }
-    match candidates.len() {
+    Ok(match candidates.len() {
         0 => Search::None,
         1 => candidates.pop().map_or(Search::None, Search::One),
         _ => Search::Several(candidates),
-    }
+    })
 }
 
 /// The only deck beside the file at `path`, or the one that includes the others, if it can be read.
 pub(crate) fn beside(path: &Path) -> Option<(PathBuf, Deck)> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match find(folder) {
-        Search::One(path) => read_deck(&path).ok().map(|deck| (path, deck)),
-        Search::None | Search::Several(_) => None,
+        Ok(Search::One(path)) => read_deck(&path).ok().map(|deck| (path, deck)),
+        _ => None,
     }
 }
 
@@ -108,17 +116,17 @@ fn has_ending(path: &Path) -> bool {
 }
 
 /// Whether the first keyword of a file is one of a deck.
-fn is_deck(path: &Path) -> bool {
-    let Ok(file) = file::open(path) else { return false };
+fn is_deck(path: &Path) -> io::Result<bool> {
+    let Some(file) = file::if_there(file::open(path))? else { return Ok(false) };
     let mut lines = Lines::new(BufReader::new(file));
     for _ in 0..HEAD_LINES {
-        match lines.next_line() {
-            Ok(Some(line)) if line.text.starts_with(b"*") => return deck::signature(line.text),
-            Ok(Some(_)) => {}
-            _ => return false,
+        match lines.next_line()? {
+            Some(line) if line.text.starts_with(b"*") => return Ok(deck::signature(line.text)),
+            Some(_) => {}
+            None => break,
         }
     }
-    false
+    Ok(false)
 }
 
 /// Fills titles that a file does not give itself from the deck; how many.

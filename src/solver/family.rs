@@ -1,42 +1,47 @@
 //! Which files make up one: the continuations of a binary file, a run's several binouts, the histories of its restarts.
 
+use std::io;
 use std::path::{Path, PathBuf};
+
+use crate::file::is_file;
 
 /// The files that are read together with `path`, itself first: of a binary file its
 /// continuations `name%001`, `name%002`, … as far as they follow each other, with
 /// `binout0000` the files `binout0001`, … that other processes of the run wrote, and with
 /// `nameT01` the files `nameT02`, … of its restarts.
-pub(crate) fn family(path: &Path) -> Vec<PathBuf> {
-    let mut parts = with_continuations(path);
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+pub(crate) fn family(path: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut parts = with_continuations(path)?;
+    let name = name_of(path);
     if let Some(number) = restart_number(&name) {
         // Only the first of them stands for all, so that each can still be looked at alone.
-        let is_first = number == 1 || !restart(path, number - 1).is_file();
-        let further = || (number + 1..=LAST_RESTART).map(|n| restart(path, n));
-        parts.extend(further().filter(|_| is_first).take_while(|part| part.is_file()));
-        return parts;
+        let is_first = number == 1 || !is_file(&restart(path, number - 1))?;
+        for next in (number + 1..=LAST_RESTART).map(|n| restart(path, n)) {
+            if !is_first || !is_file(&next)? {
+                break;
+            }
+            parts.push(next);
+        }
+        return Ok(parts);
     }
-    let Some((job, number)) = process_number(&name) else { return parts };
+    let Some((job, number)) = process_number(&name) else { return Ok(parts) };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut others: Vec<(u32, PathBuf)> = folder
-        .read_dir()
-        .into_iter()
-        .flatten()
-        .filter_map(Result::ok)
-        .filter_map(|e| {
-            let name = e.file_name().to_string_lossy().into_owned();
-            let (other, number) = process_number(&name)?;
-            (other == job).then(|| (number, e.path()))
-        })
-        .collect();
+    let mut others: Vec<(u32, PathBuf)> = Vec::new();
+    for entry in folder.read_dir()? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let other = process_number(&name).filter(|(other, _)| *other == job);
+        others.extend(other.map(|(_, number)| (number, entry.path())));
+    }
     others.sort();
     // Only the first of them stands for all, so that each can still be looked at alone.
     if others.first().is_some_and(|(first, _)| *first == number) {
-        for (_, other) in others.iter().skip(1).filter(|(_, path)| path.is_file()) {
-            parts.extend(with_continuations(other));
+        for (_, other) in others.iter().skip(1) {
+            if is_file(other)? {
+                parts.extend(with_continuations(other)?);
+            }
         }
     }
-    parts
+    Ok(parts)
 }
 
 /// What stands before `binout0000`, a job id or nothing, and its digits.
@@ -59,15 +64,20 @@ pub(crate) fn restart_number(name: &str) -> Option<u32> {
 
 /// The file of another restart.
 fn restart(path: &Path, number: u32) -> PathBuf {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = name_of(path);
     let stem = name.get(..name.len().saturating_sub(2)).unwrap_or_default();
     path.with_file_name(format!("{stem}{number:02}"))
 }
 
-fn with_continuations(path: &Path) -> Vec<PathBuf> {
+fn with_continuations(path: &Path) -> io::Result<Vec<PathBuf>> {
     let mut parts = vec![path.to_path_buf()];
-    parts.extend((1..).map(|n| continuation(path, n)).take_while(|part| part.is_file()));
-    parts
+    loop {
+        let next = continuation(path, parts.len());
+        if !is_file(&next)? {
+            return Ok(parts);
+        }
+        parts.push(next);
+    }
 }
 
 fn continuation(path: &Path, number: usize) -> PathBuf {
@@ -86,33 +96,44 @@ const MAX_MISSING_FILES: usize = 20;
 
 /// The first continuation that is missing although others are there, of any of the files, and what is therefore not
 /// read.
-pub(crate) fn missing_continuation(path: &Path) -> Option<String> {
-    let name = path.file_name()?.to_string_lossy().into_owned();
-    if let Some(number) = restart_number(&name) {
-        let parts = family(path).len() as u32;
-        let missing =
-            |n: u32| restart(path, n).file_name().map(|n| n.to_string_lossy().into_owned());
-        let is_there = |n: u32| restart(path, n).is_file();
-        if number > 1 && !is_there(number - 1) {
-            return Some(format!(
-                "{} is not there, so that the record begins late",
-                missing(number - 1)?
-            ));
+pub(crate) fn missing_continuation(path: &Path) -> io::Result<Option<String>> {
+    if let Some(number) = restart_number(&name_of(path)) {
+        let before = restart(path, number.saturating_sub(1));
+        if number > 1 && !is_file(&before)? {
+            let missing = name_of(&before);
+            return Ok(Some(format!("{missing} is not there, so that the record begins late")));
         }
-        let next = number + parts;
-        let goes_on = !is_there(next) && (next + 1..=LAST_RESTART).any(is_there);
-        return missing(next).filter(|_| goes_on).map(unread_behind);
+        let next = number + family(path)?.len() as u32;
+        return unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)));
     }
-    let first = |path: &Path| (1..).find(|&n| !continuation(path, n).is_file()).unwrap_or(1);
-    family(path).iter().filter(|part| !is_continuation(part)).find_map(|part| {
-        let missing = first(part);
-        let later = missing + 1..=missing + MAX_MISSING_FILES;
-        let missing = continuation(part, missing);
-        let name = missing.file_name()?.to_string_lossy().into_owned();
-        later.into_iter().any(|n| continuation(part, n).is_file()).then(|| unread_behind(name))
-    })
+    for part in family(path)?.iter().filter(|part| !is_continuation(part)) {
+        let next = with_continuations(part)?.len();
+        let unread =
+            unread_behind((next..=next + MAX_MISSING_FILES).map(|n| continuation(part, n)))?;
+        if unread.is_some() {
+            return Ok(unread);
+        }
+    }
+    Ok(None)
 }
 
-fn unread_behind(missing: String) -> String {
-    format!("{missing} is not there, so that what continues behind it is not read")
+/// What is not read because the first of these files is missing, if another is there.
+fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> io::Result<Option<String>> {
+    let Some(missing) = files.next() else { return Ok(None) };
+    if is_file(&missing)? {
+        return Ok(None);
+    }
+    for file in files {
+        if is_file(&file)? {
+            let missing = name_of(&missing);
+            return Ok(Some(format!(
+                "{missing} is not there, so that what continues behind it is not read"
+            )));
+        }
+    }
+    Ok(None)
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }

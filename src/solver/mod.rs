@@ -128,7 +128,9 @@ pub fn read_sections(
     let mut head = [0; 16];
     let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
     let is_container = lsdyna::binout::recognises(&head[..count]);
-    if let Some(message) = missing_continuation(path).filter(|_| format.is_binary()) {
+    if format.is_binary()
+        && let Some(message) = missing_continuation(path).map_err(io)?
+    {
         let problem = Problem::new(ProblemCode::CutRecord, message);
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }
@@ -169,7 +171,7 @@ fn open(
     }
     // Before the first is opened: its size is then fixed, and what a run wrote into a
     // continuation that began later would stand behind a hole.
-    let family = family(path);
+    let family = family(path).map_err(io)?;
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {
         Some(name) => named(name)?,

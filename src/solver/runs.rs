@@ -9,6 +9,7 @@ use super::detect::{detect, is_named_like_output};
 use super::family::{family, is_continuation, restart_number};
 use super::is_output;
 use super::source::{self, Access};
+use crate::file::is_file;
 
 /// Folders deeper than this are not looked into.
 const DEEPEST: usize = 12;
@@ -46,15 +47,15 @@ pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
 
 /// The solver files of a folder in order of their names, each family of a binary file once.
 pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut files: Vec<PathBuf> = folder
-        .read_dir()?
-        .take(MOST_NAMES)
-        .filter_map(Result::ok)
-        .filter(|entry| is_named_like_output(&entry.file_name().to_string_lossy()))
-        .map(|entry| entry.path())
+    let mut files = Vec::new();
+    for entry in folder.read_dir()?.take(MOST_NAMES) {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
         // A pipe would wait for its writer.
-        .filter(|path| path.is_file() && !is_continuation(path))
-        .collect();
+        if is_named_like_output(&name) && is_file(&path)? && !is_continuation(&path) {
+            files.push(path);
+        }
+    }
     // Other files end like the history of a restart, too: what is in them tells.
     let is_restart = |name: &str| restart_number(name).is_some_and(|number| number > 1);
     files.retain(|path| {
@@ -62,8 +63,10 @@ pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
         !is_restart(&name) || is_output(path)
     });
     files.sort();
-    let further: HashSet<PathBuf> =
-        files.iter().flat_map(|path| family(path).into_iter().skip(1)).collect();
+    let mut further = HashSet::new();
+    for path in &files {
+        further.extend(family(path)?.into_iter().skip(1));
+    }
     files.retain(|path| !further.contains(path));
     Ok(files)
 }

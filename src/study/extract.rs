@@ -9,6 +9,7 @@ use crate::curve::extract::{DeckSpeed, ExtractError, Extracted, Notes, Setup, ex
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::error::{Error, ErrorCode, KeyPath, error};
+use crate::file::is_file;
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
 use crate::unit::UnitSystem;
@@ -27,8 +28,8 @@ impl LocatedRun<'_> {
         remarks.notes.extend_from_slice(&extracted.quality.notes);
         remarks.warnings.extend_from_slice(&extracted.quality.warnings);
         remarks.append(self.of_files(&files)?);
-        remarks.warnings.extend(self.mass_by_energy(&files, units));
-        Ok(self.case(&files, units, extracted, remarks))
+        remarks.warnings.extend(self.mass_by_energy(&files, units)?);
+        self.case(&files, units, extracted, remarks)
     }
 
     /// The manifest's units, or those that the deck states.
@@ -106,23 +107,40 @@ impl LocatedRun<'_> {
 
     /// That the kinetic energy at the start, in a glstat beside the run, asks for another mass: a
     /// body force is in balance with every mass.
-    fn mass_by_energy(&self, files: &RunFiles<'_>, units: UnitSystem) -> Option<String> {
-        let folder = self.study.folder.join(&self.entry.path);
-        if !self.study.manifest.recipe.force_is_body() || !folder.join("glstat").is_file() {
-            return None;
+    fn mass_by_energy(
+        &self,
+        files: &RunFiles<'_>,
+        units: UnitSystem,
+    ) -> Result<Option<String>, Error> {
+        let path = self.study.folder.join(&self.entry.path).join("glstat");
+        if !self.study.manifest.recipe.force_is_body()
+            || !is_file(&path).map_err(|source| Error::io(&path, source))?
+        {
+            return Ok(None);
         }
+        let wanted = Selection {
+            ids: None,
+            components: Some(vec!["kinetic_energy".into()]),
+            ..Selection::all()
+        };
+        match solver::read(&path, None, &wanted) {
+            Err(fault) if fault.code() == ErrorCode::Io => Err(fault),
+            energy => Ok(energy.ok().and_then(|energy| self.other_mass(&energy, files, units))),
+        }
+    }
+
+    fn other_mass(
+        &self,
+        energy: &SolverFile,
+        files: &RunFiles<'_>,
+        units: UnitSystem,
+    ) -> Option<String> {
         let measured = files.measured(units).ok()?;
         let first = |history: &History| history.values.first().map(|v| v * units.speed());
         let moves = [measured.velocity, measured.minus_velocity].map(|v| v.and_then(first));
         let masses = self.study.masses(self.entry);
         let other = masses.other_kg.unwrap_or(0.0) * moves[1].unwrap_or(0.0).powi(2);
         let stated_j = 0.5 * (masses.body_kg * moves[0]?.powi(2) + other);
-        let wanted = Selection {
-            ids: None,
-            components: Some(vec!["kinetic_energy".into()]),
-            ..Selection::all()
-        };
-        let energy = solver::read(&folder.join("glstat"), None, &wanted).ok()?;
         let found_j = units.force()
             * units.length_m
             * energy.history(None, "kinetic_energy")?.values.first()?;
@@ -173,10 +191,10 @@ impl LocatedRun<'_> {
         units: UnitSystem,
         extracted: Extracted,
         remarks: Notes,
-    ) -> Case {
+    ) -> Result<Case, Error> {
         let head = &self.study.manifest.study;
         let read = files.each().into_iter().map(|read| self.source(read));
-        Case {
+        Ok(Case {
             id: CaseId {
                 study: head.name.clone(),
                 group: head.group.clone(),
@@ -197,7 +215,7 @@ impl LocatedRun<'_> {
                 recipe: self.recipe_in(units),
                 fingerprint: self.fingerprint.clone(),
                 sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
-                solver_wall_time_s: self.solver_wall_time_s(),
+                solver_wall_time_s: self.solver_wall_time_s()?,
                 origin: Some(Origin {
                     manifest: self.study.path(),
                     group: head.group.clone(),
@@ -205,7 +223,7 @@ impl LocatedRun<'_> {
                 }),
                 ..Provenance::default()
             },
-        }
+        })
     }
 
     /// The recipe with the units that were found for it.

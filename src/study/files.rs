@@ -1,9 +1,10 @@
 //! The files that a recipe names in a run's folder: text, or section of a binary file.
 
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 use crate::curve::recipe::ForceSource;
-use crate::error::{Error, KeyPath, error};
+use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::file;
 use crate::guess;
 use crate::solver::{self, Selection};
@@ -34,6 +35,7 @@ pub(super) fn force_file(force: &ForceSource) -> &str {
 pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
     let names = file_names(folder)?;
     let text = named_text(folder, name, &names)?;
+    let is_text = is_file(&text)?;
     let names_only = Selection { audit: false, ..Selection::nothing() };
     let (mut binout, mut damaged) = (None, None);
     let outputs = solver::runs::output_files(folder).map_err(|source| Error::io(folder, source))?;
@@ -46,7 +48,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             Ok(sections) => sections,
             // Only named like one; or broken, which matters where the text is not there.
             Err(error) if error.is_about("format") => continue,
-            Err(_) if text.is_file() => continue,
+            Err(error) if is_text && error.code() != ErrorCode::Io => continue,
             Err(error) => return Err(error.at(KeyPath::default())),
         };
         let states: usize = sections.iter().map(|s| s.time.len()).sum();
@@ -61,7 +63,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             break;
         }
     }
-    let (path, section, twin) = match (text.is_file(), binout) {
+    let (path, section, twin) = match (is_text, binout) {
         // A solver that was asked for the binary file alone may leave the header of the text.
         (true, Some((path, section))) if is_without_states(&text) => (path, Some(section), None),
         (true, twin) => (text, None, twin),
@@ -80,23 +82,34 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             .at_key("file"));
         }
     };
-    let parts = if section.is_some() { solver::family(&path) } else { vec![path.clone()] };
+    let parts = match section {
+        Some(_) => solver::family(&path).map_err(|source| Error::io(&path, source))?,
+        None => vec![path.clone()],
+    };
     Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
+}
+
+fn is_file(path: &Path) -> Result<bool, Error> {
+    file::is_file(path).map_err(|source| Error::io(path, source))
 }
 
 /// The text file that a recipe calls `name`: the one of that name, or with a job id before it.
 fn named_text(folder: &Path, name: &str, names: &[String]) -> Result<PathBuf, Error> {
     let exact = folder.join(name);
-    let is_named_so = |n: &&String| solver::without_job_id(n) == name && folder.join(n).is_file();
-    let mut of_jobs = names.iter().filter(is_named_so);
-    match (of_jobs.next(), of_jobs.next()) {
-        (Some(first), Some(second)) if !exact.is_file() => Err(error!(
+    let mut of_jobs = Vec::new();
+    for name in names.iter().filter(|n| solver::without_job_id(n) == name) {
+        if is_file(&folder.join(name))? {
+            of_jobs.push(name);
+        }
+    }
+    match of_jobs[..] {
+        [first, second, ..] if !is_file(&exact)? => Err(error!(
             Run,
             "the run's folder {} has {first} and {second}: write in the recipe which one is meant",
             folder.display()
         )
         .at_key("file")),
-        (Some(only), None) => Ok(folder.join(only)),
+        [only] => Ok(folder.join(only)),
         _ => Ok(exact),
     }
 }
@@ -145,12 +158,11 @@ pub(crate) fn is_section_of(section: &str, name: &str) -> bool {
 
 /// Names in a run's folder, in order.
 fn file_names(folder: &Path) -> Result<Vec<String>, Error> {
-    let entries = folder.read_dir().map_err(|source| Error::io(folder, source))?;
-    let mut names: Vec<String> = entries
-        .filter_map(Result::ok)
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .take(1_000)
-        .collect();
+    let names = folder.read_dir().and_then(|entries| {
+        let name = |e: DirEntry| e.file_name().to_string_lossy().into_owned();
+        entries.take(1_000).map(|entry| entry.map(name)).collect()
+    });
+    let mut names: Vec<String> = names.map_err(|source| Error::io(folder, source))?;
     names.sort();
     Ok(names)
 }

@@ -1,5 +1,6 @@
 //! The files of a run: found and hashed, so that only what changed is read again.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::files::{Located, force_file, hashed_family, locate_file, shown_name};
@@ -41,7 +42,8 @@ impl Study {
     /// Finds and hashes the files of a run.
     pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, Error> {
         let folder = self.folder.join(&entry.path);
-        if !folder.is_dir() {
+        let there = file::if_there(fs::metadata(&folder)).map_err(|e| Error::io(&folder, e))?;
+        if !there.is_some_and(|meta| meta.is_dir()) {
             let path = folder.display();
             return Err(error!(
                 Run,
@@ -91,7 +93,7 @@ impl Study {
         let mut notes = Vec::new();
         let path = match &entry.deck {
             Some(name) => Some(self.folder.join(name)),
-            None => match decks::find(folder) {
+            None => match decks::find(folder).map_err(|e| Error::io(folder, e))? {
                 Search::None => None,
                 Search::One(path) => Some(path),
                 Search::Several(found) => {
@@ -166,11 +168,14 @@ impl LocatedRun<'_> {
     }
 
     /// `engine_wall_time_s` of the case.json in the run's folder, if there is one.
-    pub(super) fn solver_wall_time_s(&self) -> Option<f64> {
+    pub(super) fn solver_wall_time_s(&self) -> Result<Option<f64>, Error> {
         let path = self.study.folder.join(&self.entry.path).join("case.json");
-        let text = file::read_text(&path, MAX_CASE_BYTES).ok()?;
-        let case: serde_json::Value = serde_json::from_str(&text).ok()?;
-        case.get("engine_wall_time_s")?.as_f64().filter(|t| *t > 0.0 && t.is_finite())
+        let text = file::if_there(file::read_text(&path, MAX_CASE_BYTES));
+        let stated = |text: String| {
+            let case: serde_json::Value = serde_json::from_str(&text).ok()?;
+            case.get("engine_wall_time_s")?.as_f64().filter(|t| *t > 0.0 && t.is_finite())
+        };
+        Ok(text.map_err(|e| Error::io(&path, e))?.and_then(stated))
     }
 
     /// The located file of a recipe's file name.

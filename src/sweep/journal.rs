@@ -13,7 +13,7 @@ use super::statistics::Tally;
 use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, Sweep, foreign};
 use crate::error::Error;
-use crate::file::{WriterLock, accepts_changed, not_written};
+use crate::file::{WriterLock, accepts_changed, not_written, target_of};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +57,7 @@ pub fn write(
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, Error> {
     // A link is followed, so that its target is replaced and not the link.
-    let output = &fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf());
+    let output = &target_of(output).map_err(failed(output))?;
     let _lock = WriterLock::take(output)?;
     let head = ShardHeader::of(sweep, options.shard);
     let (part, sums) = (beside(output, ".part"), beside(output, ".part.sums"));
@@ -69,7 +69,7 @@ pub fn write(
                 _ => {}
             }
         }
-    } else if output.exists() {
+    } else if output.try_exists().map_err(failed(output))? {
         complete(output, &head, &mut tally)?;
         // Left if a kill came just before their removal; they hold nothing more.
         let _ = fs::remove_file(&part);

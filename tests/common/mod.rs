@@ -222,7 +222,7 @@ pub fn edited(path: &Path, edit: impl FnOnce(&hdf5_pure::File)) {
 pub struct Demo {
     /// Its standard output.
     pub printed: String,
-    files: Vec<(PathBuf, Vec<u8>)>,
+    files: BTreeMap<PathBuf, Vec<u8>>,
 }
 
 /// The demo, run once for all tests.
@@ -231,20 +231,23 @@ pub fn demo() -> &'static Demo {
     DEMO.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let printed = crumple_ok(folder.path(), &["demo"]);
-        let mut files = Vec::new();
-        collect(&folder.path().join("crumple-demo"), Path::new(""), &mut files);
-        Demo { printed, files }
+        Demo { printed, files: contents(&folder.path().join("crumple-demo")) }
     })
 }
 
 impl Demo {
     /// Writes the demo's files into `folder`.
     pub fn copy_to(&self, folder: &Path) {
-        for (path, bytes) in &self.files {
-            let path = folder.join(path);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, bytes).unwrap();
-        }
+        write_contents(folder, &self.files);
+    }
+}
+
+/// Writes files into `folder`.
+pub fn write_contents(folder: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
+    for (path, bytes) in files {
+        let path = folder.join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
     }
 }
 
@@ -255,15 +258,16 @@ pub fn demo_folder() -> tempfile::TempDir {
     folder
 }
 
-/// Adds the files below `folder/below` to `files`, with their paths in `folder`.
-fn collect(folder: &Path, below: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
-    for name in entries(&folder.join(below)) {
-        let path = below.join(name);
-        if folder.join(&path).is_dir() {
-            collect(folder, &path, files);
+/// The files below `folder`, by their paths in it.
+pub fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for name in entries(folder) {
+        let (path, name) = (folder.join(&name), Path::new(&name));
+        if path.is_dir() {
+            files.extend(contents(&path).into_iter().map(|(p, bytes)| (name.join(p), bytes)));
         } else {
-            let bytes = std::fs::read(folder.join(&path)).unwrap();
-            files.push((path, bytes));
+            files.insert(name.into(), std::fs::read(path).unwrap());
         }
     }
+    files
 }
