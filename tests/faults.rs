@@ -121,12 +121,12 @@ impl Faulty<'_> {
     fn names(&self) -> Vec<&str> {
         let failed = self.calls.iter().skip(self.at - 1);
         let failed = failed.take(if self.how == "once" { 1 } else { usize::MAX });
-        let name = |call: &'_ String| {
+        fn name(call: &String) -> &str {
             let name = call.rsplit(['/', ' ']).next().unwrap_or_default();
             let name = name.strip_prefix(".crumple-").unwrap_or(name);
             let ends = [".sums", ".part", ".lock"];
             ends.iter().fold(name, |name, end| name.strip_suffix(end).unwrap_or(name))
-        };
+        }
         failed.map(name).collect()
     }
 }

@@ -5,8 +5,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::path::PathBuf;
 
-use crate::common::{held, root, samples_by_kind};
+use crate::common::{entries, held, root, samples_by_kind, shared};
 use crate::{engine, known_solutions};
 use crumple::solver::{self, Selection};
 
@@ -156,6 +157,22 @@ fn hold(made: &str) {
     );
 }
 
+/// Files below folders whose names end so.
+fn found(folders: &[PathBuf], end: &str) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for folder in folders {
+        for name in entries(folder) {
+            let path = folder.join(&name);
+            match path.is_dir() {
+                true => files.extend(found(&[path], end)),
+                false if name.ends_with(end) => files.push(path),
+                false => {}
+            }
+        }
+    }
+    files
+}
+
 /// Of every kind of solver file: how many real ones are read, and the versions that wrote them.
 fn real_files(page: &mut String) {
     let mut kinds: BTreeMap<String, (usize, BTreeSet<String>)> = BTreeMap::new();
@@ -173,8 +190,15 @@ fn real_files(page: &mut String) {
             }
         }
     }
+    for path in found(&[shared("samples/openradioss"), shared("fe")], "T01") {
+        let nothing = Selection { audit: false, ..Selection::nothing() };
+        let Ok(sections) = solver::read_sections(&path, None, &nothing) else { continue };
+        let (count, versions) = kinds.entry("t01".into()).or_default();
+        *count += 1;
+        versions.extend(sections.into_iter().filter_map(|section| section.version.or(section.solver)));
+    }
     for format in solver::FORMATS {
-        kinds.entry((*format).to_string()).or_default();
+        kinds.entry(format.name.to_string()).or_default();
     }
     for (kind, (count, versions)) in kinds {
         let versions: Vec<String> = versions.into_iter().collect();
