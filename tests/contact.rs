@@ -420,7 +420,12 @@ fn histories_that_contradict_each_other_are_said() {
     fn clock(run: &mut Run, at: fn(f64) -> f64) {
         run.force.time = run.force.time.iter().map(|&t| at(t)).collect();
     }
-    let damages: [(&str, Damage, &str); 12] = [
+    let damages: [(&str, Damage, &str); 13] = [
+        (
+            "a state of the force that is wrong",
+            |run| run.force.values[30] *= 4.0,
+            "force: the peak of ",
+        ),
         ("force 10 ms early", |run| clock(run, |t| t - 0.010), "times: the force begins at -10 ms"),
         ("force 5 ms early", |run| clock(run, |t| t - 0.005), "times: the force begins at -5 ms"),
         (

@@ -195,7 +195,8 @@ fn real_files(page: &mut String) {
         let Ok(sections) = solver::read_sections(&path, None, &nothing) else { continue };
         let (count, versions) = kinds.entry("t01".into()).or_default();
         *count += 1;
-        versions.extend(sections.into_iter().filter_map(|section| section.version.or(section.solver)));
+        versions
+            .extend(sections.into_iter().filter_map(|section| section.version.or(section.solver)));
     }
     for format in solver::FORMATS {
         kinds.entry(format.name.to_string()).or_default();

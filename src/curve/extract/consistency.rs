@@ -29,6 +29,8 @@ const SAMPLED_OFF: f64 = 0.02;
 /// Where two histories of one record cannot be one run's.
 const OTHER_FILES: &str =
     "likely files of two runs, another node or wall, or a clock that was changed";
+/// A peak is a spike above these multiples of the states beside it and of all others.
+const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Free flight in fewer states says nothing of gravity.
 const FLIGHT: usize = 5;
 /// Work of another force, as a share of the kinetic energy, that deserves a warning.
@@ -94,6 +96,24 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     }
     remarks.warn(format!("{found}: one of the two is damaged, scaled or of another node"));
     Ok(remarks)
+}
+
+/// A peak that is a single state, far above those beside it and above all others: damage, or an output
+/// interval that is too long.
+pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
+    let peak = (0..force_n.len()).max_by(|&a, &b| force_n[a].total_cmp(&force_n[b]))?;
+    let beside = force_n.get(peak.checked_sub(1)?)?.max(*force_n.get(peak + 1)?).max(0.0);
+    let others = force_n.iter().enumerate().filter(|(k, _)| *k != peak).map(|(_, f)| *f);
+    let others = others.fold(0.0, f64::max);
+    (force_n[peak] > SPIKE.0 * beside && force_n[peak] > SPIKE.1 * others).then(|| {
+        format!(
+            "force: the peak of {:.3} MN is a single state, at {}; the states beside it have up to {:.3} MN, all others up to {:.3} MN: look whether it is damaged",
+            force_n[peak] / 1e6,
+            milliseconds(time_s[peak]),
+            beside / 1e6,
+            others / 1e6
+        )
+    })
 }
 
 /// A curve from contact on, with the closing speeds at its states.

@@ -73,6 +73,7 @@ pub(crate) fn curve_of(
     };
     remarks.append(accepted(consistency::displacement(&record))?);
     let recorded_n = record.force_n.clone();
+    remarks.warnings.extend(consistency::spike(&record.time_s, &recorded_n));
     if let Filter::Cfc(class) = setup.filter {
         remarks.append(filter(class, &mut record)?);
     }

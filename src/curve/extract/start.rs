@@ -109,6 +109,16 @@ impl Start {
                 ));
             }
             StartBy::FirstState { missing_m }
+                if setup.stated.offset_m > 0.0
+                    && (missing_m - setup.stated.offset_m).abs() > MISSING_SHARE * crush_m =>
+            {
+                remarks.warn(format!(
+                    "contact: offset = {:.1} mm, but by its first state the record, which begins in contact, lacks {:.1} mm of the crush",
+                    setup.stated.offset_m * 1e3,
+                    missing_m * 1e3
+                ));
+            }
+            StartBy::FirstState { missing_m }
                 if missing_m > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
                 remarks.warn(format!(
