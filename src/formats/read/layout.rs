@@ -5,7 +5,7 @@ use super::ColumnNames;
 use super::columns::LISTED;
 use super::curve::{Place, expected, shown};
 use super::label::{Label, Quantity, no_unit};
-use super::table::{Row, Table, unit_of};
+use super::table::{Purpose, Row, Table, names_all, unit_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
@@ -88,9 +88,14 @@ pub(super) fn layout(
         }
         _ => Label::of_column(name),
     };
+    // A header may have any order, an axis not.
+    let texts: Vec<String> = table.names.iter().map(|(_, name)| name.clone()).collect();
+    let is_header = table.names.windows(2).all(|two| two[0].0 == two[1].0)
+        && names_all(&texts, Purpose::Curve, &[]);
     for (field, (quantity, which)) in wanted.into_iter().zip(["first", "second"]).enumerate() {
         let is_asked = wanted.iter().any(|quantity| asked.of(*quantity).is_some());
-        let Some((line, name)) = table.names.get(field).filter(|_| table.has_axes() && !is_asked)
+        let Some((line, name)) =
+            table.names.get(field).filter(|_| table.has_axes() && !is_header && !is_asked)
         else {
             continue;
         };

@@ -25,6 +25,8 @@ const UNIT: usize = 6;
 const HEADS: usize = 20;
 /// Characters of such a line that are looked at.
 const LABEL: usize = 300;
+/// Words between two quantities of a title, the first of which stands in the second column.
+const VERSUS: [&str; 6] = ["vs", "vs.", "versus", "over", "against", "über"];
 /// Titles that a note repeats.
 const TITLES: usize = 3;
 
@@ -113,7 +115,7 @@ impl Separator {
             // The last fields of the row may be empty.
             return Some(whole).filter(|names| (columns..=all).contains(&names.len()));
         }
-        let fits = |names: &Vec<String>| names.len() == columns;
+        let fits = |names: &Vec<String>| names.len() == columns && !is_title(names);
         // Names may hold single blanks, and a unit in brackets is not a name.
         let apart = line.trim().split("  ").flat_map(|part| part.split('\t')).map(str::trim);
         let apart = owned(apart.filter(|name| !name.is_empty()).collect());
@@ -450,13 +452,20 @@ fn fit(
     }
 }
 
+/// Whether names are parts of a title such as `Force (N) over displacement (m)`.
+fn is_title(names: &[String]) -> bool {
+    let first = |name: &String| name.split_whitespace().next().unwrap_or_default().to_lowercase();
+    names.iter().any(|name| VERSUS.contains(&&*first(name)))
+}
+
 /// Whether names are those of the columns that are looked for, or what the user has named.
-fn names_all(names: &[String], purpose: Purpose, asked: &[&str]) -> bool {
+pub(super) fn names_all(names: &[String], purpose: Purpose, asked: &[&str]) -> bool {
     let has = |quantity: Quantity| {
         names.iter().any(|name| Label::of_column(name).is_some_and(|l| l.quantity == quantity))
     };
     let is_asked = |asked: &&str| names.iter().any(|name| name.eq_ignore_ascii_case(asked));
     names.len() > 1
+        && !is_title(names)
         && (asked.iter().any(is_asked)
             || match purpose {
                 Purpose::Curve => has(Quantity::Deflection) && has(Quantity::Force),
