@@ -69,7 +69,8 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Er
 /// The files that a deck itself includes.
 fn includes(path: &Path) -> io::Result<Vec<deck::Include>> {
     let mut file = BufReader::new(file::open(path)?);
-    Ok(deck::parse_deck(&mut file, &mut |_| None)?.includes)
+    let deck = file::if_there(deck::parse_deck(&mut file, &mut |_| None))?;
+    Ok(deck.map(|deck| deck.includes).unwrap_or_default())
 }
 
 /// Looks for the main deck in a folder: the one that no other of the folder includes.
@@ -123,7 +124,7 @@ fn is_deck(path: &Path) -> io::Result<bool> {
     let Some(file) = file::if_there(file::open(path))? else { return Ok(false) };
     let mut lines = Lines::new(BufReader::new(file));
     for _ in 0..HEAD_LINES {
-        match lines.next_line()? {
+        match file::if_there(lines.next_line())?.flatten() {
             Some(line) if line.text.starts_with(b"*") => return Ok(deck::signature(line.text)),
             Some(_) => {}
             None => break,
