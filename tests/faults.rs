@@ -112,22 +112,24 @@ const CAUSES: [&str; 5] = [
     "File exists",
 ];
 
+/// The name of the file of a call, without what is added to those of files under work.
+fn name_of(call: &str) -> &str {
+    let name = call.rsplit(['/', ' ']).next().unwrap_or_default();
+    let name = name.strip_prefix(".crumple-").unwrap_or(name);
+    let ends = [".sums", ".part", ".lock"];
+    ends.iter().fold(name, |name, end| name.strip_suffix(end).unwrap_or(name))
+}
+
 impl Faulty<'_> {
     fn said(&self) -> String {
         String::from_utf8_lossy(&self.output.stderr).into_owned()
     }
 
-    /// The names of the files whose calls failed, without what is added to those of files under work.
+    /// The names of the files whose calls failed.
     fn names(&self) -> Vec<&str> {
         let failed = self.calls.iter().skip(self.at - 1);
         let failed = failed.take(if self.how == "once" { 1 } else { usize::MAX });
-        fn name(call: &String) -> &str {
-            let name = call.rsplit(['/', ' ']).next().unwrap_or_default();
-            let name = name.strip_prefix(".crumple-").unwrap_or(name);
-            let ends = [".sums", ".part", ".lock"];
-            ends.iter().fold(name, |name, end| name.strip_suffix(end).unwrap_or(name))
-        }
-        failed.map(name).collect()
+        failed.map(|call| name_of(call)).collect()
     }
 }
 

@@ -98,7 +98,7 @@ pub fn build(
 ) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
     let _lock = WriterLock::take(path)?;
-    let is_there = is_file(path).map_err(|source| Error::io(path, source))?;
+    let is_there = is_file(path)?;
     let mut database = if is_there { Database::read_as_it_is(path)? } else { Database::default() };
     let located: Vec<Result<LocatedRun<'_>, Error>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();

@@ -3,7 +3,6 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::Error;
 use crate::file::write_whole;
 use crate::history::{History, Side};
 use crate::history_hdf5::{Beside, convert, encode};
@@ -113,7 +112,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 /// What is written, if anything is; refuses what would be written over.
 fn checked_target(args: &Args, output: Option<&Path>) -> Result<Option<Target>, Failure> {
     if let Some(output) = output {
-        let parts = solver::family(&args.file).map_err(|e| Error::io(&args.file, e))?;
+        let parts = solver::family(&args.file)?;
         parts.iter().try_for_each(|part| keep_input(part, output))?;
         if !args.force && crate::history_hdf5::is_other_hdf5(output) {
             return Err(Failure::Usage(format!(

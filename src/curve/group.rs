@@ -31,13 +31,13 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     all.extend(titles(cases));
     let runs: Vec<&Case> =
         cases.iter().filter(|c| c.id.study != IMPORTED && !c.is_truncated()).collect();
-    let measures: [(&'static str, &str, fn(&Case) -> f64); 2] = [
-        ("group_energy", "W/E", |case| case.quality.audit.ratio()),
-        ("group_impulse", "impulse over momentum", impulse_ratio),
+    let energy = |case: &&Case| (case.conditions.speed.m_per_s, case.quality.audit.ratio());
+    let impulse = |case: &&Case| (case.conditions.speed.m_per_s, impulse_ratio(case));
+    let measures: [(_, _, Vec<(f64, f64)>); 2] = [
+        ("group_energy", "W/E", runs.iter().map(energy).collect()),
+        ("group_impulse", "impulse over momentum", runs.iter().map(impulse).collect()),
     ];
-    for (code, what, ratio) in measures {
-        let points: Vec<(f64, f64)> =
-            runs.iter().map(|c| (c.conditions.speed.m_per_s, ratio(c))).collect();
+    for (code, what, points) in measures {
         for (i, case) in runs.iter().enumerate() {
             let Some(expected) = expected(&points, i) else { continue };
             let found = points[i].1;

@@ -121,7 +121,7 @@ impl Database {
     /// If the target cannot be written, and if
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        if is_file(path).map_err(|source| Error::io(path, source))? {
+        if is_file(path)? {
             let foreign = foreign::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);

@@ -9,6 +9,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::error::Error;
 pub use lock::WriterLock;
 pub(crate) use write::not_written;
 pub(crate) use write::write_all_whole;
@@ -129,8 +130,9 @@ pub(crate) fn if_there<T>(asked: io::Result<T>) -> io::Result<Option<T>> {
 }
 
 /// Whether there is a file at `path`.
-pub(crate) fn is_file(path: &Path) -> io::Result<bool> {
-    Ok(if_there(fs::metadata(path))?.is_some_and(|meta| meta.is_file()))
+pub(crate) fn is_file(path: &Path) -> Result<bool, Error> {
+    let there = if_there(fs::metadata(path)).map_err(|source| Error::io(path, source))?;
+    Ok(there.is_some_and(|meta| meta.is_file()))
 }
 
 /// The file that is written at `path`: a link is followed, so that its target is and not the link.

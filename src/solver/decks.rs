@@ -67,28 +67,32 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Er
 }
 
 /// The files that a deck itself includes.
-fn includes(path: &Path) -> Vec<deck::Include> {
-    let Ok(file) = file::open(path) else { return Vec::new() };
-    let read = deck::parse_deck(&mut BufReader::new(file), &mut |_| None);
-    read.map(|deck| deck.includes).unwrap_or_default()
+fn includes(path: &Path) -> io::Result<Vec<deck::Include>> {
+    let mut file = BufReader::new(file::open(path)?);
+    let deck = file::if_there(deck::parse_deck(&mut file, &mut |_| None))?;
+    Ok(deck.map(|deck| deck.includes).unwrap_or_default())
 }
 
 /// Looks for the main deck in a folder: the one that no other of the folder includes.
 pub(crate) fn find(folder: &Path) -> io::Result<Search> {
+    let of = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| io::Error::other(Error::io(&path, source))
+    };
     let mut candidates = Vec::new();
     for entry in folder.read_dir()?.take(MAX_NAMES) {
         let path = entry?.path();
-        if has_ending(&path) && is_deck(&path)? {
+        if has_ending(&path) && is_deck(&path).map_err(of(&path))? {
             candidates.push(path);
         }
     }
     candidates.sort();
     if candidates.len() > 1 && candidates.len() <= MAX_DECKS {
-        let included: Vec<String> = candidates
-            .iter()
-            .flat_map(|path| includes(path))
-            .map(|include| include.name.replace('\\', "/"))
-            .collect();
+        let mut included = Vec::new();
+        for path in &candidates {
+            let named = includes(path).map_err(of(path))?;
+            included.extend(named.into_iter().map(|include| include.name.replace('\\', "/")));
+        }
         candidates.retain(|path| {
             let name = path.file_name().map(|n| n.to_string_lossy());
             !included.iter().any(|i| Path::new(i).file_name().map(|n| n.to_string_lossy()) == name)
@@ -120,7 +124,7 @@ fn is_deck(path: &Path) -> io::Result<bool> {
     let Some(file) = file::if_there(file::open(path))? else { return Ok(false) };
     let mut lines = Lines::new(BufReader::new(file));
     for _ in 0..HEAD_LINES {
-        match lines.next_line()? {
+        match file::if_there(lines.next_line())?.flatten() {
             Some(line) if line.text.starts_with(b"*") => return Ok(deck::signature(line.text)),
             Some(_) => {}
             None => break,

@@ -1,15 +1,15 @@
 //! Which files make up one: the continuations of a binary file, a run's several binouts, the histories of its restarts.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::error::Error;
 use crate::file::is_file;
 
 /// The files that are read together with `path`, itself first: of a binary file its
 /// continuations `name%001`, `name%002`, … as far as they follow each other, with
 /// `binout0000` the files `binout0001`, … that other processes of the run wrote, and with
 /// `nameT01` the files `nameT02`, … of its restarts.
-pub(crate) fn family(path: &Path) -> io::Result<Vec<PathBuf>> {
+pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = with_continuations(path)?;
     let name = name_of(path);
     if let Some(number) = restart_number(&name) {
@@ -26,8 +26,9 @@ pub(crate) fn family(path: &Path) -> io::Result<Vec<PathBuf>> {
     let Some((job, number)) = process_number(&name) else { return Ok(parts) };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut others: Vec<(u32, PathBuf)> = Vec::new();
-    for entry in folder.read_dir()? {
-        let entry = entry?;
+    let io = |source| Error::io(folder, source);
+    for entry in folder.read_dir().map_err(io)? {
+        let entry = entry.map_err(io)?;
         let name = entry.file_name().to_string_lossy().into_owned();
         let other = process_number(&name).filter(|(other, _)| *other == job);
         others.extend(other.map(|(_, number)| (number, entry.path())));
@@ -69,7 +70,7 @@ fn restart(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(format!("{stem}{number:02}"))
 }
 
-fn with_continuations(path: &Path) -> io::Result<Vec<PathBuf>> {
+fn with_continuations(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = vec![path.to_path_buf()];
     loop {
         let next = continuation(path, parts.len());
@@ -96,7 +97,7 @@ const MAX_MISSING_FILES: usize = 20;
 
 /// The first continuation that is missing although others are there, of any of the files, and what is therefore not
 /// read.
-pub(crate) fn missing_continuation(path: &Path) -> io::Result<Option<String>> {
+pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error> {
     if let Some(number) = restart_number(&name_of(path)) {
         let before = restart(path, number.saturating_sub(1));
         if number > 1 && !is_file(&before)? {
@@ -118,7 +119,7 @@ pub(crate) fn missing_continuation(path: &Path) -> io::Result<Option<String>> {
 }
 
 /// What is not read because the first of these files is missing, if another is there.
-fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> io::Result<Option<String>> {
+fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<String>, Error> {
     let Some(missing) = files.next() else { return Ok(None) };
     if is_file(&missing)? {
         return Ok(None);

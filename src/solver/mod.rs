@@ -129,7 +129,7 @@ pub fn read_sections(
     let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
     let is_container = lsdyna::binout::recognises(&head[..count]);
     if format.is_binary()
-        && let Some(message) = missing_continuation(path).map_err(io)?
+        && let Some(message) = missing_continuation(path)?
     {
         let problem = Problem::new(ProblemCode::CutRecord, message);
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
@@ -171,7 +171,7 @@ fn open(
     }
     // Before the first is opened: its size is then fixed, and what a run wrote into a
     // continuation that began later would stand behind a hole.
-    let family = family(path).map_err(io)?;
+    let family = family(path)?;
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {
         Some(name) => named(name)?,

@@ -52,7 +52,10 @@ pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         // A pipe would wait for its writer.
-        if is_named_like_output(&name) && is_file(&path)? && !is_continuation(&path) {
+        if is_named_like_output(&name)
+            && is_file(&path).map_err(io::Error::other)?
+            && !is_continuation(&path)
+        {
             files.push(path);
         }
     }
@@ -65,7 +68,7 @@ pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     files.sort();
     let mut further = HashSet::new();
     for path in &files {
-        further.extend(family(path)?.into_iter().skip(1));
+        further.extend(family(path).map_err(io::Error::other)?.into_iter().skip(1));
     }
     files.retain(|path| !further.contains(path));
     Ok(files)

@@ -113,9 +113,7 @@ impl LocatedRun<'_> {
         units: UnitSystem,
     ) -> Result<Option<String>, Error> {
         let path = self.study.folder.join(&self.entry.path).join("glstat");
-        if !self.study.manifest.recipe.force_is_body()
-            || !is_file(&path).map_err(|source| Error::io(&path, source))?
-        {
+        if !self.study.manifest.recipe.force_is_body() || !is_file(&path)? {
             return Ok(None);
         }
         let wanted = Selection {

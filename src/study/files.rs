@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::recipe::ForceSource;
 use crate::error::{Error, ErrorCode, KeyPath, error};
-use crate::file;
+use crate::file::{self, is_file};
 use crate::guess;
 use crate::solver::{self, Selection};
 
@@ -83,14 +83,10 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
         }
     };
     let parts = match section {
-        Some(_) => solver::family(&path).map_err(|source| Error::io(&path, source))?,
+        Some(_) => solver::family(&path)?,
         None => vec![path.clone()],
     };
     Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
-}
-
-fn is_file(path: &Path) -> Result<bool, Error> {
-    file::is_file(path).map_err(|source| Error::io(path, source))
 }
 
 /// The text file that a recipe calls `name`: the one of that name, or with a job id before it.
