@@ -171,10 +171,10 @@ impl LocatedRun<'_> {
             ));
         }
         let ReadFile { located, file } = &files.motion;
-        remarks.append(compare_twin(located, file));
+        remarks.append(compare_twin(located, file)?);
         if self.files.len() > 1 {
             let ReadFile { located, file } = &files.force;
-            remarks.append(compare_twin(located, file));
+            remarks.append(compare_twin(located, file)?);
         }
         for ReadFile { located, file } in files.each() {
             remarks.notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
@@ -292,13 +292,13 @@ const SAME_ENERGY: f64 = 0.05;
 const SAME_VALUE: f64 = 1e-5;
 
 /// Which of text file and binout was read, and whether they differ.
-pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Notes {
+pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Result<Notes, Error> {
     let mut remarks = Notes::default();
     let name = &file.file;
     if let Some(section) = &file.section {
         remarks.note(format!("{name}: read from section {section} of {}", shown_name(&file.path)));
     }
-    let Some((path, section)) = &file.twin else { return remarks };
+    let Some((path, section)) = &file.twin else { return Ok(remarks) };
     let selection = same_histories(read, section);
     match solver::read(path, None, &selection) {
         Ok(twin) if is_same(read, &twin) => remarks
@@ -307,11 +307,12 @@ pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Notes {
             "{name} and section {section} of {} differ; the text file was used",
             shown_name(path)
         )),
+        Err(fault) if fault.code() == ErrorCode::Io => return Err(fault),
         Err(error) => {
             remarks.warn(format!("{name}: the binary file beside it cannot be compared: {error}"));
         }
     }
-    remarks
+    Ok(remarks)
 }
 
 fn same_histories(read: &SolverFile, section: &str) -> Selection {
