@@ -299,11 +299,8 @@ fn joined_databases_survive_every_fault() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     small_database(here);
-    fs::write(
-        here.join("nose.csv"),
-        "deflection_m,force_N\n0,0\n0.1,8e5\n0.2,1e6\n0.3,1.2e6\n0.4,1.5e6\n",
-    )
-    .unwrap();
+    let curve = "deflection_m,force_N\n0,0\n0.1,2e6\n0.2,3e6\n0.3,3e6\n0.4,3e6\n0.5,3e6\n";
+    fs::write(here.join("nose.csv"), curve).unwrap();
     hold(
         here,
         "db add b.h5 nose.csv --group tests --speed 36km/h --kind wall --mass 24t --unloading 80MN/m",
