@@ -103,13 +103,14 @@ fn numbers(how: &str, calls: &[String]) -> BTreeSet<usize> {
 }
 
 /// What an error says of its cause.
-const CAUSES: [&str; 5] = [
+const CAUSES: [&str; 6] = [
     "Input/output error",
     "No space left on device",
     "Cannot allocate memory",
     "No locks available",
-    // Of a folder that could not be looked at and so was to be made.
+    // Of a folder that could not be looked at and so was to be made, and a database that was to be read.
     "File exists",
+    "No such file or directory",
 ];
 
 /// The name of the file of a call, without what is added to those of files under work.
