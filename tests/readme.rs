@@ -38,6 +38,7 @@ documents! {
     forest_holds: "docs/forest.md";
     sweeps_hold: "docs/sweeps.md";
     databases_hold: "docs/databases.md";
+    verification_holds: "docs/verification.md";
     feeding_holds: "docs/feeding/README.md";
     feeding_lsdyna_holds: "docs/feeding/lsdyna.md";
     feeding_radioss_holds: "docs/feeding/radioss.md";

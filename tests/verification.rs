@@ -195,8 +195,11 @@ fn real_files(page: &mut String) {
         let Ok(sections) = solver::read_sections(&path, None, &nothing) else { continue };
         let (count, versions) = kinds.entry("t01".into()).or_default();
         *count += 1;
-        versions
-            .extend(sections.into_iter().filter_map(|section| section.version.or(section.solver)));
+        // A T01 gives weekday, date and time of its run, the program and the platform.
+        for version in sections.into_iter().filter_map(|section| section.version) {
+            let words: Vec<&str> = version.split_whitespace().skip(6).collect();
+            versions.insert(words.join(" ").replace(",", ""));
+        }
     }
     for format in solver::FORMATS {
         kinds.entry(format.name.to_string()).or_default();

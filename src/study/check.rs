@@ -138,11 +138,22 @@ fn check_parameters(entry: &RunEntry) -> Result<(), Error> {
     Ok(())
 }
 
+/// Longest name, in bytes, as databases take it.
+const MAX_NAME: usize = 200;
+
 /// Names stand in files, tables and HDF5 paths.
 fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
     let shown = name.escape_debug();
     if name.trim().is_empty() || name == "." || name == ".." {
         return Err(error!(Study at key, "{key} = \"{shown}\" is not a name"));
+    }
+    if name.len() > MAX_NAME {
+        let (begin, bytes) = (name.chars().take(20).collect::<String>(), name.len());
+        return Err(error!(
+            Study at key,
+            "{key} = \"{}…\" has {bytes} bytes: expected at most {MAX_NAME}",
+            begin.escape_debug()
+        ));
     }
     if name.contains(|c: char| c.is_control() || (c == '/' && !slash)) {
         return Err(error!(

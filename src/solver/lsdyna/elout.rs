@@ -176,7 +176,8 @@ impl Elout {
         }
     }
 
-    /// One row; the first behind a heading begins a state where the one above has it already.
+    /// One row; the first behind a heading begins a state where the one above has it already. Behind
+    /// damage that state's own heading, with its time, may be what was lost.
     fn row(
         &mut self,
         table: TableId,
@@ -186,7 +187,8 @@ impl Elout {
         field: impl Fn(usize) -> (usize, usize),
     ) {
         if std::mem::take(&mut self.begins) && states.has_row(table, entity) {
-            self.begin(states.pending_time(), line, states);
+            let time = states.pending_time().filter(|_| !states.is_damaged());
+            self.begin(time, line, states);
         }
         states.row(table, entity, line, |k| Some(field(k)));
     }

@@ -211,6 +211,10 @@ impl<'a> StateReader<'a> {
         }
     }
 
+    pub(crate) fn is_damaged(&self) -> bool {
+        self.pending.as_ref().is_some_and(|p| p.damaged)
+    }
+
     /// Stores the selected fields of one row. `field(k)` gives the first and last
     /// column (from 1) of the table's k-th component, `None` if this row does not have it.
     pub(crate) fn row(
