@@ -13,12 +13,11 @@ use std::path::Path;
 use crumple::assess::Purpose;
 use crumple::assess::{Choice, train};
 use crumple::build::build;
-use crumple::curve::{Case, Envelope, ForceKind};
-use crumple::formats::{ExportCurve, ExportInput, Options, Tail, by_name};
+use crumple::curve::{Case, Envelope, ForceKind, Tail};
+use crumple::formats::{ExportCurve, Options, by_name};
 use crumple::multibody::{EnvelopeEnd, ForceLaw, Unloading};
 use crumple::plot::{Axis, Chart, Mark, Panel, Series, Shown};
-use crumple::surrogate::predict_beyond;
-use crumple::surrogate::{Model, PredictedCurve, Query};
+use crumple::surrogate::{Model, PredictedCurve, Query, predict};
 
 type Points = Vec<(f64, f64)>;
 type Anything<T> = Result<T, Box<dyn Error>>;
@@ -35,13 +34,12 @@ fn main() -> Anything<()> {
     let cases = report.database.cases(GROUP);
     let model =
         train(GROUP, cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })?;
-    let (curve, beyond) = predict_beyond(&model, &Query::at(PREDICTED_M_PER_S))?;
-    let predicted = ExportInput { curve, beyond: None };
-    let along_faster_runs = ExportInput { beyond: Some(beyond), ..predicted.clone() };
+    let along_faster_runs = predict(&model, &Query::at(PREDICTED_M_PER_S))?;
+    let predicted = PredictedCurve { beyond: None, ..along_faster_runs.clone() };
     let is_recorded =
         |case: &&Case| (case.conditions.speed.m_per_s - RECORDED_M_PER_S).abs() < 0.01;
     let case = cases.iter().find(is_recorded).ok_or("no run at 48 km/h")?;
-    let recorded = ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None };
+    let recorded = PredictedCurve::of_case(case)?;
     for (name, picture) in [
         ("overview", overview(&along_faster_runs, &recorded)?),
         ("lsdyna", lsdyna(&recorded)?),
@@ -61,7 +59,7 @@ fn main() -> Anything<()> {
 }
 
 /// Both forces with their tails; and the three ways in which targets unload.
-fn overview(predicted: &ExportInput, recorded: &ExportInput) -> Anything<String> {
+fn overview(predicted: &PredictedCurve, recorded: &PredictedCurve) -> Anything<String> {
     let body = ready(predicted, ForceKind::Body)?;
     let contact = ready(predicted, ForceKind::Contact)?;
     let one = ready(recorded, ForceKind::Body)?;
@@ -84,7 +82,7 @@ fn overview(predicted: &ExportInput, recorded: &ExportInput) -> Anything<String>
 }
 
 /// MAT_121 and S06 unload with the curve's own stiffness, S08 with the steepest rise.
-fn lsdyna(recorded: &ExportInput) -> Anything<String> {
+fn lsdyna(recorded: &PredictedCurve) -> Anything<String> {
     let curve = ready(recorded, ForceKind::Body)?;
     let own = on_line(&curve, curve.stiffness_n_per_m());
     let steepest = on_line(&curve, curve.loading.max_slope().max(curve.stiffness_n_per_m()));
@@ -100,7 +98,7 @@ fn lsdyna(recorded: &ExportInput) -> Anything<String> {
 }
 
 /// K1 is at least the steepest rise, so the way back is steeper than ours where a flank is.
-fn radioss(recorded: &ExportInput) -> Anything<String> {
+fn radioss(recorded: &PredictedCurve) -> Anything<String> {
     let curve = ready(recorded, ForceKind::Body)?;
     let k1 = curve.stiffness_n_per_m().max(curve.loading.max_slope());
     let mut left = Sheet::whole("run at 48 km/h, body force");
@@ -113,21 +111,21 @@ fn radioss(recorded: &ExportInput) -> Anything<String> {
 }
 
 /// 200 rows, elastic.
-fn calculix(predicted: &ExportInput) -> Anything<String> {
+fn calculix(predicted: &PredictedCurve) -> Anything<String> {
     let rows = rows(&exported(predicted, "calculix", "inp")?, "*SPRING", "*STEP");
     let rows: Points = rows.iter().rev().map(|&(f, d)| (-d, -f)).collect();
     elastic(predicted, "CalculiX, Abaqus", rows)
 }
 
 /// Elastic, with guard points.
-fn adams(predicted: &ExportInput) -> Anything<String> {
+fn adams(predicted: &PredictedCurve) -> Anything<String> {
     let rows = rows(&exported(predicted, "adams", "spr")?, "{ disp", "[");
     let rows = rows.iter().map(|&(d, f)| (1e-3 * d, f)).collect();
     elastic(predicted, "Adams, MotionView", rows)
 }
 
 /// A target that goes back on the loading branch, with its points at the maximal crush.
-fn elastic(input: &ExportInput, name: &str, rows: Points) -> Anything<String> {
+fn elastic(input: &PredictedCurve, name: &str, rows: Points) -> Anything<String> {
     let curve = ready(input, ForceKind::Body)?;
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
     left.line(0, points(&curve.loading));
@@ -141,7 +139,7 @@ fn elastic(input: &ExportInput, name: &str, rows: Points) -> Anything<String> {
 }
 
 /// The law itself, and what inputs that are held over a step make of it.
-fn fmi(predicted: &ExportInput) -> Anything<String> {
+fn fmi(predicted: &PredictedCurve) -> Anything<String> {
     let curve = ready(predicted, ForceKind::Body)?;
     let law = curve.law();
     let late = held(&law, curve.predicted.mass_kg, RECORDED_M_PER_S, 1e-3);
@@ -176,7 +174,7 @@ fn held(law: &ForceLaw, mass_kg: f64, speed_m_per_s: f64, step_s: f64) -> Points
 }
 
 /// The package has the memory, a table has none.
-fn modelica(predicted: &ExportInput) -> Anything<String> {
+fn modelica(predicted: &PredictedCurve) -> Anything<String> {
     let curve = ready(predicted, ForceKind::Body)?;
     let package = exported(predicted, "modelica", "mo")?;
     let table = Envelope::new(array(&package, "d"), array(&package, "f"))?;
@@ -196,7 +194,7 @@ fn modelica(predicted: &ExportInput) -> Anything<String> {
 }
 
 /// `fd_load` in a lookup block, and the points of `fd_unload`.
-fn matlab(predicted: &ExportInput) -> Anything<String> {
+fn matlab(predicted: &PredictedCurve) -> Anything<String> {
     let curve = ready(predicted, ForceKind::Body)?;
     let unloading = on_line(&curve, curve.stiffness_n_per_m());
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
@@ -213,7 +211,7 @@ fn matlab(predicted: &ExportInput) -> Anything<String> {
 }
 
 /// The record, beside the straight unloading of a curve's exports.
-fn iso_mme(case: &Case, recorded: &ExportInput) -> Anything<String> {
+fn iso_mme(case: &Case, recorded: &PredictedCurve) -> Anything<String> {
     let curve = ready(recorded, case.curves.force_kind)?;
     let d = case.curves.sampled.deflection_m().iter().copied();
     let record: Points = d.zip(case.curves.sampled.force_n().iter().copied()).collect();
@@ -244,7 +242,7 @@ fn two_variables(model: &Model) -> Anything<String> {
         let rows = table.lines().map(numbers).filter(|row: &Vec<f64>| row.len() >= 3);
         let of_speed = rows.filter(|row| (row[0] * 3.6 - kmh).abs() < 0.01);
         let row: Points = of_speed.map(|row| (row[1], row[2])).collect();
-        let (curve, _) = predict_beyond(model, &Query::at(kmh / 3.6))?;
+        let curve = predict(model, &Query::at(kmh / 3.6))?;
         let curve = curve.of_force(ForceKind::Body)?;
         let end = curve.max_deflection_m;
         let end_n = curve.force_n[curve.force_n.len() - 1];
@@ -256,7 +254,7 @@ fn two_variables(model: &Model) -> Anything<String> {
 }
 
 /// The points of the CSV file as they stand, and as tools with elongation positive take them.
-fn other_tools(predicted: &ExportInput) -> Anything<String> {
+fn other_tools(predicted: &PredictedCurve) -> Anything<String> {
     let csv = exported(predicted, "csv", "csv")?;
     // Deflection and force, without the edges of the band.
     let pair = |line: &str| line.split(',').take(2).collect::<Vec<_>>().join(",");
@@ -277,7 +275,7 @@ fn other_tools(predicted: &ExportInput) -> Anything<String> {
 // Curves.
 
 /// The curve as the multi-body targets get it.
-fn ready(input: &ExportInput, force: ForceKind) -> Anything<ExportCurve> {
+fn ready(input: &PredictedCurve, force: ForceKind) -> Anything<ExportCurve> {
     Ok(ExportCurve::new(input, force, Tail::Bottom, false)?)
 }
 
@@ -312,7 +310,7 @@ fn largest(points: &Points) -> f64 {
 }
 
 /// The file that `crumple export` writes of the body's force.
-fn exported(input: &ExportInput, format: &str, extension: &str) -> Anything<String> {
+fn exported(input: &PredictedCurve, format: &str, extension: &str) -> Anything<String> {
     let options = Options { extension: Some(extension.into()), ..Options::default() };
     text(by_name(format)?.export(std::slice::from_ref(input), &options)?)
 }

@@ -10,8 +10,9 @@ use std::process::Command;
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, run_python,
 };
+use crumple::curve::Tail;
 use crumple::formats::FORMATS;
-use crumple::formats::{ReadOptions, Tail, read};
+use crumple::formats::{ReadOptions, read};
 use crumple::unit::UnitSystem;
 use serde_json::{Value, json};
 

@@ -11,13 +11,12 @@ use crate::build::{self, BuiltRun, RunOutcome};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::file::{self, not_written, write_at, write_whole};
-use crate::formats::{self, ExportInput};
+use crate::formats;
 use crate::multibody::Run;
 use crate::report::{MethodSpeeds, ReportSettings, report};
 use crate::scenario;
 use crate::surrogate::leave_one_out::Validation;
-use crate::surrogate::predict::predict_beyond;
-use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
+use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
 use include_dir::{Dir, include_dir};
 use serde::Serialize;
@@ -216,16 +215,15 @@ impl Flow<'_> {
     }
 
     fn predict(&mut self, model: &Model) -> Result<PredictedCurve, Failure> {
-        let (curve, beyond) = predict_beyond(model, &Query::at(SPEED_M_PER_S))?;
-        let input = [ExportInput { curve, beyond: Some(beyond) }];
+        let curve = [predict(model, &Query::at(SPEED_M_PER_S))?];
         for name in ["lead50.json", "lead50.csv", "lead50.k", "lead50.mo", "lead50.fmu"] {
             let path = self.path(name);
             let format = formats::by_extension(&path)?;
-            for (_, bytes) in format.export(&input, &formats::Options::default())?.files {
+            for (_, bytes) in format.export(&curve, &formats::Options::default())?.files {
                 write_whole(&path, &bytes)?;
             }
         }
-        let [ExportInput { curve, .. }] = input;
+        let [curve] = curve;
         Ok(curve)
     }
 

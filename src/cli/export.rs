@@ -3,10 +3,10 @@
 use crate::error::Error;
 use std::path::{Path, PathBuf};
 
-use crate::curve::{ForceKind, Parameter};
-use crate::formats::{self, Exported, FORMATS, Format, Material, Options, Tail};
-use crate::surrogate::Query;
+use crate::curve::{ForceKind, Parameter, Tail};
+use crate::formats::{self, Exported, FORMATS, Format, Material, Options};
 use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::{PredictedCurve, Query};
 use crate::unit::UnitSystem;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
@@ -188,15 +188,13 @@ impl Target {
     pub(super) fn export(
         &self,
         format: &Format,
-        curves: &[formats::ExportInput],
+        curves: &[PredictedCurve],
         path: Option<&Path>,
     ) -> Result<Exported, Failure> {
         let alone;
         let mut curves = curves;
         if let (true, Some(force)) = (format.holds_both_forces(), self.force) {
-            let one = |input: &formats::ExportInput| {
-                Ok(formats::ExportInput { curve: input.curve.of_force(force)?, beyond: None })
-            };
+            let one = |curve: &PredictedCurve| curve.of_force(force);
             alone = curves.iter().map(one).collect::<Result<Vec<_>, Error>>()?;
             curves = &alone;
         }
@@ -330,9 +328,9 @@ fn export_curves(
         (input, format.holds_both_forces(), args.target.force)
     {
         // The file itself holds both.
-        curves[0].curve = curve.of_force(ForceKind::Body)?;
+        curves[0] = curve.of_force(ForceKind::Body)?;
     }
-    for warning in curves.iter().flat_map(|c| &c.curve.warnings).map(ToString::to_string) {
+    for warning in curves.iter().flat_map(|c| &c.warnings).map(ToString::to_string) {
         if !warnings.contains(&warning) {
             warnings.push(warning);
         }

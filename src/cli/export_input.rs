@@ -8,12 +8,10 @@ use crate::curve::Case;
 use crate::database::Database;
 use crate::dataset::is_same_speed;
 use crate::file;
-use crate::formats::ExportInput;
 use crate::formats::read::is_folder_of_tests;
 use crate::formats::read::json;
 use crate::import::{self, Item, Settings};
-use crate::surrogate::predict::predict_beyond;
-use crate::surrogate::{Model, PredictedCurve, Query};
+use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::{UnitSystem, km_per_h};
 
 use super::Failure;
@@ -43,7 +41,7 @@ pub(super) struct Chosen<'a> {
 /// Curves, and what the user should know of how they were read.
 #[derive(Default)]
 pub(super) struct Curves {
-    pub inputs: Vec<ExportInput>,
+    pub inputs: Vec<PredictedCurve>,
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
 }
@@ -107,22 +105,19 @@ impl Input {
     }
 
     pub(super) fn curves(&self, chosen: &Chosen<'_>) -> Result<Curves, Failure> {
-        let of_case = |case: &Case| -> Result<ExportInput, Failure> {
-            Ok(ExportInput { curve: PredictedCurve::of_case(case)?, beyond: None })
-        };
         let inputs = match self {
             Self::Curve(curve) => {
                 chosen.refuse_all("a predicted curve")?;
-                vec![ExportInput { curve: (**curve).clone(), beyond: None }]
+                vec![(**curve).clone()]
             }
             Self::Model(model) => chosen.of_model(model)?,
             Self::Database(path, database) => {
                 let cases = chosen.of_database(path, database)?;
-                cases.iter().map(of_case).collect::<Result<_, _>>()?
+                cases.iter().map(PredictedCurve::of_case).collect::<Result<_, _>>()?
             }
             Self::File(path) => {
                 let case = chosen.of_file(path)?;
-                let inputs = vec![of_case(&case)?];
+                let inputs = vec![PredictedCurve::of_case(&case)?];
                 return Ok(Curves {
                     inputs,
                     notes: case.quality.notes,
@@ -171,7 +166,7 @@ impl Chosen<'_> {
         }
     }
 
-    fn of_model(&self, model: &Model) -> Result<Vec<ExportInput>, Failure> {
+    fn of_model(&self, model: &Model) -> Result<Vec<PredictedCurve>, Failure> {
         if self.group.is_some() || !self.cases.is_empty() {
             let message = "--group and --case are for a database: a model is of one group";
             return Err(Failure::Usage(message.into()));
@@ -186,8 +181,7 @@ impl Chosen<'_> {
         }
         let curve = |&speed: &f64| {
             let query = Query { speed_m_per_s: speed, ..self.query.clone() };
-            let (curve, beyond) = predict_beyond(model, &query)?;
-            Ok(ExportInput { curve, beyond: Some(beyond) })
+            Ok(predict(model, &query)?)
         };
         self.speeds_m_per_s.iter().map(curve).collect()
     }

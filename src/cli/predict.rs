@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::{ForceKind, Parameter};
 use crate::file::write_all_whole;
-use crate::formats::{ExportInput, Exported, Format};
+use crate::formats::{Exported, Format};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::predict::predict_beyond;
-use crate::surrogate::{Model, PredictedCurve, Query};
+use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::{Shown, km_per_h};
 use serde::Serialize;
 
@@ -79,10 +78,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         energy_correct: args.energy_correct,
         extrapolate: args.extrapolate,
     };
-    let (curve, beyond) = predict_beyond(&model, &query)?;
-    let input = [ExportInput { curve, beyond: Some(beyond) }];
-    let curve = &input[0].curve;
-    let files = files(args, &formats, &input, options)?;
+    let curve = &predict(&model, &query)?;
+    let files = files(args, &formats, curve, options)?;
     let named = files.iter().map(|file| (file.path, &*file.bytes));
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
@@ -135,13 +132,13 @@ struct File<'a> {
 fn files<'a>(
     args: &'a Args,
     formats: &[&Format],
-    input: &[ExportInput],
+    curve: &PredictedCurve,
     options: GlobalOptions,
 ) -> Result<Vec<File<'a>>, Failure> {
     let mut files = Vec::new();
     for (path, format) in args.output.iter().zip(formats) {
         let Exported { files: mut exported, notes, .. } =
-            args.target.export(format, input, Some(path))?;
+            args.target.export(format, std::slice::from_ref(curve), Some(path))?;
         match (exported.pop(), exported.is_empty()) {
             (Some((_, bytes)), true) => {
                 if !options.quiet && !options.json {

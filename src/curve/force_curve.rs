@@ -2,6 +2,7 @@
 //! exports and comparisons take.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
+use super::tail::{Tail, bottomed, with_tail};
 use super::{Case, Envelope, ForceKind};
 use crate::error::Error;
 use crate::unit::SpeedKind;
@@ -131,25 +132,26 @@ impl ForceCurve {
         Self { unloading: CurveUnloading::Stiffness(stiffness_n_per_m), ..self }
     }
 
-    /// The same with the loading branch continued by what lies beyond it, at the level that the
-    /// branch ends with.
-    pub(crate) fn continued(mut self) -> Result<Self, Error> {
-        let Some(beyond) = self.beyond.take() else { return Ok(self) };
-        let end = self.loading.end_m();
-        let share = match beyond.force_at(end) {
-            at if at > 0.0 => self.loading.force_at(end) / at,
-            _ => 1.0,
+    /// The same with the loading branch continued by a rule; its data still end where they did. A
+    /// branch that goes beyond its data has been continued to where it ends, and can only bottom.
+    pub(crate) fn continued(mut self, tail: Tail) -> Result<Self, Error> {
+        let data_end_m = self.data_end_m.unwrap_or(self.loading.end_m());
+        let known = self.unloading.stiffness_n_per_m().filter(|k| *k > 0.0);
+        let stiffness_n_per_m = known.unwrap_or_else(|| self.loading.max_slope());
+        // A force that never rises bottoms by no slope.
+        let tail = if stiffness_n_per_m > 0.0 { tail } else { Tail::Hold };
+        let (loading, beyond) = (&self.loading, self.beyond.take());
+        let is_followed = beyond.is_none() && data_end_m < loading.end_m();
+        self.loading = if is_followed && tail == Tail::Bottom {
+            let d = loading.deflection_m();
+            let interval_m = loading.end_m() - d[d.len() - 2];
+            bottomed(loading, loading.peak_force_n(), interval_m, stiffness_n_per_m)?
+        } else if is_followed {
+            return Ok(self);
+        } else {
+            with_tail(loading, beyond.as_ref(), stiffness_n_per_m, tail)?
         };
-        let (mut d, mut f) =
-            (self.loading.deflection_m().to_vec(), self.loading.force_n().to_vec());
-        for (&deflection, &force) in beyond.deflection_m().iter().zip(beyond.force_n()) {
-            if deflection > end {
-                d.push(deflection);
-                f.push(share * force);
-            }
-        }
-        self.loading = Envelope::new(d, f)?;
-        Ok(self)
+        Ok(Self { data_end_m: Some(data_end_m), ..self })
     }
 
     /// The same with all forces, and the stiffness with them, times `factor` (above 0).
@@ -212,8 +214,20 @@ mod tests {
     #[test]
     fn what_lies_beyond_joins_at_the_level_of_the_end() {
         let beyond = Envelope::new(vec![0.0, 0.5, 1.5, 2.0], vec![0.0, 1e6, 1e6, 3e6]).unwrap();
-        let curve = ForceCurve { beyond: Some(beyond), ..curve() }.continued().unwrap();
-        assert_eq!(curve.loading.deflection_m(), [0.0, 1.0, 1.5, 2.0]);
-        assert_eq!(curve.loading.force_n(), [0.0, 2e6, 2e6, 6e6]);
+        let loading = Envelope::new(vec![0.0, 0.5, 1.0], vec![0.0, 1e6, 2e6]).unwrap();
+        let held = ForceCurve { beyond: Some(beyond), ..ForceCurve::bare(loading) };
+        let bottoms = held.clone().continued(Tail::Bottom).unwrap();
+        let held = held.continued(Tail::Hold).unwrap();
+        assert_eq!(held.loading.deflection_m(), [0.0, 0.5, 1.0, 1.5, 2.0]);
+        assert_eq!(held.loading.force_n(), [0.0, 1e6, 2e6, 2e6, 6e6]);
+        assert_eq!(held.data_end_m, Some(1.0));
+        // 6 MN are three times the peak already: one interval more, at the steepest rise.
+        assert_eq!(bottoms.loading.deflection_m(), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]);
+        assert_eq!(bottoms.loading.force_at(2.5), 7e6);
+        // What has been continued before can only bottom.
+        assert_eq!(held.clone().continued(Tail::Hold).unwrap(), held);
+        let again = held.continued(Tail::Bottom).unwrap();
+        assert_eq!(again.loading.deflection_m()[..5], [0.0, 0.5, 1.0, 1.5, 2.0]);
+        assert_eq!(again.data_end_m, Some(1.0));
     }
 }

@@ -15,6 +15,7 @@ pub(crate) mod recipe;
 pub(crate) mod replicates;
 pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
+pub(crate) mod tail;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -34,6 +35,7 @@ pub use loading::{Loading, unloading_stiffness};
 pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
 pub use stopped_mass::StoppedMass;
+pub use tail::Tail;
 
 /// A force–deflection history: what one run measured at an interface.
 ///

@@ -1,24 +1,14 @@
 //! A curve made ready for another tool's file: one force, its unloading, its tail, what must be said of it.
 
 use super::Options;
-use super::tail::{Tail, with_tail};
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use crate::curve::{Envelope, ForceCurve, ForceKind};
+use crate::curve::tail::with_tail;
+use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::PredictedCurve;
-use crate::surrogate::predict::Beyond;
 use crate::unit::km_per_h;
-
-/// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
-#[derive(Clone, Debug)]
-pub struct ExportInput {
-    /// With both forces, where it has both.
-    pub curve: PredictedCurve,
-    /// The forces beyond the maximal crush, where a model tells them.
-    pub beyond: Option<Beyond>,
-}
 
 /// One curve of one force, as writers take it; SI.
 #[derive(Clone, Debug)]
@@ -58,12 +48,12 @@ impl ExportCurve {
     /// If the curve does not have that force or is damaged,
     /// If its tail makes no curve.
     pub fn new(
-        input: &ExportInput,
+        curve: &PredictedCurve,
         force: ForceKind,
         tail: Tail,
         soften: bool,
     ) -> Result<Self, Error> {
-        let predicted = input.curve.of_force(force)?;
+        let predicted = curve.of_force(force)?;
         let mut loading = predicted.envelope()?;
         let end = loading.deflection_m().len() - 1;
         let stiffness = predicted.unloading_stiffness_n_per_m;
@@ -85,31 +75,32 @@ impl ExportCurve {
                 }
             }
         }
-        let beyond = input.beyond.as_ref().map(|beyond| match force {
-            ForceKind::Contact => &beyond.declared,
-            ForceKind::Body => &beyond.body,
-        });
-        let follows_faster_runs = beyond.is_some_and(|b| b.end_m() > loading.end_m());
-        let with_tail = with_tail(&loading, beyond, stiffness, tail)?;
+        let beyond = predicted.beyond_envelope()?;
+        let follows_faster_runs = beyond.as_ref().is_some_and(|b| b.end_m() > loading.end_m());
+        let with = |curve: &Envelope| with_tail(curve, beyond.as_ref(), stiffness, tail);
+        let continued = with(&loading)?;
         let band = predicted.force_low_n.as_ref().zip(predicted.force_high_n.as_ref());
-        // In the tail the band is as wide as at the end. It is not that of a softened curve.
-        let widened = |edge: &[f64]| -> Vec<f64> {
-            let width = edge[end] - loading.force_n()[end];
-            let tail = with_tail.force_n()[end + 1..].iter().map(|f| (f + width).max(0.0));
-            edge.iter().copied().chain(tail).collect()
+        // An edge goes on by the rule of the curve. It is not that of a softened curve.
+        let edge = |edge: &[f64]| -> Result<Vec<f64>, Error> {
+            let edge_n = with(&Envelope::new(predicted.deflection_m.clone(), edge.to_vec())?)?;
+            let own = predicted.force_n.len();
+            let tail = continued.deflection_m()[own..].iter().map(|&d| edge_n.force_at(d));
+            Ok(edge.iter().copied().chain(tail).collect())
         };
-        let no_band = match (band.is_some(), input.curve.force_low_n.is_some()) {
+        let no_band = match (band.is_some(), curve.force_low_n.is_some()) {
             (true, _) => softening.map(|_| "it is not that of a softened curve"),
             (false, true) => Some(
                 "only that of the contact force is known (--force contact), until the model is trained anew",
             ),
             (false, false) => Some("the model gives none here"),
         };
-        let band =
-            band.filter(|_| softening.is_none()).map(|(low, high)| (widened(low), widened(high)));
+        let band = match band.filter(|_| softening.is_none()) {
+            Some((low, high)) => Some((edge(low)?, edge(high)?)),
+            None => None,
+        };
         let is_recorded = predicted.provenance.max_crush_rule.is_none();
         Ok(Self {
-            loading: with_tail,
+            loading: continued,
             end,
             band,
             no_band: no_band.filter(|_| !is_recorded),
@@ -186,6 +177,7 @@ impl ExportCurve {
             kind: Some(self.predicted.provenance.force_kind),
             speed_kind: Some(self.predicted.speed_kind),
             speed_m_per_s: Some(self.predicted.speed_m_per_s),
+            data_end_m: Some(self.predicted.data_end_m()),
             ..ForceCurve::bare(self.loading.clone()).unloading_with(self.stiffness_n_per_m())
         }
     }
@@ -214,7 +206,7 @@ impl ExportCurve {
     /// goes on rising if it bottoms, else it is held.
     pub fn law(&self) -> ForceLaw {
         let end = match self.tail {
-            Tail::Bottom => EnvelopeEnd::Slope,
+            Tail::Bottom => EnvelopeEnd::Bottom,
             Tail::None | Tail::Hold => EnvelopeEnd::Hold,
         };
         ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
@@ -311,6 +303,9 @@ impl ExportCurve {
         if let Some(other) = self.other_mass_kg() {
             facts.insert(7, ("other_mass_kg", other.to_string()));
         }
+        if curve.beyond.is_some() {
+            facts.push(("data_end_m", nine_digits(curve.data_end_m())));
+        }
         if let Some(case) = &curve.provenance.case {
             facts.insert(1, ("case", case.replace(char::is_control, " ")));
         }
@@ -405,7 +400,7 @@ impl Options {
     /// The curves made ready for a target whose own tail is `usual`.
     pub(super) fn ready(
         &self,
-        inputs: &[ExportInput],
+        inputs: &[PredictedCurve],
         usual: Tail,
     ) -> Result<Vec<ExportCurve>, Error> {
         let tail = self.tail.unwrap_or(usual);

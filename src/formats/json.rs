@@ -1,10 +1,11 @@
 //! Predicted curve as JSON: the master format of exports.
 
 use super::export_curve::file_stem;
-use super::{ExportInput, Exported, Options};
+use super::{Exported, Options};
 use crate::error::{Error, error};
+use crate::surrogate::PredictedCurve;
 
-pub(crate) fn write(input: &ExportInput, options: &Options) -> Result<Exported, Error> {
+pub(crate) fn write(curve: &PredictedCurve, options: &Options) -> Result<Exported, Error> {
     if options.units.is_some() {
         return Err(error!(
             Export,
@@ -12,8 +13,8 @@ pub(crate) fn write(input: &ExportInput, options: &Options) -> Result<Exported, 
             format = "json"
         ));
     }
-    let mut bytes = serde_json::to_vec_pretty(&input.curve)
+    let mut bytes = serde_json::to_vec_pretty(curve)
         .map_err(|e| error!(Export, "cannot encode the curve: {e}").caused_by(e))?;
     bytes.push(b'\n');
-    Ok(Exported::file(format!("{}.json", file_stem(&input.curve)), bytes))
+    Ok(Exported::file(format!("{}.json", file_stem(curve)), bytes))
 }

@@ -19,25 +19,23 @@ mod onnx;
 mod radioss;
 pub(crate) mod read;
 mod table;
-mod tail;
 mod text;
 mod thin;
 
 use std::path::Path;
 
-use crate::curve::{Case, ForceKind};
+use crate::curve::{Case, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::guess;
-use crate::surrogate::{Model, Query};
+use crate::surrogate::{Model, PredictedCurve, Query};
 use crate::unit::UnitSystem;
+pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
-pub use export_curve::{ExportCurve, ExportInput};
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::curve::{Metadata, Place, ReadFile};
 pub(crate) use read::history;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
-pub use tail::Tail;
 
 /// One target: its name, its file extensions, what it can hold, how it is written.
 pub struct Format {
@@ -70,7 +68,7 @@ enum Writer {
     /// Any number of curves in one file.
     Together(fn(&[ExportCurve], &Options) -> Result<Exported, Error>),
     /// A predicted or recorded curve with both forces.
-    Whole(fn(&ExportInput, &Options) -> Result<Exported, Error>),
+    Whole(fn(&PredictedCurve, &Options) -> Result<Exported, Error>),
     Model(fn(&Model, &Options) -> Result<Exported, Error>),
     /// A recorded case with its histories.
     Case(fn(&Case, &Options) -> Result<Exported, Error>),
@@ -345,9 +343,9 @@ impl Format {
     ///
     /// # Errors
     /// If the target cannot take them.
-    pub fn export(&self, inputs: &[ExportInput], options: &Options) -> Result<Exported, Error> {
+    pub fn export(&self, inputs: &[PredictedCurve], options: &Options) -> Result<Exported, Error> {
         for input in inputs {
-            let points = input.curve.deflection_m.len();
+            let points = input.deflection_m.len();
             if points < MIN_POINTS {
                 return Err(self.unfit(format!("{MIN_POINTS} points or more, found {points}")));
             }

@@ -10,7 +10,8 @@ use std::fmt::Write;
 use super::export_curve::identifier;
 use super::text::{Lines, nine_digits, title};
 use super::thin::thinned;
-use super::{ExportCurve, Exported, Options, Tail, TargetUnloading};
+use super::{ExportCurve, Exported, Options, TargetUnloading};
+use crate::curve::Tail;
 
 const COMMENT_WIDTH: usize = 200;
 /// Most points of the package's table: a translator unrolls the search through them.

@@ -3,14 +3,13 @@
 //! Each speed's curve goes on beyond its maximal crush as a tail that is held, so that the table is a full rectangle.
 
 use super::export_curve::in_lines;
-use super::tail::Tail;
 use super::text::{Lines, nine_digits};
-use super::{ExportCurve, ExportInput, Exported, Options};
-use crate::curve::{Envelope, ForceKind};
+use super::{ExportCurve, Exported, Options};
+use crate::curve::{Envelope, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::hdf5::{AttrValue, FileBuilder};
-use crate::surrogate::predict::predict_beyond;
-use crate::surrogate::{Model, Query};
+
+use crate::surrogate::{Model, Query, predict};
 use crate::unit::km_per_h;
 
 /// Names of the band's edges.
@@ -81,10 +80,9 @@ impl Table {
         let (mut curves, mut warnings) = (Vec::new(), Vec::new());
         for &speed in &speed_m_per_s {
             let query = Query { speed_m_per_s: speed, ..options.query.clone() };
-            let (curve, beyond) = predict_beyond(model, &query)?;
+            let curve = predict(model, &query)?;
             warnings.extend(curve.warnings.iter().map(ToString::to_string));
-            let input = ExportInput { curve, beyond: Some(beyond) };
-            curves.push(ExportCurve::new(&input, options.force, tail, false)?);
+            curves.push(ExportCurve::new(&curve, options.force, tail, false)?);
         }
         warnings.sort();
         warnings.dedup();

@@ -10,7 +10,7 @@ use super::spring::{Spring, scale_error, spring};
 use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
 use crate::curve::Masses;
 use crate::error::{Error, ErrorCode, KeyPath, error};
-use crate::multibody::{Chain, Damping, ForceLaw, Interface, RunSettings, Tension};
+use crate::multibody::{Chain, Damping, EnvelopeEnd, ForceLaw, Interface, RunSettings, Tension};
 use crate::surrogate::Model;
 use crate::unit::{Shown, SpeedKind, km_per_h};
 
@@ -271,9 +271,11 @@ impl<'a> Builder<'a> {
     ) -> Result<(Interface, CurveInUse), Error> {
         let table = &self.scenario.curves[curve];
         let spring = |source| self.no_spring(curve, source);
-        let (law, of_law) = Spring { curve: crush.curve, warnings: crush.warnings }
-            .law_with_warnings(table)
-            .map_err(spring)?;
+        let (law, of_law) =
+            Spring { curve: crush.curve, end: EnvelopeEnd::Bottom, warnings: crush.warnings }
+                .continued(table)
+                .and_then(|spring| spring.law_with_warnings(table))
+                .map_err(spring)?;
         self.warnings.extend(of_law.iter().map(|w| format!("curve \"{curve}\": {w}")));
         let interface = Interface::new(slot.name.clone(), law, 0.0).with_rate(crush.rate);
         let used = CurveInUse {

@@ -3,15 +3,16 @@
 use super::layout::{Connection, Role};
 use super::{CurveSource, CurveTable as Table, LawName};
 use crate::curve::force_curve::ForceCurveError;
-use crate::curve::{ForceCurve, ForceKind};
+use crate::curve::{ForceCurve, ForceKind, Tail};
 use crate::error::{Error, ErrorCode, error};
-use crate::multibody::{ForceLaw, UnloadingChoice};
+use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::predict_driving;
-use crate::surrogate::{Model, PredictedCurve, Query, Warning, invalid};
+use crate::surrogate::{Model, PredictedCurve, Query, Warning};
 
 /// The curve at one interface, with its warnings.
 pub(super) struct Spring {
     pub curve: ForceCurve,
+    pub end: EnvelopeEnd,
     pub warnings: Vec<String>,
 }
 
@@ -56,18 +57,16 @@ pub(super) fn spring(
             "band needs a model or a predicted curve (.json), which has one"
         ));
     }
-    let Spring { mut curve, mut warnings } = match source {
+    let (mut curve, mut warnings) = match source {
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
         CurveSource::Predicted(curve) => of_predicted(curve, table, force)?,
         CurveSource::Curve(curve, changes) => {
             let unknown = curve.kind.is_none().then(|| UNKNOWN_FORCE.into());
             let warnings = changes.iter().cloned().chain(unknown).collect();
-            Spring { curve: (**curve).clone(), warnings }
+            ((**curve).clone(), warnings)
         }
         // A device between two bodies moves these, and no mass is stopped in it.
-        CurveSource::Stages(envelope) => {
-            Spring { curve: ForceCurve::of_body(envelope.clone()), warnings: Vec::new() }
-        }
+        CurveSource::Stages(envelope) => (ForceCurve::of_body(envelope.clone()), Vec::new()),
         CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
             let curve = ForceCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
@@ -77,7 +76,7 @@ pub(super) fn spring(
                     error!(Scenario, "its samples contain no loading branch")
                 }
             })?;
-            Spring { curve, warnings: truncated.into_iter().collect() }
+            (curve, truncated.into_iter().collect())
         }
     };
     let only_contact = force != Some(ForceKind::Body) && curve.kind == Some(ForceKind::Contact);
@@ -91,17 +90,29 @@ pub(super) fn spring(
         }
         curve = curve.scaled(factor).map_err(envelope_error)?;
     }
-    Ok(Spring { curve, warnings })
+    // A file or a device says itself how far it goes; the curve of one impact only how far that went.
+    let goes_on = curve.data_end_m.is_some_and(|m| m < curve.loading.end_m());
+    let end = match (source, table.end) {
+        (CurveSource::Curve(..) | CurveSource::Stages(_), None) if goes_on => EnvelopeEnd::Slope,
+        (CurveSource::Curve(..) | CurveSource::Stages(_), None) => EnvelopeEnd::Hold,
+        (CurveSource::Curve(..) | CurveSource::Stages(_), Some(end))
+            if end != EnvelopeEnd::Bottom =>
+        {
+            end
+        }
+        _ => return Spring { curve, end: EnvelopeEnd::Bottom, warnings }.continued(table),
+    };
+    Ok(Spring { curve, end, warnings })
 }
 
-/// The curve of a model, with what lies beyond its maximal crush.
+/// The curve of a model, with its warnings.
 fn of_model(
     model: &Model,
     table: &Table,
     slot: &Connection<'_>,
     speed_m_per_s: f64,
     force: Option<ForceKind>,
-) -> Result<Spring, Error> {
+) -> Result<(ForceCurve, Vec<String>), Error> {
     let query = Query {
         mass_kg: Some(slot.mass_kg),
         rule: table.max_crush,
@@ -114,9 +125,7 @@ fn of_model(
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) =
         predict_driving(model, &query, force, table.band).map_err(predict_error)?;
-    let mut curve = curve.continued().map_err(|e| predict_error(invalid(e)))?;
-    curve.data_end_m = Some(model.largest_crush_m());
-    Ok(Spring { curve, warnings: texts(&warnings) })
+    Ok((curve, texts(&warnings)))
 }
 
 /// The curve of a predicted one that was read from a file.
@@ -124,10 +133,10 @@ fn of_predicted(
     curve: &PredictedCurve,
     table: &Table,
     force: Option<ForceKind>,
-) -> Result<Spring, Error> {
+) -> Result<(ForceCurve, Vec<String>), Error> {
     let force = force.unwrap_or(curve.provenance.force_kind);
     let driving = curve.driving_member(force, table.band).map_err(predict_error)?;
-    Ok(Spring { curve: driving, warnings: texts(&curve.warnings) })
+    Ok((driving, texts(&curve.warnings)))
 }
 
 fn texts(warnings: &[Warning]) -> Vec<String> {
@@ -165,6 +174,18 @@ fn which_force(
 }
 
 impl Spring {
+    /// The curve of FE runs, continued as its table asks, or as exports are.
+    pub(super) fn continued(self, table: &Table) -> Result<Self, Error> {
+        let end = table.end.unwrap_or(EnvelopeEnd::Bottom);
+        let tail = match end {
+            EnvelopeEnd::Bottom => Tail::Bottom,
+            EnvelopeEnd::Slope if self.curve.beyond.is_none() => Tail::None,
+            EnvelopeEnd::Hold | EnvelopeEnd::Slope | EnvelopeEnd::Error => Tail::Hold,
+        };
+        let curve = self.curve.continued(tail).map_err(envelope_error)?;
+        Ok(Self { curve, end, ..self })
+    }
+
     /// The force law that the curve's table asks for, with all warnings.
     pub(crate) fn law_with_warnings(
         mut self,
@@ -175,7 +196,7 @@ impl Spring {
             LawName::Memory | LawName::Rate => self.memory(table)?,
         };
         self.warnings.extend(warnings);
-        Ok((ForceLaw::of_curve(&self.curve, unloading, table.end), self.warnings))
+        Ok((ForceLaw::of_curve(&self.curve, unloading, self.end), self.warnings))
     }
 
     fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), Error> {

@@ -144,9 +144,9 @@ pub(crate) struct CurveTable {
     /// Force law.
     #[serde(default)]
     pub(crate) law: LawName,
-    /// What the force does beyond the curve.
-    #[serde(default)]
-    pub(crate) end: EnvelopeEnd,
+    /// What the force does beyond the curve. Default: `bottom`, as exports do, for curves of models,
+    /// predicted curves and database cases; `hold` for others.
+    pub(crate) end: Option<EnvelopeEnd>,
     /// Of a model: the rule for the maximal crush; the model's own if absent.
     #[serde(default)]
     pub(crate) max_crush: Option<MaxCrushRule>,

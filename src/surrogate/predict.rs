@@ -17,7 +17,7 @@
 
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
-use super::predicted::{ForestQuantiles, PredictedCurve, Provenance, envelope};
+use super::predicted::{Beyond, ForestQuantiles, PredictedCurve, Provenance, envelope};
 use super::query::{Query, ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
@@ -64,32 +64,7 @@ pub fn predict_driving(
     }
     let prediction = Prediction::of(motion)?;
     let curve = prediction.curve(prediction.rule())?;
-    let beyond = match force {
-        ForceKind::Body => prediction.motion.body,
-        ForceKind::Contact => prediction.declared,
-    };
-    let driving = curve.driving_member(force, member)?;
-    Ok((ForceCurve { beyond: Some(beyond), ..driving }, curve.warnings))
-}
-
-/// The forces of a prediction along deflections of which some lie beyond its maximal crush.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Beyond {
-    /// What the recipe declares.
-    pub declared: Envelope,
-    /// What moves a body of one mass.
-    pub body: Envelope,
-}
-
-/// [`predict`], and how its forces go on beyond the maximal crush.
-///
-/// # Errors
-/// As [`predict`].
-pub fn predict_beyond(model: &Model, query: &Query) -> Result<(PredictedCurve, Beyond), Error> {
-    let prediction = Prediction::new(model, query)?;
-    let curve = prediction.curve(prediction.rule())?;
-    let Prediction { motion, declared, .. } = prediction;
-    Ok((curve, Beyond { declared, body: motion.body }))
+    Ok((curve.driving_member(force, member)?, curve.warnings))
 }
 
 /// The motion that the body's force gives, beyond any maximal crush.
@@ -145,6 +120,7 @@ impl<'a> Motion<'a> {
         };
         let curve = ForceCurve {
             beyond: Some(beyond.clone()),
+            data_end_m: Some(model.largest_crush_m()),
             speed_kind: Some(model.speed_kind),
             speed_m_per_s: Some(asked.v),
             ..ForceCurve::of_body(loading).unloading_with(stiffness_n_per_m)
@@ -222,6 +198,23 @@ impl<'a> Prediction<'a> {
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 
+    /// The forces from a maximal crush on; `None` if it is as far as the motion is followed.
+    fn beyond(&self, max_crush_m: f64) -> Option<Beyond> {
+        let Motion { asked, body, .. } = &self.motion;
+        let further = body.deflection_m().iter().copied().filter(|&d| d > max_crush_m);
+        let deflection_m: Vec<f64> = std::iter::once(max_crush_m).chain(further).collect();
+        let along = |force: &Envelope| deflection_m.iter().map(|&d| force.force_at(d)).collect();
+        let force_n = along(&self.declared);
+        let body_force_n = asked.model.has_body_force().then(|| along(body));
+        let data_end_m = asked.model.largest_crush_m();
+        (deflection_m.len() > 1).then_some(Beyond {
+            data_end_m,
+            deflection_m,
+            force_n,
+            body_force_n,
+        })
+    }
+
     /// The band around one force; what was said of the other force is not said again.
     fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
         let asked = &self.motion.asked;
@@ -270,6 +263,7 @@ impl<'a> Prediction<'a> {
             force_n: declared.force_n().to_vec(),
             force_low_n: own.low_n,
             force_high_n: own.high_n,
+            beyond: self.beyond(end),
             body_force_n: body.as_ref().map(|b| b.force_n().to_vec()),
             body_force_low_n: of_body.low_n,
             body_force_high_n: of_body.high_n,

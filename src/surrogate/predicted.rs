@@ -70,6 +70,9 @@ pub struct PredictedCurve {
     pub speed_kind: SpeedKind,
     /// Mass of the body, or of each body of a pair.
     pub mass_kg: f64,
+    /// How the forces go on beyond the maximal crush; absent for a recorded curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beyond: Option<Beyond>,
     /// Integral of force over deflection.
     #[serde(rename = "energy_J")]
     pub energy_j: f64,
@@ -79,6 +82,22 @@ pub struct PredictedCurve {
     pub warnings: Vec<Warning>,
     /// Where it comes from and how it was checked.
     pub provenance: Provenance,
+}
+
+/// The forces beyond the maximal crush, along faster runs: neighbours in a train push on where a
+/// body by itself would have stopped. They are continued at the level with which the curve ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Beyond {
+    /// Largest crush of the model's runs, in m: further on the forces are an assumption.
+    pub data_end_m: f64,
+    /// Rising, from the maximal crush on.
+    pub deflection_m: Vec<f64>,
+    /// Force in N, one value per deflection.
+    #[serde(rename = "force_N")]
+    pub force_n: Vec<f64>,
+    /// The same of the body force, where it is another.
+    #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
+    pub body_force_n: Option<Vec<f64>>,
 }
 
 /// Quantiles of a regression forest (Meinshausen, JMLR 7, 2006) along the curve.
@@ -155,6 +174,14 @@ pub struct Provenance {
     pub parameters: BTreeMap<String, Parameter>,
 }
 
+impl Beyond {
+    fn envelope(&self, force_n: &[f64]) -> Result<Envelope, Error> {
+        let from_origin = |values: &[f64]| std::iter::once(&0.0).chain(values).copied().collect();
+        Envelope::new(from_origin(&self.deflection_m), from_origin(force_n))
+            .map_err(|error| invalid(error).of("beyond"))
+    }
+}
+
 impl Provenance {
     /// The band of each force that has one, the declared force first.
     pub fn bands(&self) -> impl Iterator<Item = (ForceKind, Band)> {
@@ -221,6 +248,16 @@ impl PredictedCurve {
         pushing("force_N", envelope)
     }
 
+    /// Deflection up to which curve and continuation rest on runs, in m.
+    pub(crate) fn data_end_m(&self) -> f64 {
+        self.beyond.as_ref().map_or(self.max_deflection_m, |beyond| beyond.data_end_m)
+    }
+
+    /// The force `force_N` beyond the maximal crush, as an envelope from (0, 0).
+    pub(crate) fn beyond_envelope(&self) -> Result<Option<Envelope>, Error> {
+        self.beyond.as_ref().map(|beyond| beyond.envelope(&beyond.force_n)).transpose()
+    }
+
     /// The curve of one force alone, with the unloading and the band that belong to it. The
     /// quantiles are of the declared force only.
     ///
@@ -261,6 +298,11 @@ impl PredictedCurve {
         curve.force_n = envelope.force_n().to_vec();
         (curve.force_low_n, curve.force_high_n) =
             (curve.body_force_low_n.take(), curve.body_force_high_n.take());
+        if let Some(beyond) = &mut curve.beyond
+            && let Some(body) = beyond.body_force_n.take()
+        {
+            beyond.force_n = body;
+        }
         curve.forest_quantiles = None;
         curve.drives = ForceKind::Body.drives().into();
         curve.provenance.force_kind = ForceKind::Body;
@@ -275,6 +317,9 @@ impl PredictedCurve {
         self.body_force_n = None;
         (self.body_force_low_n, self.body_force_high_n) = (None, None);
         self.body_unloading_stiffness_n_per_m = None;
+        if let Some(beyond) = &mut self.beyond {
+            beyond.body_force_n = None;
+        }
         self.body_drives = None;
         self.provenance.body_energy_over_kinetic = None;
         self.provenance.body_band = None;
@@ -319,6 +364,10 @@ impl PredictedCurve {
         if let Some(member) = member {
             loading = self.band_member(force, &loading, member)?;
         }
+        let beyond = self.beyond.as_ref().map(|beyond| {
+            let of_body = beyond.body_force_n.as_ref().filter(|_| force == ForceKind::Body);
+            beyond.envelope(of_body.unwrap_or(&beyond.force_n))
+        });
         // The force law keeps to its bounds by itself; the one constant is for other tools.
         let unloading = CurveUnloading::Stiffness(self.stiffness_at_end(&loading));
         Ok(ForceCurve {
@@ -326,6 +375,8 @@ impl PredictedCurve {
             kind: Some(force),
             speed_kind: Some(self.speed_kind),
             speed_m_per_s: Some(self.speed_m_per_s),
+            data_end_m: Some(self.data_end_m()),
+            beyond: beyond.transpose()?,
             ..ForceCurve::bare(loading)
         })
     }

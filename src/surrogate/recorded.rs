@@ -59,6 +59,7 @@ impl PredictedCurve {
                 .unwrap_or(steepest),
             force_low_n: None,
             force_high_n: None,
+            beyond: None,
             body_force_low_n: None,
             body_force_high_n: None,
             forest_quantiles: None,

@@ -209,7 +209,7 @@ fn with_nsdm(
         let fit = fitted.best();
         let Some(table) = changed.curves.get_mut(name) else { continue };
         table.law = LawName::Elastic;
-        table.end = EnvelopeEnd::Slope;
+        table.end = Some(EnvelopeEnd::Slope);
         table.damping = Some(DampingTable {
             speed_m_per_s: fit.model.damping.nodes().to_vec(),
             coefficient_n_s_per_m: fit.model.damping.values().to_vec(),

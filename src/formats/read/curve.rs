@@ -123,6 +123,8 @@ pub struct Metadata {
     pub other_mass_kg: Option<f64>,
     /// Largest crush in m; points behind it are what other tools need beyond it.
     pub max_deflection_m: Option<f64>,
+    /// Where its runs' data end before that, in m.
+    pub data_end_m: Option<f64>,
 }
 
 impl Metadata {
@@ -149,6 +151,7 @@ impl Metadata {
             "mass_kg" => self.mass_kg = above_zero()?,
             "other_mass_kg" => self.other_mass_kg = above_zero()?,
             "max_deflection_m" => self.max_deflection_m = above_zero()?,
+            "data_end_m" => self.data_end_m = above_zero()?,
             "force_kind" => {
                 let kind = ForceKind::parse(value);
                 self.force = Some(kind.ok_or_else(|| wrong("\"body\" or \"contact\""))?);
@@ -169,7 +172,7 @@ impl Metadata {
             kind: self.force,
             speed_kind: self.speed_kind,
             speed_m_per_s: self.speed_m_per_s,
-            data_end_m: self.max_deflection_m,
+            data_end_m: self.data_end_m.or(self.max_deflection_m),
             ..ForceCurve::bare(loading)
         }
     }

@@ -73,6 +73,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         mass_kg: Some(curve.mass_kg),
         other_mass_kg,
         max_deflection_m: None,
+        data_end_m: None,
     };
     Ok(ReadCurve {
         title: title(&format!("{}, {}", curve.provenance.group, curve.model), &mut notes),

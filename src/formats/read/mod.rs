@@ -312,7 +312,7 @@ pub(crate) enum DrivingFile {
 /// # Errors
 /// As of [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
-    let (found, reader) = parse(path, options)?;
+    let (mut found, reader) = parse(path, options)?;
     if reader.name == JSON {
         return json::predicted(path).map(|curve| DrivingFile::Predicted(Box::new(curve)));
     }
@@ -328,7 +328,13 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
         Some(Err(error)) => Some(curve::content(path)(error).at_key("points")),
         None => None,
     };
-    let curve = found.curve(path).map_err(|error| plain.unwrap_or(error))?;
+    // What lies beyond the maximal crush is of no use to a database; here it drives.
+    let crush_m = match &mut found {
+        Parsed::Columns(columns) => columns.facts.max_deflection_m.take(),
+        Parsed::Curve(_) => None,
+    };
+    let mut curve = found.curve(path).map_err(|error| plain.unwrap_or(error))?;
+    curve.facts.max_deflection_m = curve.facts.max_deflection_m.or(crush_m);
     let (curve, changes) = curve.driving().map_err(curve::content(path))?;
     Ok(DrivingFile::Curve(Box::new(curve), changes))
 }

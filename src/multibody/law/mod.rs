@@ -39,6 +39,9 @@ pub enum EnvelopeEnd {
     Hold,
     /// The last segment is continued if it rises, else the last force is held.
     Slope,
+    /// The structure is taken as fully crushed at 1.5 times the maximal crush, or where faster runs
+    /// end: from there the force rises with the unloading stiffness. Of a law by itself: as `slope`.
+    Bottom,
     /// The run ends with an error that names the interface.
     Error,
 }
@@ -130,7 +133,7 @@ impl ForceLaw {
         let mut slope_n_per_m: Vec<f64> =
             (1..n).map(|i| (f[i] - f[i - 1]) / (d[i] - d[i - 1])).collect();
         slope_n_per_m.push(match end {
-            EnvelopeEnd::Slope => slope_n_per_m[n - 2].max(0.0),
+            EnvelopeEnd::Slope | EnvelopeEnd::Bottom => slope_n_per_m[n - 2].max(0.0),
             EnvelopeEnd::Hold | EnvelopeEnd::Error => 0.0,
         });
         let mut sum_jm = vec![0.0; n];

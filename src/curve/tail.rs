@@ -1,4 +1,4 @@
-//! What an exported curve does beyond the maximal crush of its own impact.
+//! What a curve does beyond the maximal crush of its own impact, in runs and in exports.
 //!
 //! A train crushes an end further than the same vehicle alone does, and most tools end a table with an error, with a held
 //! force or with the last slope. The rule, in three steps:
@@ -10,7 +10,7 @@
 //! 3. From there the force rises with the unloading stiffness (a steeper rise would change how tools unload that take the
 //!    steepest rise for it) to three times the curve's largest force.
 
-use crate::curve::Envelope;
+use super::Envelope;
 use crate::error::Error;
 
 /// How a curve goes on beyond its maximal crush.
@@ -79,11 +79,26 @@ pub(crate) fn with_tail(
         }
     }
     push(crushed_m, level_n);
-    if tail == Tail::Bottom {
-        let highest_n = HIGHEST * curve.peak_force_n();
-        let rise_m = on_grid(crushed_m + (highest_n - level_n) / stiffness_n_per_m) - crushed_m;
-        push(crushed_m + rise_m, level_n + stiffness_n_per_m * rise_m);
+    let held = Envelope::new(d, f)?;
+    match tail {
+        Tail::Bottom => bottomed(&held, curve.peak_force_n(), interval_m, stiffness_n_per_m),
+        Tail::None | Tail::Hold => Ok(held),
     }
+}
+
+/// Step 3: the rise from the end of a curve, over a whole number of intervals.
+pub(crate) fn bottomed(
+    held: &Envelope,
+    peak_n: f64,
+    interval_m: f64,
+    stiffness_n_per_m: f64,
+) -> Result<Envelope, Error> {
+    let (mut d, mut f) = (held.deflection_m().to_vec(), held.force_n().to_vec());
+    let (crushed_m, level_n) = (held.end_m(), held.force_at(held.end_m()));
+    let to_highest_m = (HIGHEST * peak_n - level_n) / stiffness_n_per_m;
+    let rise_m = (to_highest_m / interval_m - 1e-9).ceil().max(1.0) * interval_m;
+    d.push(crushed_m + rise_m);
+    f.push(level_n + stiffness_n_per_m * rise_m);
     Envelope::new(d, f)
 }
 
