@@ -1239,7 +1239,14 @@ fn what_drives_a_train_is_the_prediction() {
                     let (driving, warnings) = predict_driving(&model, &query, force, None).unwrap();
                     let reported = curve.driving(force).unwrap();
                     assert_eq!(driving.loading, reported.loading);
-                    assert!(driving.beyond.is_some() && reported.beyond.is_none());
+                    let beyond = |c: &ForceCurve| c.beyond.clone().unwrap();
+                    let end_m = reported.loading.end_m();
+                    let further = beyond(&reported).deflection_m().to_vec();
+                    for d in further.into_iter().filter(|d| *d >= end_m) {
+                        let (a, b) = (beyond(&driving).force_at(d), beyond(&reported).force_at(d));
+                        assert!((a - b).abs() <= 1e-9 * a, "{a} and {b} N at {d} m");
+                    }
+                    assert_eq!(driving.data_end_m, reported.data_end_m);
                     let stiffness = |c: &ForceCurve| c.unloading.stiffness_n_per_m().unwrap();
                     assert!((stiffness(&driving) / stiffness(&reported) - 1.0).abs() < 1e-12);
                     assert!(!warnings.is_empty() || mass.is_none());

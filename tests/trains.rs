@@ -533,15 +533,16 @@ fn a_curve_file_of_any_format_drives_an_interface() {
 fn leaving_the_data_is_said() {
     let folder = demo_folder();
     let here = folder.path();
-    let tail = ["export", "lead50.json", "--tail", "bottom", "--to", "csv", "-o", "tail.csv"];
-    crumple_ok(here, &tail);
+    let case = ["--group", "lead-car-wall", "--case", "48kmh", "--tail", "bottom"];
+    crumple_ok(here, &[&["export", "curves.h5", "-o", "tail.csv"], &case[..]].concat());
     let largest = {
         let model: Value = json(&std::fs::read_to_string(here.join("lead.model")).unwrap());
         let cases = model["cases"].as_array().unwrap().clone();
         cases.iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).fold(0.0, f64::max)
     };
-    let lead: Value = json(&std::fs::read_to_string(here.join("lead50.json")).unwrap());
-    let crush_m = lead["max_deflection_m"].as_f64().unwrap();
+    let table = std::fs::read_to_string(here.join("tail.csv")).unwrap();
+    let crush_m = table.lines().find_map(|l| l.strip_prefix("# max_deflection_m: ")).unwrap();
+    let crush_m: f64 = crush_m.parse().unwrap();
     let limits = "[limits]\nstandard = \"EN 15227\"\nedition = \"2020\"\nmean_deceleration_g = 5.0";
     let text = |curve: &str, mass: &str| {
         let vehicles = format!("vehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]");
@@ -574,6 +575,83 @@ fn leaving_the_data_is_said() {
     let run = simulate("model = \"lead.model\"", "20t");
     assert!(!run["warnings"].to_string().contains("beyond the end"), "{}", run["warnings"]);
     assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!([]));
+}
+
+/// A model, its predicted curve and what is exported of that go on alike beyond the maximal crush and
+/// the data: a heavy vehicle behind pushes the nose to where it bottoms.
+#[test]
+fn curves_of_one_model_go_on_alike() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let push = |curve: &str| -> (f64, f64, f64) {
+        let curves = format!(
+            "nose = {{ {curve} }}\ninner = {{ stages = [ {{ stroke = \"500mm\", from = \"5MN\", to = \"9MN\" }} ], law = \"elastic\" }}"
+        );
+        let vehicles = "inner = \"inner\"\nvehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"150t\" } ]";
+        let text = scenario(&curves, vehicles, "[wall]")
+            .replace("36km/h", "50km/h")
+            .replace("300ms", "600ms");
+        std::fs::write(here.join("push.toml"), text).unwrap();
+        let run = json(&crumple_ok(here, &["simulate", "push.toml", "--json", "-q"]));
+        let interfaces = run["summary"]["interfaces"].as_array().unwrap().clone();
+        let nose = interfaces.iter().find(|i| i["name"] == "A1|wall").unwrap();
+        let number = |key: &str| nose[key].as_f64().unwrap();
+        (number("max_deflection_m"), number("peak_force_N"), number("data_end_m"))
+    };
+    let (crush_m, force_n, data_end_m) = push("model = \"lead.model\", force = \"body\"");
+    assert!(crush_m > 1.5 * data_end_m && force_n > 10e6, "{crush_m} m, {force_n} N");
+    // A last digit of a force is one of 1e-5 in the crush: the nose strikes and parts many times.
+    let alike = |curve: &str, (d, f, end): (f64, f64, f64)| {
+        let (crush_m, force_n, data_end_m) = push(curve);
+        for (found, expected) in [(crush_m, d), (force_n, f), (data_end_m, end)] {
+            assert!((found / expected - 1.0).abs() < 3e-4, "{curve}: {found}, {expected}");
+        }
+    };
+    let of_model = (crush_m, force_n, data_end_m);
+    alike("file = \"lead50.json\", force = \"body\"", of_model);
+    for file in ["far.csv", "far.k", "far.mo", "far.mat", "far.rad", "far.txt"] {
+        let to: &[&str] = if file == "far.txt" { &["--to", "modelica"] } else { &[] };
+        crumple_ok(here, &[&["export", "lead50.json", "-o", file, "-q"], to].concat());
+        alike(&format!("file = \"{file}\", force = \"body\""), of_model);
+    }
+    let held = push("model = \"lead.model\", force = \"body\", end = \"hold\"");
+    assert!(held.0 > 1.5 * crush_m && held.1 < 0.5 * force_n, "{held:?}");
+    crumple_ok(here, &["export", "lead50.json", "--tail", "hold", "-o", "held.csv", "-q"]);
+    alike("file = \"held.csv\"", held);
+    alike("file = \"lead50.json\", force = \"body\", end = \"hold\"", held);
+    // An edge of the band goes on as its curve does.
+    let edge = push("model = \"lead.model\", force = \"body\", band = 1.0");
+    assert!(edge.0 < crush_m);
+    alike("file = \"lead50.json\", force = \"body\", band = 1.0", edge);
+    // Plots say from where on the runs' data have ended.
+    let fast = ["predict", "lead.model", "--speed", "76km/h", "--extrapolate", "-o", "fast.json"];
+    crumple_ok(here, &fast);
+    crumple_ok(here, &["plot", "fast.json", "-o", "fast.svg"]);
+    let beyond = "beyond the runs' crush";
+    let drawn = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
+    assert!(drawn("fast.svg").contains(beyond));
+    crumple_ok(here, &["plot", "lead.model", "--speed", "50km/h", "-o", "usual.svg"]);
+    assert!(!drawn("usual.svg").contains(beyond));
+}
+
+/// What a scenario names is bounded before it is read.
+#[test]
+fn curves_of_a_scenario_are_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let vehicles = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]";
+    let fails = |curves: &str| {
+        std::fs::write(here.join("many.toml"), scenario(curves, vehicles, "[wall]")).unwrap();
+        crumple_fails(here, 1, &["simulate", "many.toml"])
+    };
+    let many: Vec<String> =
+        (0..1_001).map(|k| format!("nose{k} = {{ file = \"a.csv\" }}")).collect();
+    let said = fails(&many.join("\n").replace("nose0 ", "nose "));
+    assert!(said.contains("[curves] has 1001 curves: expected at most 1000"), "{said}");
+    std::fs::File::create(here.join("a.csv")).unwrap().set_len(60 << 20).unwrap();
+    let said = fails(&many[..40].join("\n").replace("nose0 ", "nose "));
+    let expected = "the files of [curves] have 2400 MB together: expected at most 2048";
+    assert!(said.contains(expected), "{said}");
 }
 
 /// A recorded curve that drives an impact of another speed or mass is warned of, as a model out of its

@@ -137,21 +137,30 @@ const PREDICTED: usize = 1;
 /// The predicted line, its band below it, and the body's force beside it, whose own band would
 /// cover that of the line: it is drawn with that force alone.
 fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
-    let (d, f) = (&curve.deflection_m, &curve.force_n);
+    // A band is known, and a line is whole, as far as the runs were crushed.
+    let known = curve.deflection_m.partition_point(|d| *d <= curve.data_end_m());
+    let to_end = |values: &[f64]| values[..known].to_vec();
+    let d = &curve.deflection_m;
     if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
-        let (low, high) = (low.clone(), high.clone());
-        panel.bands.push(plot::Band {
-            name: band_name(curve),
-            look: PREDICTED,
-            x: d.clone(),
-            low,
-            high,
-        });
+        let (low, high) = (to_end(low), to_end(high));
+        let name = band_name(curve);
+        panel.bands.push(plot::Band { name, look: PREDICTED, x: to_end(d), low, high });
     }
     let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
-    panel.series.push(Series::line(&name, PREDICTED, d.clone(), f.clone()).shown(Shown::Emphasis));
+    let mut add = |name: &str, look, force_n: &[f64], shown| {
+        let line = Series::line(name, look, to_end(d), to_end(force_n));
+        panel.series.push(line.shown(shown));
+        if known < d.len() {
+            let from = known.saturating_sub(1);
+            let (d, force_n) = (d[from..].to_vec(), force_n[from..].to_vec());
+            let further =
+                Series::line(&format!("{name}, beyond the runs' crush"), look, d, force_n);
+            panel.series.push(further.shown(Shown::Assumed));
+        }
+    };
+    add(&name, PREDICTED, &curve.force_n, Shown::Emphasis);
     if let Some(body_n) = &curve.body_force_n {
-        panel.series.push(Series::line("its body force", 3, d.clone(), body_n.clone()));
+        add("its body force", 3, body_n, Shown::Line);
     }
 }
 

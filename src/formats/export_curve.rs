@@ -303,7 +303,7 @@ impl ExportCurve {
         if let Some(other) = self.other_mass_kg() {
             facts.insert(7, ("other_mass_kg", other.to_string()));
         }
-        if curve.beyond.is_some() {
+        if curve.data_end_m() != curve.max_deflection_m {
             facts.push(("data_end_m", nine_digits(curve.data_end_m())));
         }
         if let Some(case) = &curve.provenance.case {

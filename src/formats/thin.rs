@@ -66,6 +66,9 @@ fn least_squares(d: &[f64], f: &[f64], left: &[usize], kept: usize) -> Vec<f64> 
     right.iter().zip(left).map(|(force, &i)| force.max(f[i].min(0.0))).collect()
 }
 
+/// What a triangle beyond the maximal crush counts: the force there is less certain.
+const TAIL_WEIGHT: f64 = 0.05;
+
 /// Indices of the points that are left when the one with the smallest triangle is removed again and
 /// again; the ends and `kept` stay.
 fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
@@ -73,7 +76,8 @@ fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
     let (mut before, mut after): (Vec<usize>, Vec<usize>) =
         (0..n).map(|i| (i.saturating_sub(1), (i + 1).min(n - 1))).unzip();
     let area = |a: usize, b: usize, c: usize| {
-        0.5 * ((d[b] - d[a]) * (f[c] - f[a]) - (d[c] - d[a]) * (f[b] - f[a])).abs()
+        let weight = if b > kept { TAIL_WEIGHT } else { 1.0 };
+        0.5 * weight * ((d[b] - d[a]) * (f[c] - f[a]) - (d[c] - d[a]) * (f[b] - f[a])).abs()
     };
     let mut areas: Vec<f64> = (0..n).map(|i| area(before[i], i, after[i])).collect();
     // Smallest first: bits of numbers that are not below 0 are in the numbers' order.

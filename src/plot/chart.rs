@@ -111,6 +111,8 @@ pub enum Shown {
     Emphasis,
     /// Markers alone, one for each point.
     Points,
+    /// A dashed line: where it rests on no data.
+    Assumed,
 }
 
 /// Points in the order in which they are joined.

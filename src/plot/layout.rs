@@ -432,7 +432,7 @@ fn sample(entry: &Entry, x: f64, y: f64) -> Vec<Shape> {
             shows,
         });
     }
-    if shown != Shown::Emphasis {
+    if matches!(shown, Shown::Line | Shown::Points) {
         shapes.push(markers(entry.look, &[(x + 0.5 * SAMPLE, y)], shows));
     }
     shapes
@@ -443,9 +443,11 @@ pub(super) fn stroke(look: usize, shown: Shown) -> Option<Stroke> {
     let width = match shown {
         Shown::Line => 1.5,
         Shown::Emphasis => 3.0,
+        Shown::Assumed => 1.5,
         Shown::Points => return None,
     };
-    Some(Stroke { paint: Paint::Series(look), width, dash: style::dash(look).to_vec() })
+    let dash = if shown == Shown::Assumed { &[3.0, 3.0] } else { style::dash(look) };
+    Some(Stroke { paint: Paint::Series(look), width, dash: dash.to_vec() })
 }
 
 /// Markers of a look at some places.

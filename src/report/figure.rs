@@ -74,6 +74,7 @@ fn panel_data(panel: &Panel, place: &PanelPlace) -> Value {
                 Shown::Line => 0,
                 Shown::Emphasis => 1,
                 Shown::Points => 2,
+                Shown::Assumed => 3,
             };
             let x = abscissa(numbers(&s.x, &points, &panel.x));
             json!({ "name": s.name, "look": s.look, "shown": shown, "x": x, "y": numbers(&s.y, &points, &panel.y) })

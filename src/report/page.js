@@ -218,9 +218,9 @@
         return svg;
       }
       if (entry.shown !== 2) {
-        make("path", { d: "M0 7H34", "stroke-width": entry.shown ? 3 : 1.5, "stroke-dasharray": look.dash.join(" ") || "none", class: `l-${colour}` }, svg);
+        make("path", { d: "M0 7H34", "stroke-width": entry.shown === 1 ? 3 : 1.5, "stroke-dasharray": entry.shown === 3 ? "3 3" : look.dash.join(" ") || "none", class: `l-${colour}` }, svg);
       }
-      if (entry.shown === 1) return svg;
+      if (entry.shown === 1 || entry.shown === 3) return svg;
       const { outline, is_closed } = look.marker;
       const d = outline.map((line) => line.map(([x, y], i) => `${i ? "L" : "M"}${17 + x} ${7 + y}`).join("") + (is_closed ? "Z" : "")).join("");
       make("path", { d, "stroke-width": 1.4, class: `l-${colour} ${is_closed ? `f-${colour}` : ""}`, ...(is_closed ? {} : { fill: "none" }) }, svg);

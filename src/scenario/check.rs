@@ -45,6 +45,13 @@ impl Scenario {
         }
         check_names(self)?;
         check_contact(self)?;
+        let curves = self.curves.len();
+        if curves > MAX_CURVES {
+            return Err(error!(
+                Scenario at "curves",
+                "[curves] has {curves} curves: expected at most {MAX_CURVES}"
+            ));
+        }
         for (name, table) in &self.curves {
             check_length(name).map_err(|e| e.at_key("curves"))?;
             check_keys(name, table)?;
@@ -252,6 +259,9 @@ fn check_contact(scenario: &Scenario) -> Result<(), Error> {
         _ => Ok(()),
     }
 }
+
+/// Most curves of a scenario; each is read from its file.
+const MAX_CURVES: usize = 1_000;
 
 /// Longest name, in bytes: it stands in the columns of results and tables.
 const MAX_NAME: usize = 200;

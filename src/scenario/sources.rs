@@ -1,6 +1,7 @@
 //! Sources: the files that a scenario's curves name, read once.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{CheckedScenario, CurveTable, Scenario, StageTable, place};
@@ -61,9 +62,25 @@ impl Scenario {
     }
 }
 
+/// Most bytes of the files that the curves of a scenario name, a file as often as it is named.
+const MAX_BYTES: u64 = 2 << 30;
+
 impl Sources {
     /// Reads what `scenario`, which stands at `path`, names.
     pub(crate) fn read(path: &Path, scenario: &CheckedScenario<'_>) -> Result<Self, Error> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let files = scenario.curves.values().filter_map(|t| t.model.as_ref().or(t.file.as_ref()));
+        let sizes = files.filter_map(|file| fs::metadata(folder.join(file)).ok());
+        let bytes: u64 = sizes.map(|file| file.len()).sum();
+        if bytes > MAX_BYTES {
+            let error = error!(
+                Scenario at "curves",
+                "the files of [curves] have {} MB together: expected at most {}; name fewer, or smaller ones",
+                bytes >> 20,
+                MAX_BYTES >> 20
+            );
+            return Err(error.placed(|key| scenario.place(path, key)));
+        }
         let mut curves = BTreeMap::new();
         for (name, table) in &scenario.curves {
             let read = CurveSource::read(path, name, table);

@@ -201,8 +201,12 @@ impl<'a> Prediction<'a> {
     /// The forces from a maximal crush on; `None` if it is as far as the motion is followed.
     fn beyond(&self, max_crush_m: f64) -> Option<Beyond> {
         let Motion { asked, body, .. } = &self.motion;
-        let further = body.deflection_m().iter().copied().filter(|&d| d > max_crush_m);
-        let deflection_m: Vec<f64> = std::iter::once(max_crush_m).chain(further).collect();
+        // Whole intervals of the curve, so that what goes on with it keeps its table even.
+        let interval_m = max_crush_m / POINTS as f64;
+        let on_grid = |d: f64| max_crush_m + ((d - max_crush_m) / interval_m).ceil() * interval_m;
+        let further = body.deflection_m().iter().filter(|&&d| d > max_crush_m).map(|&d| on_grid(d));
+        let mut deflection_m: Vec<f64> = std::iter::once(max_crush_m).chain(further).collect();
+        deflection_m.dedup();
         let along = |force: &Envelope| deflection_m.iter().map(|&d| force.force_at(d)).collect();
         let force_n = along(&self.declared);
         let body_force_n = asked.model.has_body_force().then(|| along(body));

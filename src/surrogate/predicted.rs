@@ -250,12 +250,20 @@ impl PredictedCurve {
 
     /// Deflection up to which curve and continuation rest on runs, in m.
     pub(crate) fn data_end_m(&self) -> f64 {
-        self.beyond.as_ref().map_or(self.max_deflection_m, |beyond| beyond.data_end_m)
+        self.own_beyond().map_or(self.max_deflection_m, |beyond| beyond.data_end_m)
+    }
+
+    /// What lies beyond the maximal crush, if it belongs to these points and not to others that they
+    /// have replaced.
+    fn own_beyond(&self) -> Option<&Beyond> {
+        let begins =
+            |beyond: &Beyond| beyond.deflection_m.first().map(|d| d / self.max_deflection_m);
+        self.beyond.as_ref().filter(|b| begins(b).is_some_and(|at| (at - 1.0).abs() <= SAME_END))
     }
 
     /// The force `force_N` beyond the maximal crush, as an envelope from (0, 0).
     pub(crate) fn beyond_envelope(&self) -> Result<Option<Envelope>, Error> {
-        self.beyond.as_ref().map(|beyond| beyond.envelope(&beyond.force_n)).transpose()
+        self.own_beyond().map(|beyond| beyond.envelope(&beyond.force_n)).transpose()
     }
 
     /// The curve of one force alone, with the unloading and the band that belong to it. The
@@ -364,7 +372,7 @@ impl PredictedCurve {
         if let Some(member) = member {
             loading = self.band_member(force, &loading, member)?;
         }
-        let beyond = self.beyond.as_ref().map(|beyond| {
+        let beyond = self.own_beyond().map(|beyond| {
             let of_body = beyond.body_force_n.as_ref().filter(|_| force == ForceKind::Body);
             beyond.envelope(of_body.unwrap_or(&beyond.force_n))
         });

@@ -71,6 +71,11 @@ def exudyn(path, run):
     curve = json.loads(pathlib.Path(path).read_text())
     deflection = numpy.array(curve["deflection_m"])
     force = numpy.array(curve["body_force_N"])
+    # Beyond the maximal crush the force follows faster runs, at the level with which the curve ends.
+    beyond = curve["beyond"]
+    further = numpy.array(beyond["body_force_N"])
+    deflection = numpy.append(deflection, beyond["deflection_m"][1:])
+    force = numpy.append(force, force[-1] / further[0] * further[1:])
     stiffness = curve["body_unloading_stiffness_N_per_m"]
     largest = [0.0]
 
