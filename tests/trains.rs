@@ -627,7 +627,7 @@ fn curves_of_one_model_go_on_alike() {
     let fast = ["predict", "lead.model", "--speed", "76km/h", "--extrapolate", "-o", "fast.json"];
     crumple_ok(here, &fast);
     crumple_ok(here, &["plot", "fast.json", "-o", "fast.svg"]);
-    let beyond = "beyond the runs' crush";
+    let beyond = "beyond the runs&#39; crush";
     let drawn = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
     assert!(drawn("fast.svg").contains(beyond));
     crumple_ok(here, &["plot", "lead.model", "--speed", "50km/h", "-o", "usual.svg"]);

@@ -131,14 +131,18 @@ fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
     sorted.into_iter().skip(from).take(2).collect()
 }
 
+/// A maximal crush is within those of the runs up to this share above the largest.
+const SAME_CRUSH: f64 = 0.01;
+
 /// The look of predictions.
 const PREDICTED: usize = 1;
 
 /// The predicted line, its band below it, and the body's force beside it, whose own band would
 /// cover that of the line: it is drawn with that force alone.
 fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
-    // A band is known, and a line is whole, as far as the runs were crushed.
-    let known = curve.deflection_m.partition_point(|d| *d <= curve.data_end_m());
+    // A band is known, and a line is whole, as far as the runs were crushed, within the line's own scatter.
+    let end_m = curve.data_end_m() * (1.0 + SAME_CRUSH);
+    let known = curve.deflection_m.partition_point(|d| *d <= end_m);
     let to_end = |values: &[f64]| values[..known].to_vec();
     let d = &curve.deflection_m;
     if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
