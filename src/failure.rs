@@ -21,7 +21,7 @@ pub const DONE_WITH_WARNINGS: u8 = 3;
 pub const EXIT_CODES: [(u8, &str); 4] = [
     (DONE, "done"),
     (FAILED, "failed: nothing was done, or only part of it; standard error says which"),
-    (USAGE, "the arguments make no sense, or do not fit together or with the file"),
+    (USAGE, "the arguments are invalid, or fit neither together nor the file"),
     (DONE_WITH_WARNINGS, "done, but with damage or warnings, and `--strict` was given"),
 ];
 

@@ -558,7 +558,7 @@ fn any_section_with_states_is_read() {
     assert_eq!(names, ["gceout", "icvout", "odd/values"]);
     assert_eq!(
         sections[2].problems[0].to_string(),
-        "odd/values: 1 record not read: they do not stand in states (d000001, d000002, …) with times"
+        "odd/values: 1 record not read: they are not in states (d000001, d000002, …) with times"
     );
 }
 

@@ -302,7 +302,7 @@ fn a_run_states_contact_gap_offset_end_and_sign() {
     let error = fails("contact_time = \"3s\"");
     assert!(
         error.contains(
-            "contact_time = 3000 ms lies outside the record, which goes from 0 ms to 299."
+            "contact_time = 3000 ms lies outside the record, which runs from 0 ms to 299."
         ),
         "{error}"
     );
@@ -355,7 +355,7 @@ fn impossible_runs_are_refused_with_their_likely_cause() {
     let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "d.h5"]);
     assert!(output.status.success());
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("accept_energy: the curve takes up 2.041 times"), "{said}");
+    assert!(said.contains("accept_energy: the curve absorbs 2.041 times"), "{said}");
 }
 
 #[test]

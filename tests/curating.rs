@@ -143,7 +143,7 @@ fn what_cannot_be_chosen_is_said_with_what_is_there() {
     misused(
         here,
         "db tag curves.h5 --group lead-car-wall",
-        "say what is changed: with --add, --remove or --clear",
+        "nothing to do: give --add, --remove or --clear",
     );
     misused(here, "db copy curves.h5 --group lead-car-wall", "say where the cases are copied");
     misused(here, "db rename curves.h5 --to x", "--group");

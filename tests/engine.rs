@@ -430,7 +430,7 @@ fn the_fourth_order_refuses_what_depends_on_speeds() {
     let damped = against_wall(Interface::new("nose|wall", linear(MEGA), 0.0).with_damping(damping));
     assert_eq!(
         simulate(&damped, &fourth).unwrap_err().to_string(),
-        "the damper of interface nose|wall depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
+        "the damper of interface nose|wall depends on the speed, which the fourth-order method does not support: use method = \"verlet\""
     );
     let resistance = Resistance { linear_per_s: 0.01, ..Resistance::default() };
     let body = Body { resistance, ..Body::new("car", 20.0 * TONNES, 15.0) };

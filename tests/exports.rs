@@ -317,7 +317,7 @@ fn a_missing_band_is_said() {
     for to in ["csv", "mat"] {
         let to = ["--to", to, "-o", "x"];
         let older = export_notes(here, "older.json", &to);
-        let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained anew";
+        let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained again";
         assert!(older.contains(of_body), "{older}");
         let of_contact = export_notes(here, "older.json", &[&to[..], &contact].concat());
         assert!(!of_contact.contains("band"), "{of_contact}");
@@ -756,7 +756,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         &["export", "lead.model", "--to", "onnx", "--speed", "50km/h"],
         "holds a whole model: remove --speed",
     );
-    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model is of one group");
+    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model has only one group");
     t(
         2,
         &["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"],

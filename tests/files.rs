@@ -465,7 +465,7 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
     );
     t(
         &|file| file.group(WALL).unwrap().delete("48kmh").unwrap(),
-        &[("case_list", "is listed in the group's cases, but is not there")],
+        &[("case_list", "is listed in the group's cases, but is missing")],
     );
 }
 
@@ -836,7 +836,7 @@ fn writers_of_one_file_do_not_mix() {
         let error = crumple_fails(here, 1, &["histories", input, "-o", "out.csv"]);
         assert_eq!(
             error,
-            "error: cannot write out.csv: another process is writing it: try again when it has finished; what was there before is unchanged\n"
+            "error: cannot write out.csv: another process is writing it: try again when it has finished; the previous content is unchanged\n"
         );
         Ok(None::<()>)
     })
@@ -879,7 +879,7 @@ fn a_file_beyond_the_limit_of_the_session_is_said() {
         assert_eq!(
             error,
             format!(
-                "error: cannot write {path}: the file would be larger than the limit of this session (ulimit -f) or of the disk; what was there before is unchanged\n"
+                "error: cannot write {path}: the file would be larger than the limit of this session (ulimit -f) or the disk allows; the previous content is unchanged\n"
             )
         );
     }
@@ -936,8 +936,8 @@ fn a_folder_that_is_not_there_is_named() {
             assert!(!error.contains("unchanged"), "nothing was there: {error}");
         }
     };
-    t("nodir/x.csv", "the folder nodir does not exist: make it, or name another");
-    t("no/dir/x.csv", "the folder no/dir does not exist: make it, or name another");
+    t("nodir/x.csv", "the folder nodir does not exist: create it, or name another");
+    t("no/dir/x.csv", "the folder no/dir does not exist: create it, or name another");
     t("m.model/x.csv", "m.model is a file and no folder: name another");
     t("m.model/in/x.csv", "m.model is a file and no folder: name another");
     assert_eq!(entries(here), ["curves.h5", "m.model"]);

@@ -265,7 +265,7 @@ fn mat_files_of_both_byte_orders() {
         is_points(&read_bytes("b.mat", &other, &given(Some("SI"))).unwrap().0, "other");
         let error = read_bytes("b.mat", &other, &given(None)).unwrap_err();
         assert!(
-            error.contains("b.mat: the file does not say its units: give them with --units"),
+            error.contains("b.mat: the file does not state its units: give them with --units"),
             "{error}"
         );
     }
@@ -601,7 +601,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.cur",
         "x (m)\ny (N)\n0 0\n1 2 3\n",
         None,
-        &["line 4: expected two numbers, or CONTINUE behind a curve"],
+        &["line 4: expected two numbers, or CONTINUE after a curve"],
     );
 }
 
@@ -619,7 +619,7 @@ fn memory_is_bounded_by_the_number_of_curves_and_points() {
     t("a.mo", "package a\n", 20_000, "more than 10000 curves");
     t("a.csv", "a;b c,d\te ", 2_000_000, "expected a column deflection");
     t("a.txt", "1 2 3\n", 1_100_000, "more than 1000000 points");
-    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it");
+    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it out");
     t("a.cur", "1 1\n", 1_100_000, "more than 1000000 points");
     t("a.cur", "a (m) ", 1_000_000, "expected a curve: lines of two numbers");
 }
@@ -741,7 +741,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t_with(
         2,
         &["other.csv"],
-        "--speed is given 1 time for 2 files: give it once for each file, in their order",
+        "--speed is given 1 time for 2 files: give it once for each file, in the same order",
     );
     t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 file");
     t_with(2, &["--other-mass", "3t"], "a wall has no mass: remove --other-mass");
@@ -754,7 +754,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t(
         1,
         &["--kind", "wall", "--mass", "240t", "--speed", &v],
-        "nose.csv: the curve takes up 0.1000 times the kinetic energy of 240.0 t",
+        "nose.csv: the curve absorbs 0.1000 times the kinetic energy of 240.0 t",
     );
     t(
         1,

@@ -188,7 +188,7 @@ fn a_binout_gives_the_proposal_of_its_texts() {
             let means = "\"smp d R14 (from OpenRadioss T01)\": a mean over two intervals";
             assert!(from.as_str().unwrap().starts_with(&format!("{by} {means}")), "{from}");
         };
-        said(&mut of_text, "its second line says");
+        said(&mut of_text, "its second line reads");
         said(&mut of_binout, "its version is");
         assert_eq!(of_text, of_binout, "{group_name}");
         crumple_ok(&here, &["build", "-q"]);
@@ -267,8 +267,8 @@ fn every_value_says_where_it_is_from() {
     }
     assert!(above("kind").contains("guessed: one body moves, and a rigid wall stops it"));
     assert!(above("deflection").contains("node \"COG of the rigid trailing mass\""));
-    assert!(above("filter").contains("read: its second line says"), "{}", above("filter"));
-    assert!(text.contains("# CANNOT BE SEEN: is this one body of a pair"));
+    assert!(above("filter").contains("read: its second line reads"), "{}", above("filter"));
+    assert!(text.contains("# CANNOT BE DETERMINED: is this one body of a pair"));
     assert!(text.contains("\n# half_model = true\n"));
     assert!(text.contains(
         "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\""
@@ -564,7 +564,7 @@ fn masses_are_never_made_up() {
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
-        said.contains("fill in mass of 50kmh: it follows from no force and no energy; say --mass"),
+        said.contains("fill in mass of 50kmh: no force and no energy give it: use --mass"),
         "{said}"
     );
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
@@ -703,10 +703,10 @@ fn what_is_no_run_is_named_and_left_out() {
     said("died", "it died: nodout holds 3 whole states (line 33: the file ends");
     said(
         "aborted",
-        "it died: the record ends at 66.754 ms, while the bodies still close at 62 % of",
+        "it terminated early: the record ends at 66.754 ms, while the bodies still close at 62 % of",
     );
     said("empty", "the folder is empty");
-    said("planned", "it holds a deck and nothing that a solver wrote: it has not run");
+    said("planned", "it holds a deck but no solver output: it has not been run");
     said(
         "energies",
         "it has no histories of nodes (a nodout, or a binout or T01 with one): it has glstat",
@@ -732,13 +732,13 @@ fn a_run_that_died_early_says_where_its_record_ends() {
     keep(&killed.join("nodout"), "\n\n\n n o d a l   p r i n t", 20);
     let document = json(&crumple_ok(&here, &["init", "--json"]));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
-    let died = "it died: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
+    let died = "it terminated early: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
     assert_eq!(left_out(&document), [("killed".into(), died.into())]);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     assert!(text.contains("\n# [[run]]\n# path = \"killed\"\n"), "{text}");
     // Alone its units are not known.
     let error = crumple_fails(&here, 1, &["init", "killed", "-o", "killed.toml"]);
-    assert!(error.contains("  killed: it died: the record ends at 0.0142"), "{error}");
+    assert!(error.contains("  killed: it terminated early: the record ends at 0.0142"), "{error}");
     assert!(error.contains("while the bodies still close at 93 %"), "{error}");
     assert!(!here.join("killed.toml").exists());
     // A force that ends early ends the record, too.

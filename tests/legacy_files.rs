@@ -226,7 +226,7 @@ fn texts_in_every_encoding() {
         ([b"\xEF\xBB\xBF", good.as_bytes()].concat(), None),
         ([vec![0xFF, 0xFE], pairs(u16::to_le_bytes)].concat(), Some("text: UTF-16, little-endian")),
         ([vec![0xFE, 0xFF], pairs(u16::to_be_bytes)].concat(), Some("text: UTF-16, big-endian")),
-        (latin1, Some("text: Latin-1, as it is no UTF-8")),
+        (latin1, Some("text: Latin-1, because it is not UTF-8")),
     ] {
         for name in ["a.csv", "a.txt"] {
             let (curve, _) = read_bytes(name, &bytes, &given(None)).unwrap();
@@ -301,7 +301,7 @@ fn curves_of_ls_prepost() {
     wrong(
         &single.replace("#pts=5", "#pts=6"),
         None,
-        "line 5: the curve declares 6 points (#pts), but the file has 5 for it: write the file anew, it may be cut",
+        "line 5: the curve declares 6 points (#pts), but the file has 5 for it: write the file again: it may be truncated",
     );
     wrong(
         &single.replace("1000   2000000\n", ""),
@@ -450,7 +450,7 @@ fn jumps_of_the_force_are_taken_and_said() {
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
     let notes = case["notes"].to_string();
     assert!(notes.contains("points: 1 that repeat the one before removed"), "{notes}");
-    assert!(notes.contains("the force jumps from 0 to 1000000 N at 0 m (line 2), from 1000000 to 2000000 N at 0.4 m (line 4), from 2000000 to 1000000 N at 0.7 m (line 6): the points there are set apart by 0.0001 of the largest deflection"), "{notes}");
+    assert!(notes.contains("the force jumps from 0 to 1000000 N at 0 m (line 2), from 1000000 to 2000000 N at 0.4 m (line 4), from 2000000 to 1000000 N at 0.7 m (line 6): the points there are set apart by 0.0001 of the maximum deflection"), "{notes}");
     // Such a curve trains nothing by itself, but it runs and goes out.
     crumple_ok(here, &["export", "new.h5", "--to", "lsdyna", "-o", "a.k"]);
     // Back and forth is still refused.
@@ -515,7 +515,7 @@ fn radioss_functions() {
     wrong(
         &begin("x"),
         &si,
-        "expected a /FUNCT, found none in this file (of a run's files the starter, _0000.rad, has them)",
+        "expected a /FUNCT, found none in this file (in a run, the starter, _0000.rad, has them)",
     );
     wrong("/RUN/x/1\n0.2\n/TFILE/4\n0.1\n", &si, "expected a /FUNCT");
     wrong(
@@ -553,7 +553,7 @@ fn radioss_functions() {
     wrong(
         &smooth,
         &si,
-        "line 2: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
+        "line 2: expected /FUNCT/5 with linear interpolation between its points, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
     );
     t(
         &(smooth + &one.replace("/5", "/7")),
@@ -563,7 +563,7 @@ fn radioss_functions() {
     wrong(
         &one.replace("FUNCT/5", "FUNCT/5/2"),
         &si,
-        "line 1: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT/5/2",
+        "line 1: expected /FUNCT/5 with linear interpolation between its points, in the units of the deck, found /FUNCT/5/2",
     );
     let five = ReadOptions { curve: Some("5".into()), ..si.clone() };
     wrong(&format!("{one}{one}"), &five, "the file has 2 curves \"5\": leave one of them in it");

@@ -390,7 +390,7 @@ fn older_models_have_no_band_of_the_body_force() {
     std::fs::write(here.join("older.model"), model.to_string()).unwrap();
     let predict = |model: &str| crumple_ok(here, &["predict", model, "--speed", "50km/h"]);
     let (newer, older) = (predict("lead.model"), predict("older.model"));
-    let said = "band of body force   not known until the model is trained anew";
+    let said = "band of body force   unknown until the model is trained again";
     assert!(older.contains(said) && !newer.contains(said), "{older}");
     for (text, bands) in [(&newer, 2), (&older, 1)] {
         assert_eq!(text.matches("\n  band                 ±").count(), bands, "{text}");
@@ -403,7 +403,7 @@ fn older_models_have_no_band_of_the_body_force() {
     std::fs::write(here.join("s.toml"), scenario).unwrap();
     let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
     assert!(
-        error.contains("no band around its body force: remove band, or train the model anew"),
+        error.contains("no band around its body force: remove band, or train the model again"),
         "{error}"
     );
 }
@@ -1074,7 +1074,7 @@ fn nested_validation_says_why_it_cannot_be() {
         let output = crumple_in(here, &["validate", "c.h5", "--nested", "--strict", "--json"]);
         assert_eq!(output.status.code(), Some(3));
         let said = format!(
-            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {n}"
+            "auto has no errors of its own: choosing again without one speed needs at least 4, the group has {n}"
         );
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(error.contains(&said), "{error}");

@@ -140,7 +140,7 @@ fn a_killed_run_says_nothing_of_the_others() {
         let output = crumple_in(here, &["init", "runs", "-o", &format!("{states}.toml")]);
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{states} states");
         let printed = String::from_utf8(output.stdout).unwrap();
-        let died = "left out: runs/48kmh: it died: the record ends at ";
+        let died = "left out: runs/48kmh: it terminated early: the record ends at ";
         assert!(printed.contains(died), "{printed}");
         let without_its_run: Vec<&str> =
             printed.lines().filter(|line| !line.starts_with("left out: ")).collect();
@@ -165,7 +165,7 @@ fn a_killed_run_says_nothing_of_the_others() {
     let first: Vec<&str> = text.split_inclusive('\n').take(40).collect();
     fs::write(&rwforc, first.concat()).unwrap();
     let printed = crumple_ok(here, &["init", "runs", "-o", "force.toml"]);
-    assert!(printed.contains("left out: runs/48kmh: it died: the record ends at 22."), "{printed}");
+    assert!(printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."), "{printed}");
     assert!(printed.contains("\n36kmh  36 km/h     24.00 "), "{printed}");
 }
 
@@ -197,7 +197,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     assert!(printed.contains("left out: runs/48kmh: the folder is empty"), "{printed}");
     assert!(
         printed
-            .ends_with("wrote study.toml (1 run): look at what is guessed, then crumple build\n")
+            .ends_with("wrote study.toml (1 run): check the guessed values, then run crumple build\n")
     );
     // What is left to fill in is counted where the next step is named.
     fs::remove_file(here.join("runs/36kmh/rwforc")).unwrap();

@@ -342,10 +342,10 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert!(listed.contains("runT01") && !listed.contains("runT02"), "{listed}");
     fs::rename(at("runT02"), at("runT03")).unwrap();
     let message = section(&at("runT01"), "nodout").problems[0].to_string();
-    assert_eq!(message, "runT02 is not there, so that what continues behind it is not read");
+    assert_eq!(message, "runT02 is missing, so its continuation is not read");
     fs::remove_file(at("runT01")).unwrap();
     let message = section(&at("runT03"), "nodout").problems[0].to_string();
-    assert_eq!(message, "runT02 is not there, so that the record begins late");
+    assert_eq!(message, "runT02 is missing, so the record starts late");
     // What does not hold the same is not joined.
     fs::write(at("runT01"), written(3040, &[(0, 9, 9), (102, 1, 6)], 5)).unwrap();
     fs::write(at("runT02"), written(3040, &[(0, 8, 9), (102, 1, 6)], 5)).unwrap();

@@ -151,7 +151,7 @@ fn units_and_factors_are_those_of_the_arguments() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
     assert_eq!(
         error,
-        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each behind its name, such as a.csv,time=s and t.csv,time=ms\n"
+        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each after its name, such as a.csv,time=s and t.csv,time=ms\n"
     );
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
@@ -260,7 +260,7 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "a.csv", "--from=0.5s"],
         1,
-        "what is asked for, from 0.5 s to 0.199 s, lies outside the common times",
+        "the requested interval, from 0.5 s to 0.199 s, lies outside the common times",
     );
     t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
     t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
@@ -277,7 +277,7 @@ fn wrong_input_says_where_and_what_to_do() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
     assert!(
         error
-            .contains("a CSV file has the ending .csv, or its column behind its name: note:COLUMN"),
+            .contains("a CSV file has the extension .csv, or its column after its name: note:COLUMN"),
         "{error}"
     );
     t(
@@ -316,7 +316,7 @@ fn degenerate_and_long_signals_are_rated() {
     assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));
     assert_eq!(
         String::from_utf8_lossy(&text.stderr),
-        "warning: the reference is zero throughout: there is nothing to be relative to\n"
+        "warning: the reference is zero throughout: relative measures are undefined\n"
     );
     let of = rate(here, &["one.csv", "one.csv"]);
     assert_eq!((&of["iso18571"]["rating"], &of["cora"]["rating"]), (&1.0.into(), &1.0.into()));

@@ -246,7 +246,7 @@ fn every_command_takes_replicates() {
     assert_eq!(scatter["speeds"][0]["runs"], serde_json::json!(["a", "b"]));
     crumple_ok(here, &["train", "c.h5", "--group", "made", "-o", "m.model"]);
     let text = crumple_ok(here, &["predict", "m.model", "--speed", "12m/s"]);
-    assert!(text.contains("scatter between equal runs ±"), "{text}");
+    assert!(text.contains("scatter between repeated runs ±"), "{text}");
     crumple_ok(here, &["export", "m.model", "--speed", "12m/s", "-o", "m.csv"]);
     let all = ["compare", "c.h5", "--group", "made", "--speed", "12m/s", "--nsdm-seeds", "0"];
     crumple_ok(here, &all);

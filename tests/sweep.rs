@@ -439,7 +439,7 @@ fn items_that_fail_are_rows_with_their_reason() {
     let output = crumple_in(folder.path(), &["sweep", "s.toml", "-o", "out.csv"]);
     assert_eq!(output.status.code(), Some(0));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("4 of 6 items failed; their rows say why"), "{error}");
+    assert!(error.contains("4 of 6 items failed; their rows give the reason"), "{error}");
     assert!(error.contains("item 1: the mass of A1 is 0 kg: expected more than 0"), "{error}");
     let (_, rows) = rows(&folder.text("out.csv"));
     let status: Vec<&str> = rows.iter().map(|r| r[r.len() - 2].as_str()).collect();

@@ -55,14 +55,14 @@ pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, Strin
     let (over, preferred) = match purpose {
         Purpose::Vehicle => ("", "the simplest"),
         Purpose::Train => {
-            (" with the ends of the range", "the simplest that follows the closing speed")
+            (", ends of the range included,", "the simplest that follows the closing speed")
         }
     };
     let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
     let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
     if let Some(chosen) = tied.min_by_key(|m| rank(m)) {
         let reason = format!(
-            "mean force error{over} {:.2} %, the smallest is {:.2} %; of those within 10 % {preferred}",
+            "{preferred} of the models whose mean force error{over} is within 10 % of the smallest (its own {:.2} %, smallest {:.2} %)",
             chosen.force_l1 * 100.0,
             best * 100.0
         );
@@ -72,7 +72,7 @@ pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, Strin
     let chosen = means.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
     let compared: Vec<&str> = baselines().map(|m| m.model.as_str()).collect();
     let reason = format!(
-        "no model is at or below each of {} in both force and velocity; this one comes nearest (force {:.2} %, velocity {:.2} %)",
+        "no model is at least as good as each of {} in both force and velocity; this one comes closest (force {:.2} %, velocity {:.2} %)",
         compared.join(", "),
         chosen.force_l1 * 100.0,
         chosen.velocity_l1 * 100.0
@@ -158,13 +158,13 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
     let Gap { between_m_per_s: (low, high), expected_force_l1 } = gaps.next()?;
     let reason = match expected_force_l1 {
         Some(error) => format!(
-            "of all gaps between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), judged by the speeds at its ends when they were left out",
+            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at its two ends when left out",
             km_per_h(low),
             km_per_h(high),
             error * 100.0
         ),
         None => format!(
-            "the gap from {} to {} is the widest in ratio to its speeds, and there are too few speeds to leave one out",
+            "the interval from {} to {} is the widest relative to its speeds, and there are too few speeds to leave one out",
             km_per_h(low),
             km_per_h(high)
         ),

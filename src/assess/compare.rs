@@ -164,7 +164,7 @@ fn left_out_at<'a>(speed_m_per_s: f64, set: &'a TrainingSet) -> Result<LeftOutCa
         Ok(left_out) => Ok(left_out),
         Err(NotLeftOut::Truncated { case }) => Err(error!(
             Comparison,
-            "case \"{case}\" ended while loading: it is not a reference; compare at another speed"
+            "case \"{case}\" ended while loading and cannot serve as the reference: compare at another speed"
         )),
         Err(NotLeftOut::Motion(error)) => Err(error),
         Err(NotLeftOut::TooFew { .. }) => Err(too_few()),

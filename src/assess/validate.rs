@@ -380,7 +380,7 @@ pub(crate) fn add_nested(
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     if speeds.len() < 4 {
         validation.notes.push(format!(
-            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {}",
+            "auto has no errors of its own: choosing again without one speed needs at least 4, the group has {}",
             speeds.len()
         ));
         return Ok(());
@@ -431,7 +431,7 @@ pub(crate) fn add_nested(
 
 /// Why a model is not among the means.
 fn without_means(model: &str) -> String {
-    format!("{model} has no means and cannot be chosen: it has no answer at every inner speed")
+    format!("{model} has no means and cannot be chosen: it cannot predict every inner speed")
 }
 
 /// With too few speeds to leave one out.

@@ -84,7 +84,7 @@ impl Motion {
         if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
             return Err(error!(
                 Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
                 found = header.join(",")
             ));
         }
@@ -141,7 +141,7 @@ impl Motion {
         if bodies.is_empty() && interfaces.is_empty() {
             return Err(error!(
                 Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
                 found = header.join(",")
             ));
         }

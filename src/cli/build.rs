@@ -178,7 +178,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     }
     for run in runs {
         if let Some(renamed) = &run.renamed {
-            writeln!(out, "note: {}: is {renamed} in the database", run.name)?;
+            writeln!(out, "note: {}: called {renamed} in the database", run.name)?;
         }
     }
     for line in moved_lines(moved) {
@@ -187,7 +187,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     for group in earlier_groups {
         writeln!(
             out,
-            "note: group {group} was built from this manifest when it said something else; it stays: crumple db rm removes it"
+            "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
         )?;
     }
     writeln!(out, "wrote {database} (group {group})")
@@ -201,7 +201,7 @@ fn moved_lines(moved: &[Moved]) -> Vec<String> {
         if from.name == to.name {
             *groups.entry((&from.group, &to.group)).or_default() += 1;
         } else {
-            lines.push(format!("{from}: renamed since it was built, is {to} now"));
+            lines.push(format!("{from}: renamed since it was built, now {to}"));
         }
     }
     let group = |((from, to), count): (&(&str, &str), &usize)| {

@@ -445,7 +445,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
     let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!("; FE took {t:.0} s"));
     writeln!(
         out,
-        "velocity errors to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
+        "velocity errors up to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
         comparison.until_s * 1e3
     )?;
     let rows: Vec<Vec<String>> = comparison
@@ -473,7 +473,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
             cells
         })
         .collect();
-    let mut heading = vec!["method", "driven by", "mean", "mean, of first speed"];
+    let mut heading = vec!["method", "driven by", "mean", "mean, of initial speed"];
     heading.extend(vehicles.iter().map(|v| v.as_str()));
     heading.push("curves at");
     output::table(out, &heading, &rows)?;
@@ -483,7 +483,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
         .iter()
         .map(|row| format!("{} {:.2} ms", row.method, row.simulation_time_s * 1e3))
         .collect();
-    writeln!(out, "time of curves and run: {}", times.join(", "))?;
+    writeln!(out, "time for curves and run: {}", times.join(", "))?;
     writeln!(out, "\nspeeds in m/s")?;
     let step = comparison.time_s.len().div_ceil(SPEED_ROWS).max(1);
     let columns = |of: &BTreeMap<String, Vec<f64>>, i: usize| {

@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
     if let Some(edited) = edited_scenario(&args.output).filter(|_| !options.overwrite) {
         return Err(Failure::Usage(format!(
-            "{} exists and is not the demo's, as if it had been edited: name another folder with -o, or replace it with --overwrite",
+            "{} exists and differs from what the demo writes: name another folder with -o, or replace it with --overwrite",
             edited.display()
         )));
     }

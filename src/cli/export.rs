@@ -113,18 +113,18 @@ pub(super) struct Target {
 
 /// Forces of a curve.
 pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
-    ("body", ForceKind::Body, "The force that moves a body of one mass"),
+    ("body", ForceKind::Body, "The force that drives a body of one mass"),
     (
         "contact",
         ForceKind::Contact,
-        "What the obstacle feels: for bodies whose crush zone is a mass of its own",
+        "The force on the obstacle: for bodies whose crush zone is a separate mass",
     ),
 ];
 
 /// What a curve does beyond its maximal crush.
 const TAILS: &[(&str, Tail, &str)] = &[
     ("none", Tail::None, "Nothing: the last point is the maximal crush"),
-    ("hold", Tail::Hold, "Goes on along faster runs, or at the level of its last tenth"),
+    ("hold", Tail::Hold, "Continues along faster runs, or at the mean level of its last tenth"),
     ("bottom", Tail::Bottom, "The same, and then rises with the unloading stiffness"),
 ];
 
@@ -202,7 +202,7 @@ impl Target {
         }
         format.export(curves, &self.options(path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
-                Failure::Usage("the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into())
+                Failure::Usage("the curve has no force that drives a body of one mass (its runs record no velocities): use --force contact to export the force on the obstacle".into())
             } else {
                 error.into()
             }
@@ -236,7 +236,7 @@ impl Target {
             Err(Failure::Usage(format!(
                 "{} holds a whole model in SI: remove --units and --soften{}",
                 format.name,
-                if forced { " and --force: it is of the recipe's force" } else { "" }
+                if forced { " and --force: it holds the recipe's force" } else { "" }
             )))
         } else {
             Ok(())

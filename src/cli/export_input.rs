@@ -80,7 +80,7 @@ impl Input {
         match (self, is_said) {
             (Self::File(_), _) | (_, false) => Ok(()),
             (_, true) => Err(Failure::Usage(
-                "--kind, --other-mass, --unloading, --from, --curve, --deflection-column, --force-column, --time-column, --accept-energy and --input-units are for the file of a measured or legacy curve: curves of crumple predict, models and databases say these themselves".into(),
+                "--kind, --other-mass, --unloading, --from, --curve, --deflection-column, --force-column, --time-column, --accept-energy and --input-units apply only to the file of a measured or legacy curve: predicted curves, models and databases hold these values".into(),
             )),
         }
     }
@@ -142,7 +142,7 @@ impl Chosen<'_> {
             || !self.cases.is_empty();
         if is_asked {
             Err(Failure::Usage(format!(
-                "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
+                "{what} has one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
             )))
         } else {
             Ok(())
@@ -162,7 +162,7 @@ impl Chosen<'_> {
         let of_curve = self.asks_a_model() || !self.speeds_m_per_s.is_empty();
         match (of_database, of_curve && !is_table) {
             (true, _) => Err(Failure::Usage(
-                "--group and --case are for a database: a model is of one group".into(),
+                "--group and --case are for a database: a model has only one group".into(),
             )),
             (false, true) => Err(Failure::Usage(
                 "this holds a whole model: remove --speed, --mass, --max-crush, --extrapolate, --parameter".into(),
@@ -173,7 +173,7 @@ impl Chosen<'_> {
 
     fn of_model(&self, model: &Model) -> Result<Vec<ExportInput>, Failure> {
         if self.group.is_some() || !self.cases.is_empty() {
-            let message = "--group and --case are for a database: a model is of one group";
+            let message = "--group and --case are for a database: a model has only one group";
             return Err(Failure::Usage(message.into()));
         }
         if self.speeds_m_per_s.is_empty() {
@@ -195,7 +195,7 @@ impl Chosen<'_> {
     /// The case that a measured or legacy curve's file makes.
     fn of_file(&self, path: &Path) -> Result<Case, Failure> {
         if self.speeds_m_per_s.len() > 1 || self.cases.len() > 1 {
-            let message = "a file holds the curve of one impact: say one --speed and one --case";
+            let message = "a file holds the curve of one impact: give one --speed and one --case";
             return Err(Failure::Usage(message.into()));
         }
         if self.query.rule.is_some() || self.query.extrapolate {

@@ -129,7 +129,7 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
             options.print(|out| {
                 writeln!(
                     out,
-                    "wrote {scenario}: put your trains in, then crumple simulate {scenario}"
+                    "wrote {scenario}: put in your trains, then run crumple simulate {scenario}"
                 )
             })?;
         }
@@ -156,11 +156,11 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
             group: known.group.clone(),
         },
     };
-    let bar = progress::Bar::new(options, "looking into runs");
+    let bar = progress::Bar::new(options, "examining runs");
     let done = AtomicUsize::new(0);
     let proposal = init::propose(&request, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        bar.step(&format!("{done} runs looked over, last {name}"));
+        bar.step(&format!("{done} runs examined, last {name}"));
     });
     bar.end();
     let proposal = proposal?;
@@ -215,9 +215,9 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     }
     let runs = output::counted(proposal.runs.len(), "run");
     let next = match proposal.missing().len() {
-        0 => "look at what is guessed, then crumple build".into(),
+        0 => "check the guessed values, then run crumple build".into(),
         lines => format!(
-            "not complete, {} to fill in or to give as an option: then crumple build",
+            "incomplete, {} to fill in or to give as an option; then run crumple build",
             output::counted(lines, "line")
         ),
     };

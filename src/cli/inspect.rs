@@ -19,7 +19,7 @@ use crate::solver::runs::{output_files, run_folders};
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
 #[command(
-    after_help = "Titles that a file does not give are taken from the keyword deck beside it.
+    after_help = "Titles missing from a file are taken from the keyword deck next to it.
 Examples:
   crumple inspect run/nodout
   crumple inspect run/main.k               # what a deck says of its run
@@ -322,7 +322,7 @@ pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
         let failed = |e| Failure::Failed(format!("{}: {e}", path.display()).into());
         let found = run_folders(path).map_err(failed)?;
         if found.runs.is_empty() {
-            let message = format!("{}: no folder in it holds solver files", path.display());
+            let message = format!("{}: none of its folders holds solver files", path.display());
             return Err(Failure::Failed(message.into()));
         }
         for folder in found.runs {

@@ -43,7 +43,7 @@ pub(super) struct Args {
     /// Value of a further parameter of the training cases, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
     parameter: Vec<(String, Parameter)>,
-    /// Scale the force so that the curve takes up the impact's kinetic energy (by 0.8 to 1.25)
+    /// Scale the force so that the curve absorbs the impact's kinetic energy (by 0.8 to 1.25)
     #[arg(long)]
     energy_correct: bool,
     /// Answer further outside the training speeds than a third of their range
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.target.check(&formats)?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
+        return Err(Failure::Usage("standard output can take only one of them: one \"-o -\", or --json".into()));
     }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
@@ -165,7 +165,7 @@ fn files<'a>(
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
     let (one, how) = match band.left_out {
-        LeftOutSpeeds::Inner => ("curve", "left out between others, for the width of the gap here"),
+        LeftOutSpeeds::Inner => ("curve", "left out in turn, scaled to the interval between the neighbouring speeds"),
         LeftOutSpeeds::Ends => ("end", "of the range left out, growing with the distance"),
     };
     format!("{place}, from {} {how}", counted(band.curves, one))
@@ -206,14 +206,14 @@ fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         let Some(scatter) = band.scatter else { continue };
         writeln!(
             out,
-            "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
+            "  of this              interpolation ±{:.1} %, scatter between repeated runs ±{:.1} %",
             band.interpolation_share() * 100.0,
             scatter.pointwise_share * 100.0
         )?;
     }
     let provenance = &curve.provenance;
     if provenance.band.is_some() && provenance.body_band.is_none() && curve.body_force_n.is_some() {
-        writeln!(out, "  band of body force   not known until the model is trained anew")?;
+        writeln!(out, "  band of body force   unknown until the model is trained again")?;
     }
     Ok(())
 }

@@ -241,8 +241,8 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
     let both = &args.both;
     let [a_is_table, b_is_table] = is_table;
     let (any_table, all_tables) = (a_is_table || b_is_table, a_is_table && b_is_table);
-    let column = "names a column of a CSV file, but that is a solver's: use --id and --component";
-    let history = "chooses a history of a solver's file, but that is a CSV: use --column";
+    let column = "names a column of a CSV file, but this is a solver file: use --id and --component";
+    let history = "chooses a history of a solver file, but this is a CSV file: use --column";
     for (option, given, fits, why) in [
         ("--column", both.column.is_some(), any_table, column),
         ("--id", both.id.is_some(), !all_tables, history),
@@ -268,7 +268,7 @@ fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Re
         return Ok(());
     }
     Err(failed(format!(
-        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each behind its name, such as {},time=s and {},time=ms",
+        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each after its name, such as {},time=s and {},time=ms",
         a.path.display(),
         b.path.display(),
         a.path.display(),
@@ -296,7 +296,7 @@ impl Wanted<'_> {
             {
                 match self.read_table() {
                     Err(_) if self.column.is_none() => Err(failed(format!(
-                        "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",
+                        "{error}; a CSV file has the extension .csv, or its column after its name: {}:COLUMN",
                         self.path.display()
                     ))),
                     read => read,
@@ -312,7 +312,7 @@ impl Wanted<'_> {
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
         let read = formats::history(&text, self.column).map_err(|error| {
             let how = if error.is_about("column") {
-                format!(" behind the file's name: {path}:COLUMN")
+                format!(" after the file's name: {path}:COLUMN")
             } else {
                 String::new()
             };
@@ -361,7 +361,7 @@ impl Wanted<'_> {
             [] => return Err(failed(format!("{path}: it holds no history"))),
             [first, .., last] => {
                 return Err(failed(format!(
-                    "{path}: {} histories fit, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
+                    "{path}: {} histories match, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
                     file.histories.len(),
                     first.label(),
                     last.label()
@@ -371,7 +371,7 @@ impl Wanted<'_> {
         let label = history.label();
         if let Some(state) = history.values.iter().position(|v| v.is_nan()) {
             return Err(failed(format!(
-                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose a stretch without it by --from and --to, after writing the rest with crumple histories",
+                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose an interval without it with --from and --to, after writing the rest with crumple histories",
                 state + 1,
                 history.time[state]
             )));
@@ -448,7 +448,7 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
         };
         row(&format!("peak {}", number + 1), Some(value), more);
     }
-    row("integral", rating.integral_error.map(percent), "of p over that of r, less 1".into());
+    row("integral", rating.integral_error.map(percent), "of p over that of r, minus 1".into());
     let mut errors = |name: &str, of: Option<MagnitudePhase>| {
         let parts = of.map(|e| format!("M {:.4}, P {:.4}", e.magnitude, e.phase));
         row(name, of.map(|e| format!("{:.4}", e.combined)), parts.unwrap_or_default());

@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     let report = write(&sweep, output, &options, global)?;
     if !report.is_complete() {
         let message = format!(
-            "stopped behind {} of {} rows; the same command goes on there",
+            "stopped after {} of {} rows; the same command resumes there",
             report.done, report.rows
         );
         return Err(Failure::Failed(message.into()));
@@ -236,7 +236,7 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
     let Document { report, seconds, output } = document;
     if report.failed > 0 {
         let mut text =
-            format!("{} of {} items failed; their rows say why", report.failed, report.rows);
+            format!("{} of {} items failed; their rows give the reason", report.failed, report.rows);
         for (item, message) in &report.messages {
             text.push_str(&format!("\n  item {item}: {message}"));
         }
@@ -255,8 +255,8 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
             table(out, &report.columns)?;
             let resumed = match report.resumed {
                 0 => String::new(),
-                n if n == report.rows => ", all of an earlier run".into(),
-                n => format!(", {n} of them of an earlier run"),
+                n if n == report.rows => ", all from an earlier run".into(),
+                n => format!(", {n} of them from an earlier run"),
             };
             writeln!(
                 out,

@@ -185,7 +185,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     if model.cases.len() < 3 {
         options.warn(&format!(
-            "the group has {}: with fewer than 3 no speed can be left out to see how good the model is",
+            "the group has {}: with fewer than 3, no speed can be left out to assess the model",
             counted(model.cases.len(), "curve")
         ));
     }
@@ -248,7 +248,7 @@ pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind) -> Strin
     let (end_m, all_kg) = stopped.in_all();
     let of = match kind {
         SpeedKind::Wall => "of the crush zone",
-        SpeedKind::Closing => "of reduced mass, half of what one of two equal ends has,",
+        SpeedKind::Closing => "of reduced mass (half that of one of two equal ends)",
     };
     let scatter_kg = stopped.residual_kg;
     format!(

@@ -151,7 +151,7 @@ fn validated(
     if args.next {
         next = next_run(&TrainingSet::new(group, cases)?, &validation);
         if next.is_none() {
-            let note = "there is no gap to run in: a second speed, far from the first, comes first";
+            let note = "there is no interval between speeds yet: first run a second speed, far from the first";
             validation.notes.push(note.into());
         }
     }
@@ -202,7 +202,7 @@ fn print_group(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
 }
 
 fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {
-    writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+    writeln!(out, "\nnext run: {}: {}", km_per_h(next.speed_m_per_s), next.reason)?;
     let then = next.other_gaps.iter().filter_map(|gap| {
         let (low, high) = gap.between_m_per_s;
         let error = gap.expected_force_l1? * 100.0;
@@ -229,11 +229,11 @@ pub(super) fn print_summary(out: &mut dyn Write, validation: &Validation) -> io:
     for (force, band) in bands(validation) {
         let span = km_per_h(band.span_m_per_s);
         let place = match band.left_out {
-            LeftOutSpeeds::Inner => format!("in a gap of {span}"),
-            LeftOutSpeeds::Ends => format!("{span} outside"),
+            LeftOutSpeeds::Inner => format!("between speeds {span} apart"),
+            LeftOutSpeeds::Ends => format!("{span} outside the range"),
         };
         let coverage = match band.coverage {
-            Some(share) => format!("covers {:.0} % of the points left out", share * 100.0),
+            Some(share) => format!("covers {:.0} % of the left-out points", share * 100.0),
             None => "not checked".into(),
         };
         writeln!(
@@ -298,7 +298,7 @@ pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::R
         let speeds = first.speeds;
         writeln!(
             out,
-            "{group}: means over {speeds} inner speeds left out in turn; the body's force drives the runs"
+            "{group}: means over {speeds} inner speeds left out in turn; the body force drives the runs"
         )?;
         let by_rule = MaxCrushRule::ALL.map(|rule| format!("by {}", rule.name()));
         let mut heading = vec!["model", "force", "energy", "crush"];
@@ -382,20 +382,20 @@ fn band_line(force: &str, band: &Band) -> String {
         LeftOutSpeeds::Inner => (
             "curve",
             format!(
-                "in a gap of {span} between training speeds, in others by its power {POWER_OF_GAP}"
+                "between training speeds {span} apart, otherwise scaled by the interval to the power {POWER_OF_GAP}"
             ),
         ),
         LeftOutSpeeds::Ends => {
-            ("end", format!("{span} outside the training speeds, elsewhere in proportion"))
+            ("end", format!("{span} outside the training speeds, elsewhere in proportion to the distance"))
         }
     };
     let coverage = match band.coverage {
-        Some(share) => format!("covers {} of the points of the others left out", percent(share)),
+        Some(share) => format!("covers {} of the points of the other left-out curves", percent(share)),
         None => format!("one {of} cannot be checked against others"),
     };
     let parts = match band.scatter {
         Some(scatter) => format!(
-            " (interpolation ±{}, scatter of equal runs ±{}, which no gap changes)",
+            " (interpolation ±{}, scatter of repeated runs ±{}, whatever the interval)",
             percent(band.interpolation_share()),
             percent(scatter.pointwise_share)
         ),

@@ -62,7 +62,7 @@ pub(crate) fn merge(
     if !is_input && is_there(output)? {
         return Err(error!(
             Database,
-            "{} is there already: name it among the databases that are joined, or write to another file",
+            "{} exists already: name it among the databases to be joined, or write to another file",
             output.display()
         ));
     }
@@ -202,7 +202,7 @@ impl Join {
             let (path, names) = (path.display(), conflicts.join(", "));
             return Err(error!(
                 Database,
-                "{path}: other curves have these names already: {names}: rename the new ones with --rename, or take their place with --replace"
+                "{path}: other curves have these names already: {names}: rename the new ones with --rename, or replace the old ones with --replace"
             ));
         }
         self.database.change(|case| {

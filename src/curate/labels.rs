@@ -44,7 +44,7 @@ impl Labels {
             } else if tag.contains(|c: char| c.is_control() || [',', ';'].contains(&c)) {
                 "it may not contain \",\", \";\" or control characters"
             } else if tag.chars().count() > MAX_TAG {
-                "it has more than 100 characters; say it in a note"
+                "it has more than 100 characters; put it in a note"
             } else {
                 continue;
             };

@@ -72,7 +72,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         .take(NAMED)
         .map(|spell| {
             format!(
-                "contact: not the {} at {}, with {} of the impulse; contact begins at {} (contact_time = \"…ms\" in the run says otherwise)",
+                "contact: ignored the {} at {}, with {} of the impulse; contact starts at {} (contact_time = \"…ms\" in the run overrides this)",
                 spell.shown(),
                 milliseconds(time_s[spell.first]),
                 percent(spell.impulse_ns / total_ns),
@@ -81,7 +81,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         })
         .collect();
     if main > NAMED {
-        warnings.push(format!("contact: {} more spells of force lie before it", main - NAMED));
+        warnings.push(format!("contact: {} more force pulses precede it", main - NAMED));
     }
     let first = pieces.iter().find(|p| p.first == contact.first);
     let second = pieces.iter().find(|p| p.first > contact.first && p.first <= contact.last);
@@ -89,7 +89,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         && first.impulse_ns < SMALL_SHARE * contact.impulse_ns
     {
         warnings.push(format!(
-            "contact: it begins at {} with the {}, {} of the impulse, and goes on at {}: if that is noise, say contact_time = \"…ms\" in the run",
+            "contact: starts at {} with the {}, {} of the impulse, and resumes at {}: if that is noise, set contact_time = \"…ms\" in the run",
             milliseconds(crossing_s),
             first.shown(),
             percent(first.impulse_ns / contact.impulse_ns),
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(
             found.warnings,
             [
-                "contact: not the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact begins at 49.005 ms (contact_time = \"…ms\" in the run says otherwise)"
+                "contact: ignored the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact starts at 49.005 ms (contact_time = \"…ms\" in the run overrides this)"
             ]
         );
     }

@@ -70,7 +70,7 @@ pub(crate) struct EnergyBalance {
 /// Why a run cannot be what the manifest says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{found}: such an impact cannot be; {}. Correct the manifest, or take the run as it is with accept_energy = true",
+    "{found}: such an impact is impossible; {}. Correct the manifest, or take the run as it is with accept_energy = true",
     cause.of_run()
 )]
 pub struct ImpossibleRun {
@@ -124,7 +124,7 @@ impl Cause {
                 format!("likely the units: read as \"{units}\" it would fit")
             }
             Self::OtherUnits => {
-                "likely the units of the solver's files are others than the study says".into()
+                "likely the units: the solver files have others than the study states".into()
             }
             Self::RecordedSpeed(speed) => format!("likely the speed: the record's is {speed}"),
             Self::OtherRun(run) => format!("likely speed, deck or files of the run {run}"),
@@ -136,7 +136,7 @@ impl Cause {
             ),
             Self::Histories(cause) => (*cause).into(),
             Self::Unknown(mass) => {
-                format!("look at units, speed and mass{mass}, and at node and force of the recipe")
+                format!("check units, speed and mass{mass}, and node and force of the recipe")
             }
         }
     }
@@ -144,7 +144,7 @@ impl Cause {
     /// In words for somebody who has the curve in a file.
     fn of_file(&self) -> String {
         match self {
-            Self::OtherUnits => "likely the units of its columns are others".into(),
+            Self::OtherUnits => "likely the units of its columns".into(),
             Self::Half(mass) => format!(
                 "likely the mass{mass}, half a structure taken for a whole one, or the force of one of two sides"
             ),
@@ -152,7 +152,7 @@ impl Cause {
                 "likely the speed of one body taken for the closing speed of two (--kind), or the mass{mass}"
             ),
             Self::Unknown(mass) => format!(
-                "look at units, speed and mass{mass}; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body"
+                "check units, speed and mass{mass}; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body"
             ),
             Self::FittingUnits(_)
             | Self::RecordedSpeed(_)
@@ -212,7 +212,7 @@ impl StatedConditions<'_> {
         }
         if let Some(work) = balance.work {
             found.push(format!(
-                "the curve takes up {} times the kinetic energy of {} at {}",
+                "the curve absorbs {} times the kinetic energy of {} at {}",
                 significant(work),
                 self.shown_mass(),
                 self.speed
@@ -268,7 +268,7 @@ impl StatedConditions<'_> {
             .impulse
             .map(|i| {
                 format!(
-                    " (impulse and speeds ask for {} t)",
+                    " (impulse and speeds give {} t)",
                     significant(i * self.masses.body_kg / 1e3)
                 )
             })

@@ -23,7 +23,7 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     let (found, cause) = (impossible.found(), impossible.cause_in_file());
     error!(
         Other,
-        "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+        "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
     )
 }
 
@@ -37,11 +37,11 @@ fn of_table(error: ExtractError) -> Error {
         ),
         ExtractError::NoContact => error!(
             Other,
-            "the force of the record is never positive, which is not a contact: look at its column"
+            "the force of the record is never positive, which is not a contact: check its column"
         ),
         ExtractError::NoDeflection => error!(
             Other,
-            "the deflection does not grow after contact: look at its column, and whether it is compression"
+            "the deflection does not grow after contact: check its column, and whether it is compression"
         ),
         ExtractError::Curve(error) => error,
         other => Error::below(ErrorCode::Other, other),
@@ -106,7 +106,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
     let audit = energy::audit(&original, impact.masses, impact.speed);
     if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
         warnings.push(format!(
-            "energy: the curve takes up {:.1} % of the kinetic energy",
+            "energy: the curve absorbs {:.1} % of the kinetic energy",
             audit.ratio() * 100.0
         ));
     }
@@ -150,7 +150,7 @@ fn recorded(
 ) -> Result<(RecordedCurves, Quality), Error> {
     let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
     let contact = begins_in_contact(time_s, table.force_n).then(|| {
-        notes.push("contact: the record begins with it".into());
+        notes.push("contact: the record starts with it".into());
         StatedContact::Time { s: time_s[0] }
     });
     let common = Sampling::default();
@@ -187,7 +187,7 @@ fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec
             let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
             return Err(error!(
                 Other,
-                "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+                "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
             ));
         }
         warnings.push(format!("accept_energy: {found}"));
@@ -206,7 +206,7 @@ fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
     let begins = closing_m_per_s.iter().take(FIRST_STATES).copied().fold(0.0, f64::max);
     let ratio = begins / stated_m_per_s;
     (!(0.8..=1.25).contains(&ratio)).then(|| {
-        format!("its deflection begins with {begins:.4} m/s, {stated_m_per_s:.4} m/s is stated")
+        format!("its deflection starts at {begins:.4} m/s, but {stated_m_per_s:.4} m/s is stated")
     })
 }
 
@@ -218,7 +218,7 @@ const FIRST_STATES: usize = 4;
 fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String> {
     match found {
         Some(found) => Ok(format!(
-            "unloading: {:.4} MN/m as the record has it, {:.4} MN/m is stated",
+            "unloading: {} in the record, {} is stated",
             found / 1e6,
             stated / 1e6
         )),
@@ -340,7 +340,7 @@ mod tests {
         let (d, f) = ([0.0, 0.2, 0.4, 0.5], [0.0, 1e6, 2e6, 3e6]);
         let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
         let error = from_table(&table, &impact(10.0, 24e3)).unwrap_err().to_string();
-        assert!(error.contains("the curve takes up 0.5417 times the kinetic energy"), "{error}");
+        assert!(error.contains("the curve absorbs 0.5417 times the kinetic energy"), "{error}");
         assert!(error.contains("--accept-energy"), "{error}");
         let accepted = Impact { accept_energy: true, ..impact(10.0, 24e3) };
         assert!(from_table(&table, &accepted).unwrap().1.warnings[1].starts_with("accept_energy"));
@@ -350,7 +350,7 @@ mod tests {
         // A force of next to nothing at the end would take for ever.
         let crawls = Table { force_n: &[1e6, 1e-9, 1e-9, 1e-9], ..table };
         let error = from_table(&crawls, &accepted).unwrap_err().to_string();
-        assert!(error.contains("a body hardly moves any more"), "{error}");
+        assert!(error.contains("a body almost stops moving"), "{error}");
         let soft = Impact { unloading_stiffness_n_per_m: Some(1e6), ..accepted };
         let error = from_table(&table, &soft).unwrap_err().to_string();
         assert!(error.contains("1000000 N/m is softer than the line"), "{error}");

@@ -115,7 +115,7 @@ fn copies(cases: &[Case]) -> Vec<Remark> {
                 case.id.name.clone(),
                 "copy",
                 format!(
-                    "is a copy of {}: the same values at every state, no repetition of the run; scatter counts them once",
+                    "is a copy of {}: the same values at every state, so not a repeated run; scatter counts them once",
                     one.id.name
                 ),
             )),

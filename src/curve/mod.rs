@@ -134,7 +134,7 @@ impl ForceKind {
         match self {
             Self::Body => "bodies of one mass",
             Self::Contact => {
-                "bodies whose crush zone is a mass of its own; one rigid mass does not follow it"
+                "bodies whose crush zone is a separate mass, not a single rigid mass"
             }
         }
     }
@@ -219,7 +219,7 @@ impl EnergyAudit {
     /// Imbalance over which a warning is due.
     pub(crate) const TOLERANCE: f64 = 0.05;
 
-    /// `W/E`; 1 where the curve takes up exactly the impact's energy.
+    /// `W/E`; 1 where the curve absorbs exactly the impact's energy.
     pub fn ratio(&self) -> f64 {
         self.work_j / self.kinetic_j
     }

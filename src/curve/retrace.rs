@@ -44,7 +44,7 @@ pub struct Impact {
 pub(super) fn endless() -> Error {
     error!(
         Other,
-        "along this curve a body hardly moves any more before it has stopped: remove the points whose force is next to nothing, or give the record with its times"
+        "along this curve a body almost stops moving before it is at rest: remove the points whose force is almost zero, or give the record with its times"
     )
 }
 
@@ -90,7 +90,7 @@ pub(super) fn retrace(
         let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
         return Err(error!(
             Other,
-            "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points behind the end of the force, or give the record with its times",
+            "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points after the end of the force, or give the record with its times",
             from_m = d[last.map_or(0, |i| i + 1)]
         ));
     }
@@ -100,7 +100,7 @@ pub(super) fn retrace(
     let mut builder =
         MotionBuilder { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
     builder.motion.notes.push(
-        "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
+        "motion: reconstructed, the file has no times: the maximum deflection is taken as the maximum crush, v² = v0² (1 − W(d)/W(end))"
             .into(),
     );
     if table.body_force_n.is_some() {
@@ -236,7 +236,7 @@ impl MotionBuilder {
         let stiffness = match stated {
             Some(stiffness) => {
                 self.motion.notes.push(format!(
-                    "unloading: a line of {:.4} MN/m from the largest deflection",
+                    "unloading: a line of {} from the maximum deflection",
                     stiffness / 1e6
                 ));
                 stiffness
@@ -250,7 +250,7 @@ impl MotionBuilder {
                     ));
                 }
                 self.motion.warnings.push(format!(
-                    "unloading: neither the file nor --unloading gives it; the steepest rise, {:.4} MN/m, is used: say --unloading …MN/m",
+                    "unloading: neither the file nor --unloading gives it; the steepest rise, {}, is used: give --unloading …MN/m",
                     steepest / 1e6
                 ));
                 steepest
@@ -265,7 +265,7 @@ impl MotionBuilder {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
             return Err(error!(
                 Other,
-                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which no crash is: give a stiffer one with --unloading"
+                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: give a stiffer one with --unloading"
             ));
         }
         let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];

@@ -182,10 +182,10 @@ impl Findings<'_> {
             {
                 let odd = least_like_neighbours(&values);
                 let which = odd.map_or(String::new(), |i| {
-                    format!("; the one least like its neighbours is {path}[{i}] = {}", values[i])
+                    format!("; the one that fits its neighbours least is {path}[{i}] = {}", values[i])
                 });
                 let message =
-                    format!("the values of {path} are not those that were written{which}");
+                    format!("the values of {path} differ from those that were written{which}");
                 self.add("altered", Some(path), odd, message);
             }
         }
@@ -196,7 +196,7 @@ impl Findings<'_> {
         let FoundCase { case, attributes, hashes } = found;
         let content = Content::of(case)?;
         if hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES) {
-            let message = "its attributes are not those that were written".into();
+            let message = "its attributes differ from those that were written".into();
             self.add("altered", None, None, message);
         }
         self.attributes(&content, attributes);
@@ -387,7 +387,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     let (is_listed, is_there): (HashSet<&str>, HashSet<&str>) =
         (in_list.iter().copied().collect(), there.iter().copied().collect());
     for name in in_list.iter().filter(|name| !is_there.contains(*name)) {
-        add(name, "case_list", "is listed in the group's cases, but is not there".into());
+        add(name, "case_list", "is listed in the group's cases, but is missing".into());
     }
     for name in there.iter().filter(|name| !is_listed.contains(*name)) {
         add(name, "case_list", "is not listed in the group's cases".into());
@@ -422,7 +422,7 @@ fn of_stopped_mass(
     };
     if let Some((attribute, why)) = group::differs(&attributes, name, cases) {
         let message = format!(
-            "the group's {attribute} is not that of its cases ({why}): the next change of the group by crumple writes it anew"
+            "the group's {attribute} is not that of its cases ({why}): crumple rewrites it at the next change of the group"
         );
         Findings { group: name, case: &first.id.name, list }.add(
             "stopped_mass_differs",

@@ -30,7 +30,7 @@ pub(super) fn write_keeping(
     let would_drop = |what: String| {
         error!(
             Database,
-            "{} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database",
+            "{} holds objects that crumple did not write and would lose by rewriting the file: {what}; the database is unchanged: copy them to another file and delete them here, or build into a new database",
             path.display()
         )
     };

@@ -326,7 +326,7 @@ impl<'a> Opened<'a> {
         if !(OLDEST..=VERSION).contains(&found) {
             return Err(error!(
                 Database,
-                "{}: its layout has version {found}, this program reads versions {OLDEST} to {VERSION}: build the database anew with crumple build",
+                "{}: its layout has version {found}, this program reads versions {OLDEST} to {VERSION}: build the database again with crumple build",
                 path.display()
             ));
         }

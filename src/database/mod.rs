@@ -384,7 +384,7 @@ fn changed(path: &Path, case: &CasePath, count: usize) -> Error {
     let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
     error!(
         Database,
-        "{}: the values of case {case}{more} are not those that were written, by the fingerprint beside them: crumple db check shows which; build the case anew or remove it (crumple db rm), or go on with --accept-changed",
+        "{}: the values of case {case}{more} do not match their fingerprint: crumple db check shows which; build the case again or remove it (crumple db rm), or use --accept-changed",
         path.display()
     )
 }

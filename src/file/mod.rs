@@ -158,28 +158,28 @@ pub(super) fn explained(path: &Path, source: io::Error) -> io::Error {
     let folder = folder_of(path);
     let message = match (source.kind(), fs::metadata(folder)) {
         (io::ErrorKind::FileTooLarge, _) if source.raw_os_error().is_some() => {
-            "the file would be larger than the limit of this session (ulimit -f) or of the disk"
+            "the file would be larger than the limit of this session (ulimit -f) or the disk allows"
                 .into()
         }
         (io::ErrorKind::NotFound | io::ErrorKind::NotADirectory, Err(_)) => {
             match folder.ancestors().find(|part| part.exists()) {
                 Some(part) if !part.is_dir() => {
-                    format!("{} is a file and no folder: name another", part.display())
+                    format!("{} is a file, not a folder: name another", part.display())
                 }
                 _ => format!(
-                    "the folder {} does not exist: make it, or name another",
+                    "the folder {} does not exist: create it, or name another",
                     folder.display()
                 ),
             }
         }
         (io::ErrorKind::NotADirectory, Ok(meta)) if !meta.is_dir() => {
-            format!("{} is a file and no folder: name another", folder.display())
+            format!("{} is a file, not a folder: name another", folder.display())
         }
         (io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem, Ok(meta))
             if meta.is_dir() && source.raw_os_error().is_some() =>
         {
             format!(
-                "nothing can be written in the folder {} ({source}): name another",
+                "cannot write in the folder {} ({source}): name another",
                 folder.display()
             )
         }

@@ -12,7 +12,7 @@ use crate::error::{Error, error};
 /// The error of a file that cannot be written; what was there before still is.
 pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
     let source = explained(path, source);
-    let unchanged = if path.is_file() { "; what was there before is unchanged" } else { "" };
+    let unchanged = if path.is_file() { "; the previous content is unchanged" } else { "" };
     error!(Io, "cannot write {}: {source}{unchanged}", path.display()).caused_by(source)
 }
 
@@ -115,7 +115,7 @@ impl Draft {
                 return Err(io::Error::new(io::ErrorKind::IsADirectory, message));
             }
             Some(meta) if !meta.is_file() => {
-                let message = "this is a device or a pipe, which takes no file of this kind";
+                let message = "this is a device or a pipe, which cannot hold a file of this kind";
                 return Err(io::Error::new(io::ErrorKind::Unsupported, message));
             }
             there => there.map(|meta| meta.permissions()),
@@ -180,7 +180,7 @@ mod tests {
         let error = write_whole(Path::new("/no/such/folder/a.txt"), b"x").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "cannot write /no/such/folder/a.txt: the folder /no/such/folder does not exist: make it, or name another"
+            "cannot write /no/such/folder/a.txt: the folder /no/such/folder does not exist: create it, or name another"
         );
     }
 
@@ -212,7 +212,7 @@ mod tests {
             file.write_all(b"first")?;
             let error = write_whole(&path, b"second").unwrap_err().to_string();
             assert!(error.contains("a.csv: another process is writing it: try again"), "{error}");
-            assert!(error.ends_with("what was there before is unchanged"), "{error}");
+            assert!(error.ends_with("the previous content is unchanged"), "{error}");
             assert_eq!(fs::read(&path).unwrap(), b"old");
             Ok(Some(()))
         })

@@ -29,7 +29,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let loading = thinned(&curve.loading, MOST_ROWS - 1, curve.end)?;
         if loading.deflection_m().len() < given {
             notes.push(format!(
-                "{}: {} of {given} points are kept (CalculiX takes {MOST_ROWS} rows), with the same energy to the maximal crush",
+                "{}: {} of {given} points are kept (CalculiX takes {MOST_ROWS} rows), with the same energy up to the maximum crush",
                 curve.headline(),
                 loading.deflection_m().len()
             ));

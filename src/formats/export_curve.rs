@@ -79,7 +79,7 @@ impl ExportCurve {
                 Softened::ImpossibleRun => {
                     return Err(error!(
                         Export,
-                        "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
+                        "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
                         stiffness / 1e6
                     ));
                 }
@@ -101,7 +101,7 @@ impl ExportCurve {
         let no_band = match (band.is_some(), input.curve.force_low_n.is_some()) {
             (true, _) => softening.map(|_| "it is not that of a softened curve"),
             (false, true) => Some(
-                "only that of the contact force is known (--force contact), until the model is trained anew",
+                "only that of the contact force is known (--force contact), until the model is trained again",
             ),
             (false, false) => Some("the model gives none here"),
         };
@@ -142,7 +142,7 @@ impl ExportCurve {
     pub fn softening_note(&self) -> Option<String> {
         let (before, after) = self.softening?;
         Some(format!(
-            "{}: flanks steeper than {:.1} MN/m have been made less steep, with the same energy to the maximal crush; the largest force goes from {:.3} to {:.3} MN",
+            "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}",
             self.headline(),
             self.stiffness_n_per_m() / 1e6,
             before / 1e6,
@@ -238,7 +238,7 @@ impl ExportCurve {
         let theirs = self.restitution(unloading);
         let how = match unloading {
             TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),
-            TargetUnloading::Line(k) => format!("it unloads with {:.1} MN/m", k / 1e6),
+            TargetUnloading::Line(k) => format!("it unloads with {}", k / 1e6),
         };
         format!(
             "{}: restitution {theirs:.3} in {target} ({how}), {ours:.3} in crumple's own runs",
@@ -254,7 +254,7 @@ impl ExportCurve {
         let mut notes = vec![self.restitution_note(target, unloading)];
         if steepest > own * 1.01 {
             notes.push(format!(
-                "{target} unloads with the steepest rise, {:.1} MN/m, which is more than the curve's own {:.1} MN/m: --soften makes the steep flank less steep at equal energy{other}",
+                "{target} unloads with the steepest rise, {}, which is more than the curve's own {}: --soften makes the steep rise less steep at equal energy{other}",
                 steepest / 1e6,
                 own / 1e6
             ));

@@ -81,7 +81,7 @@ pub const FORMATS: &[Format] = &[
     Format::new(
         "json",
         &["json"],
-        "predicted curve with everything known of it, SI (master format)",
+        "predicted curve with all its data, SI (master format)",
         Tail::None,
         Writer::Whole(json::write),
     ),
@@ -149,7 +149,7 @@ pub const FORMATS: &[Format] = &[
     Format::new(
         "fmi3",
         &["fmu"],
-        "the same of FMI 3.0",
+        "the same for FMI 3.0",
         Tail::Bottom,
         Writer::Each(fmu_export::write_fmi3),
     ),
@@ -377,7 +377,7 @@ impl Format {
         };
         let mut exported = with_names_of_their_own(exported);
         if options.deck && options.force == ForceKind::Contact {
-            exported.notes.push("the deck's one mass moves by the contact force, which one rigid mass does not follow (mass that the crush zone stops early is in it): its crush and rebound are not the run's; the body force is for that".into());
+            exported.notes.push("the deck's single mass is driven by the contact force, which includes mass that the crush zone stops early: its crush and rebound differ from the run's; use the body force".into());
         }
         Ok(exported)
     }

@@ -41,7 +41,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
         if loading.deflection_m().len() < points {
             exported.notes.push(format!(
-                "{}: {} of {points} points are kept in the package, with the same energy to the maximal crush",
+                "{}: {} of {points} points are kept in the package, with the same energy up to the maximum crush",
                 curve.headline(),
                 loading.deflection_m().len()
             ));

@@ -109,7 +109,7 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
         Some(other) if other.id.study != IMPORTED => {
             return Err(error!(
                 Import,
-                "{path}: case \"{name}\" of group \"{group}\" is of the study \"{study}\", which builds it: give another name with --case",
+                "{path}: case \"{name}\" of group \"{group}\" belongs to the study \"{study}\", which builds it: give another name with --case",
                 path = path.display(),
                 study = other.id.study
             ));

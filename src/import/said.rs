@@ -57,7 +57,7 @@ impl StatedAndFound<'_> {
     fn missing(&self, what: &'static str, option: &'static str) -> Error {
         error!(
             Usage,
-            "{path}: the file does not say {what}: give {option}",
+            "{path}: the file does not state {what}: give {option}",
             path = self.item.path.display()
         )
     }
@@ -73,7 +73,7 @@ impl StatedAndFound<'_> {
             && (stated / found - 1.0).abs() > SAME
         {
             let (stated, found) = (shown(stated), shown(found));
-            self.warnings.push(format!("{what}: the file says {found}, {stated} is used"));
+            self.warnings.push(format!("{what}: the file states {found}; {stated} is used"));
         }
         let value = stated.or(found);
         match value.filter(|v| !(*v > 0.0 && v.is_finite())) {
@@ -91,7 +91,7 @@ impl StatedAndFound<'_> {
             && stated != found
         {
             let (stated, found) = (stated.name(), found.name());
-            self.warnings.push(format!("speed: the file says {found}, {stated} is used"));
+            self.warnings.push(format!("speed: the file states {found}; {stated} is used"));
         }
         match (self.settings.kind, self.facts.speed_kind, group) {
             (Some(kind), ..) | (None, Some(kind), _) => Ok(kind),
@@ -124,7 +124,7 @@ impl StatedAndFound<'_> {
             (SpeedKind::Wall, _) if self.settings.other_mass_kg.is_some() => {
                 return Err(error!(
                     Usage,
-                    "{path}: a wall has no mass: remove --other-mass, or say --kind closing",
+                    "{path}: a wall has no mass: remove --other-mass, or use --kind closing",
                     path = self.item.path.display()
                 ));
             }
@@ -158,7 +158,7 @@ impl StatedAndFound<'_> {
             (Some(force), _) | (None, Some(force)) => Ok(force),
             (None, None) => {
                 self.notes
-                    .push("force: taken as the contact force, as nothing says which it is".into());
+                    .push("force: taken as the contact force, because nothing states which it is".into());
                 Ok(ForceKind::Contact)
             }
         }

@@ -138,11 +138,11 @@ impl MassEstimates {
                 other(self.by_momentum, "momentum gives")
             ),
             _ if self.in_free_flight => format!(
-                "impulse of the force over the change of velocity, behind the contact{}",
+                "impulse of the force over the change of velocity, after the contact{}",
                 other(self.by_energy, "kinetic energy at the start gives")
             ),
             _ => format!(
-                "impulse of the force over the change of velocity, while loading (good to a few per cent){}",
+                "impulse of the force over the change of velocity, while loading (accurate to a few per cent){}",
                 other(self.by_energy, "kinetic energy at the start gives")
             ),
         }
@@ -187,7 +187,7 @@ fn doubt(name: &str, weighed: &MassEstimates) -> Option<String> {
     let (momentum, energy) = (weighed.by_momentum?, weighed.by_energy?);
     (!is_near(momentum, energy, SAME_BY_ENERGY)).then(|| {
         format!(
-            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on part of what moves, or more moves than the bodies",
+            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies moves",
             shown_mass(momentum),
             shown_mass(energy)
         )
@@ -265,12 +265,12 @@ pub(super) fn filter(means: Option<&str>, interval_s: f64) -> Proposed<Filter> {
         Some(why) => Proposed::found(Filter::None, Evidence::Read(why.into())),
         None if interval_s <= longest_s => Proposed::found(
             Filter::Cfc(CFC),
-            Evidence::Guessed(format!("the usual class; one force each {ms} ms allows it")),
+            Evidence::Guessed(format!("the usual class; one force every {ms} ms allows it")),
         ),
         None => Proposed::found(
             Filter::None,
             Evidence::Computed(format!(
-                "one force each {ms} ms is too coarse for CFC {CFC}, which needs one each {} ms",
+                "one force every {ms} ms is too coarse for CFC {CFC}, which needs one every {} ms",
                 digits(longest_s * 1e3)
             )),
         ),
@@ -291,7 +291,7 @@ pub(super) fn sampling(runs: &[Times]) -> Option<Proposed<Sampling>> {
     let ms = |s: f64| digits(s * 1e3);
     let from = match (alike, least > 1.01 * coarsest) {
         (_, true) => format!(
-            "the records have a state each {} ms at the coarsest; {} ms is enough",
+            "the coarsest record has a state every {} ms; {} ms is enough",
             ms(coarsest),
             ms(interval_s)
         ),
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(values, [24_000.0, 24_000.0, 24_000.0, 20_240.0]);
         assert_eq!(
             found[0].to_string(),
-            "computed: impulse of the force over the change of velocity, behind the contact; median of 3 runs, 23990 to 24010 kg"
+            "computed: impulse of the force over the change of velocity, after the contact; median of 3 runs, 23990 to 24010 kg"
         );
         assert_eq!(warnings, [""; 0]);
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));

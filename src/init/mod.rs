@@ -38,7 +38,7 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     if is_there {
         Err(error!(
             Study,
-            "{path} is there already, and nothing is written over it: name another with -o, or remove it",
+            "{path} exists already and is not overwritten: name another with -o, or remove it",
             path = path.display()
         ))
     } else {

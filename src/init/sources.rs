@@ -81,7 +81,7 @@ impl Sources {
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
             let hint = misnamed(folder)
-                .map_or(String::new(), |name| format!("; if {name} is the {MOTION}, name it so"));
+                .map_or(String::new(), |name| format!("; if {name} is the {MOTION}, rename it accordingly"));
             found.extend(unread.iter().map(|why| format!("({why})")));
             Reason::NoMotion { found: found.join(", ") + &hint }
         })?;
@@ -202,7 +202,7 @@ fn means(file: &SolverFile, is_text: bool) -> Option<String> {
         return Some("a T01 holds impulses, so each force is a mean over two intervals".into());
     }
     version.contains(MADE_OF_T01).then(|| {
-        let says = if is_text { "its second line says" } else { "its version is" };
+        let says = if is_text { "its second line reads" } else { "its version is" };
         format!("{says} \"{version}\": a mean over two intervals of a T01's impulse")
     })
 }

@@ -119,7 +119,7 @@ pub(super) fn choose(
                 return Proposed::found(units, Evidence::Read(from));
             }
             Some(why) => warnings.push(format!(
-                "units: {place} states {units}, which would make {why}; it is not taken"
+                "units: {place} states {units}, which would make {why}; it is not used"
             )),
         }
     }
@@ -133,7 +133,7 @@ pub(super) fn choose(
                 digits(first.crush),
                 digits(first.loading_time)
             ),
-            None => "they follow from no run".into(),
+            None => "no run determines them".into(),
         }),
     }
 }
@@ -184,7 +184,7 @@ fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence)> {
         .map(|(_, units)| format!("{units} ({})", runs[0].unusual(units).1))
         .collect();
     let from = format!(
-        "the most usual impacts in it; also possible, but less usual: {}; impossible: {others}",
+        "the impacts are the most usual ones in it; also possible, but less usual: {}; impossible: {others}",
         less.join(", ")
     );
     Some((units, Evidence::Guessed(from)))
@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(
             warnings,
             [
-                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not taken"
+                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not used"
             ]
         );
         let found = choose(&[car(&UnitSystem::SI)], None, stated, &mut Vec::new());

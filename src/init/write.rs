@@ -9,12 +9,12 @@ use crate::curve::recipe::ForceSource;
 use crate::history::Side;
 
 const HEAD: &str = "\
-Proposed by crumple init. Of every value the comment above it says where it is from:
-  read      it stands in the runs' files
-  computed  it follows from what stands there
-  guessed   it is the likely one of several: look at it
+Proposed by crumple init. The comment above each value says where it is from:
+  read      found in the runs' files
+  computed  derived from them
+  guessed   the most likely of several: check it
   given     by an option of crumple init
-Change what you know better.";
+Change whatever you know better.";
 
 impl Proposal {
     /// The proposal as the text of a study manifest.
@@ -56,7 +56,7 @@ impl Proposal {
                 text.line("half_model = true");
             }
             false if self.node_titles.len() < 2 => {
-                text.comment("CANNOT BE SEEN: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
+                text.comment("CANNOT BE DETERMINED: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
                 text.line("# kind = \"pair\"");
                 text.line("# half_model = true");
             }

@@ -92,7 +92,7 @@ fn refuse_rates(chain: &Chain) -> Result<(), Error> {
         .unwrap_or_else(|| "running or braking resistance".into());
     Err(error!(
         Simulation at "run.method",
-        "{what} depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
+        "{what} depends on the speed, which the fourth-order method does not support: use method = \"verlet\""
     ))
 }
 
@@ -166,7 +166,7 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
         let travel_m = gone_m + interface.gap_m + tension.slack_m;
         if gone_m > FREE_TRAVEL_M && history.restitution.is_some() {
             warnings.push(format!(
-                "interface {}: after a crush of {largest_m:.3} m its coupling pulls only from the length at first on, after {travel_m:.3} m of free travel; a real one would pull sooner, or be broken",
+                "interface {}: after a crush of {largest_m:.3} m its coupling carries tension only beyond its initial length, after {travel_m:.3} m of free travel; a real one would engage sooner, or be broken",
                 interface.name
             ));
         }
@@ -184,7 +184,7 @@ fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
     // Without the rounding of a product.
     let end_s = (end_s * 1e9).round() / 1e9;
     Some(format!(
-        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration is that up to there, and what comes may be more; lengthen duration",
+        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration covers the time up to then and may still grow; lengthen duration",
         bodies.join(", ")
     ))
 }

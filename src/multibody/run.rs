@@ -218,7 +218,7 @@ impl Grid {
             let interface = chain.interfaces().get(k).map_or("none", |i| i.name.as_str());
             return Err(error!(
                 Simulation at "run.duration",
-                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
+                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is needed by interface {interface}"
             ));
         }
         let (bodies, interfaces) = (chain.bodies().len(), chain.interfaces().len());
@@ -325,6 +325,6 @@ pub(super) fn diverged(body: &Body, time_s: f64) -> Error {
     let body = &body.name;
     error!(
         Simulation at "train",
-        "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
+        "the motion is no longer finite at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
     )
 }

@@ -254,17 +254,17 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
     if from_s < rating.from_s - INTERVAL_S || to_s > rating.to_s + INTERVAL_S {
         warnings.push(format!(
-            "{from_s} s to {to_s} s was asked for, but the signals have in common only {} s to {} s",
+            "{from_s} s to {to_s} s was requested, but the signals have in common only {} s to {} s",
             rating.from_s, rating.to_s
         ));
     }
     if reference.iter().all(|&r| r == 0.0) {
         warnings
-            .push("the reference is zero throughout: there is nothing to be relative to".into());
+            .push("the reference is zero throughout: relative measures are undefined".into());
     }
     if rating.iso18571.is_none() {
         warnings.push(format!(
-            "{} samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to {}: ask for a shorter interval, or check the units of time",
+            "{} samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to {}: choose a shorter interval, or check the units of time",
             rating.samples,
             iso18571::MOST_SAMPLES
         ));
@@ -281,7 +281,7 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         }
         if of.is_cut {
             warnings.push(format!(
-                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration is that up to there",
+                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration covers the time up to then",
                 rating.to_s
             ));
         }
@@ -379,7 +379,7 @@ mod tests {
         let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
         let beyond = RatingSettings { to_s: Some(5.0), ..RatingSettings::default() };
         let beyond = rate(&step, &step, &beyond).unwrap().warnings;
-        assert!(beyond.iter().any(|w| w.contains("to 5 s was asked for")), "{beyond:?}");
+        assert!(beyond.iter().any(|w| w.contains("to 5 s was requested")), "{beyond:?}");
         let window =
             RatingSettings { from_s: Some(0.052), cfc: Some(60), ..RatingSettings::default() };
         let whole = RatingSettings { from_s: None, ..window };
@@ -404,7 +404,7 @@ mod tests {
         assert_eq!(
             of.warnings,
             [
-                "100000 samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: ask for a shorter interval, or check the units of time"
+                "100000 samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: choose a shorter interval, or check the units of time"
             ]
         );
         assert!((of.sprague_geers.unwrap().phase - 0.1 / std::f64::consts::PI).abs() < 1e-4);
@@ -426,7 +426,7 @@ mod tests {
         assert_eq!((of.l1_ratio, of.rms_ratio, of.sprague_geers), (None, None, None));
         assert_eq!(
             of.warnings,
-            ["the reference is zero throughout: there is nothing to be relative to"]
+            ["the reference is zero throughout: relative measures are undefined"]
         );
         assert_eq!(plain(&zero, &zero).l1_ratio, Some(0.0));
     }

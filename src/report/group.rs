@@ -153,7 +153,7 @@ impl Validated<'_> {
         parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
         if let Some(scatter) = &validation.scatter {
             parts.push(Part::Text(format!(
-                "Equal runs lie apart by {} in force and {} in velocity: no model can remove this part of its errors.",
+                "Repeated runs differ by {} in force and {} in velocity: no model can remove this part of its errors.",
                 percent(scatter.force_l1),
                 percent(scatter.velocity_l1)
             )));
@@ -168,7 +168,7 @@ impl Validated<'_> {
         match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
             Ok(chart) => {
                 parts.push(Part::Text(format!(
-                    "Of the inner speeds, {} has the largest force error, {}. Left out, it is predicted so:",
+                    "Of the inner speeds, {} has the largest force error, {}. This is its prediction when left out:",
                     km_per_h(worst.speed_m_per_s),
                     percent(worst.force_l1)
                 )));
@@ -206,7 +206,7 @@ impl Validated<'_> {
         let left_out = counted(speeds, "inner speed");
         Table {
             caption: format!(
-                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body's force drives one mass)"
+                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
             ),
             heading: heading.map(String::from).to_vec(),
             rows: validation.means.iter().map(row).collect(),
@@ -241,7 +241,7 @@ impl Validated<'_> {
             && let Some(next) = next_run(&set, validation)
         {
             let advice =
-                format!("Next FE run: {}, as {}.", km_per_h(next.speed_m_per_s), next.reason);
+                format!("Next FE run: {}: {}.", km_per_h(next.speed_m_per_s), next.reason);
             parts.push(Part::Text(advice));
         }
         Ok(())
@@ -269,7 +269,7 @@ impl Validated<'_> {
                 format!("±{} of the local {} force", percent(band.pointwise_share), force.name()),
             ));
             if let Some(scatter) = &band.scatter {
-                let name = "part of it from scatter between equal runs".to_string();
+                let name = "part of it from scatter between repeated runs".to_string();
                 rows.push((name, format!("±{}", percent(scatter.pointwise_share))));
             }
         }
@@ -346,12 +346,12 @@ fn mean_crush(comparisons: &[Comparison]) -> f64 {
 fn methods_explained(nsdm_seeds: u64) -> String {
     let nsdm = match nsdm_seeds {
         0 => {
-            " nsdm, the spring and damper fitted by a genetic algorithm, was left out; ask for it with --nsdm-seeds."
+            " nsdm, the spring and damper fitted by a genetic algorithm, was left out; --nsdm-seeds includes it."
         }
         _ => " nsdm: a spring and damper fitted by a genetic algorithm to that run.",
     };
     format!(
-        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed.{nsdm} ddtcm: the reference method's forest. best: the model that leaving speeds out chooses."
+        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
     )
 }
 

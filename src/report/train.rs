@@ -52,7 +52,7 @@ pub(super) fn add(
         let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
         let asked = ComparisonSettings { seed, nsdm_seeds, ..ComparisonSettings::default() };
         let comparison = compare_train(path, &read, &asked)?;
-        parts.push(Part::Heading("Beside FE's run of the whole train".into()));
+        parts.push(Part::Heading("Comparison with FE's run of the whole train".into()));
         let chart = train_speeds(&format!("{name}: speeds by FE and by the methods"), &comparison);
         parts.push(Part::Figure(Figure::new(format!("s{number}-train"), chart)));
         parts.push(Part::Table(methods(&comparison)));
@@ -173,6 +173,6 @@ fn methods(comparison: &TrainComparison) -> Table {
         cells.extend(row.vehicles.iter().map(|v| percent(v.velocity_l1).into()));
         cells
     });
-    let caption = format!("Velocity errors to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
+    let caption = format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
     table(&caption, &heading, rows.collect())
 }

@@ -208,7 +208,7 @@ fn check_vehicles(scenario: &Scenario, train: &TrainTable) -> Result<(), Error> 
 fn between_ends(scenario: &Scenario, curve: &str) -> Error {
     error!(
         Scenario,
-        "curve \"{curve}\" stands between ends that come from models, where plates meet: remove it"
+        "curve \"{curve}\" lies between ends that come from models, where plates meet: remove it"
     )
     .at(scenario.use_of(curve))
 }

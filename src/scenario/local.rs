@@ -59,7 +59,7 @@ pub(crate) fn assemble(
             settings = settings.with_method(Method::FourthOrder);
         }
         let failed =
-            |error: Error| prepared.failed(error.of("while the interfaces' speeds were sought"));
+            |error: Error| prepared.failed(error.of("while the interface speeds were determined"));
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
         let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
         if largest < CHANGE_M_PER_S {

@@ -135,10 +135,10 @@ fn texts(warnings: &[Warning]) -> Vec<String> {
 }
 
 /// Said of a file without `# force_kind`.
-const UNKNOWN_FORCE: &str = "its file does not say which force it holds: taken as the one that moves the bodies; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
+const UNKNOWN_FORCE: &str = "its file does not state which force it holds: taken as the body force; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
 
 /// Said of a contact force that drives bodies of one mass without being asked for.
-const ONLY_CONTACT: &str = "it has a contact force only, which a vehicle of one mass does not follow: mass that the crush zone stops early is in it; use a body force, or split the vehicles (front, rear)";
+const ONLY_CONTACT: &str = "it has a contact force only, which includes mass that the crush zone stops early and is wrong for a vehicle of one mass; use a body force, or split the vehicles (front, rear)";
 
 /// The force that drives the interface: what was asked for, or what the vehicles need; `None` for
 /// the recipe's own. One mass per vehicle moves by the body force; where the crush zone has a mass
@@ -185,7 +185,7 @@ impl Spring {
         let mut warnings = Vec::new();
         if asked.is_none() && known.is_none() && steepest > 0.0 {
             warnings.push(format!(
-                "it has no unloading stiffness: it unloads with its steepest rise, {:.4} MN/m; how much it gives back follows from that: say unloading = \"…MN/m\"",
+                "it has no unloading stiffness: it unloads with its steepest rise, {}, which decides the rebound: set unloading = \"…MN/m\"",
                 steepest / 1e6
             ));
         }
@@ -194,7 +194,7 @@ impl Spring {
             && table.stages.is_none()
         {
             warnings.push(format!(
-                "unloading {:.4} MN/m is softer than the curve's steepest rise ({:.4} MN/m): where it rises so, unloading is stiffer",
+                "unloading {} is softer than the curve's steepest rise ({}): there it unloads as steeply as it rises",
                 asked / 1e6,
                 steepest / 1e6
             ));

@@ -157,7 +157,7 @@ pub(super) fn check_format(
     match look_at(path, source, None)? {
         (Some(found), _) if found.name != format.name => Err(error!(
             SolverFile,
-            "{}: this is not a {}: it looks like a {}, read it as that",
+            "{}: this is not a {}: it looks like a {}: read it as such",
             path.display(),
             format.name,
             found.name

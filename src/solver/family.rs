@@ -102,7 +102,7 @@ pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error>
         let before = restart(path, number.saturating_sub(1));
         if number > 1 && !is_file(&before)? {
             let missing = name_of(&before);
-            return Ok(Some(format!("{missing} is not there, so that the record begins late")));
+            return Ok(Some(format!("{missing} is missing, so the record starts late")));
         }
         let next = number + family(path)?.len() as u32;
         return unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)));
@@ -128,7 +128,7 @@ fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<Stri
         if is_file(&file)? {
             let missing = name_of(&missing);
             return Ok(Some(format!(
-                "{missing} is not there, so that what continues behind it is not read"
+                "{missing} is missing, so its continuation is not read"
             )));
         }
     }

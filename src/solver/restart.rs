@@ -41,7 +41,7 @@ pub(crate) fn resolve(
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
                 let twice = || {
                     format!(
-                        "{of}the state at time {:?} is written twice: the last writing counts",
+                        "{of}the state at time {:?} is written twice: the last one counts",
                         time[i]
                     )
                 };

@@ -113,7 +113,7 @@ impl Run {
         let Self { state, first, last, .. } = *self;
         let at = histories[first].time.get(state).copied().unwrap_or(f64::NAN);
         let message = format!(
-            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero, but not in the states around it: was the file overwritten there?",
             last - first + 1,
             state + 1,
             histories[first].label(),

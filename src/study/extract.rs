@@ -59,11 +59,11 @@ impl LocatedRun<'_> {
             (None, None) => {
                 let deck = match &self.deck {
                     Some(deck) => format!("the deck {} states none", deck.file.path.display()),
-                    None => "the run has no deck that could".into(),
+                    None => "the run has no deck that could state them".into(),
                 };
                 return Err(error!(
                     Run,
-                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or what they are) to [study]"
+                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
                 )
                 .at(KeyPath::of("study")));
             }
@@ -145,7 +145,7 @@ impl LocatedRun<'_> {
         let ratio = found_j / stated_j;
         ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
             format!(
-                "mass: glstat has {:.4} MJ at the start, the masses of the manifest have {:.4} MJ: the mass of the run is wrong ({:.4} t would agree), or more moves than its bodies",
+                "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies moves",
                 found_j / 1e6,
                 stated_j / 1e6,
                 ratio * masses.body_kg / 1e3

@@ -92,7 +92,7 @@ pub struct Band {
     pub pointwise_share: f64,
     /// Half width that the whole curve keeps to.
     pub simultaneous_share: f64,
-    /// The part of both that comes from the scatter between equal runs, whatever the span; the
+    /// The part of both that comes from the scatter between repeated runs, whatever the span; the
     /// squares of it and of the error of interpolation add. Absent without such runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<ScatterWidths>,
@@ -102,7 +102,7 @@ pub struct Band {
     pub coverage: Option<f64>,
 }
 
-/// Half widths that the scatter between equal runs gives by itself: Student's t times its root mean
+/// Half widths that the scatter between repeated runs gives by itself: Student's t times its root mean
 /// square.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScatterWidths {

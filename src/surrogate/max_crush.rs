@@ -212,7 +212,7 @@ pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error>
             error!(Prediction at "max_crush", "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
-                .map_or("(no rule has an answer here)", MaxCrushRule::name), rule = rule.name()),
+                .map_or("(no rule applies here)", MaxCrushRule::name), rule = rule.name()),
         ),
     }
 }

@@ -162,14 +162,14 @@ impl Model {
             Some(fingerprint) if !is_as_written(text, fingerprint) && !file::accepts_changed() => {
                 Err(error!(
                     Model,
-                    "{}: the model is not the one that was written, by its fingerprint: train it again with crumple train, or go on with --accept-changed",
+                    "{}: the model does not match its fingerprint: train it again with crumple train, or use --accept-changed",
                     path.display()
                 ))
             }
             None if !file::accepts_changed() => match model.impossible_case() {
                 Some(found) => Err(error!(
                     Model,
-                    "{}: {found}: a mass, speed or force was changed in it, and the file has no fingerprint that would say so: train the model again with crumple train, or go on with --accept-changed",
+                    "{}: {found}: a mass, speed or force was changed in it, and the file has no fingerprint that would show it: train the model again with crumple train, or use --accept-changed",
                     path.display()
                 )),
                 None => Ok(model),

@@ -212,7 +212,7 @@ impl<'a> Prediction<'a> {
         if !(CORRECTION.0..=CORRECTION.1).contains(&factor) {
             return Err(error!(
                 Prediction,
-                "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: the scale is not what is wrong; look at mass, speed and the rule for the maximal crush",
+                "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: scaling is not the remedy; check mass, speed and the rule for the maximum crush",
                 low = CORRECTION.0,
                 high = CORRECTION.1
             ));

@@ -354,7 +354,7 @@ impl PredictedCurve {
             let mut why =
                 format!("there is no band around its {} force: remove band", force.name());
             if self.force_low_n.is_some() {
-                why += ", or train the model anew";
+                why += ", or train the model again";
             }
             error!(Prediction, "{}", why)
         })?;

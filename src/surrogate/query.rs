@@ -32,7 +32,7 @@ pub struct Query {
     pub rule: Option<MaxCrushRule>,
     /// Values of the model's further parameters.
     pub parameters: BTreeMap<String, Parameter>,
-    /// Scale the force so that the curve takes up the impact's energy.
+    /// Scale the force so that the curve absorbs the impact's energy.
     pub energy_correct: bool,
     /// Answer further outside the training speeds than a third of their range.
     pub extrapolate: bool,
@@ -84,7 +84,7 @@ impl<'a> ResolvedQuery<'a> {
         if !query.extrapolate && is_far_outside(v, low, high) {
             return Err(error!(
                 Prediction,
-                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE at such a speed, or use --extrapolate to get it all the same",
+                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE near this speed, or use --extrapolate to predict it anyway",
                 outside = outside_of(v, low, high)
             ));
         }

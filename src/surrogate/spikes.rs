@@ -22,7 +22,7 @@ pub(super) fn without_spikes(
     if force_n.iter().any(|f| !f.is_finite()) {
         return Err(error!(
             Prediction,
-            "the {model} model has no answer at this speed: train another one",
+            "the {model} model cannot predict this speed: train another one",
             model = model.name()
         ));
     }

@@ -39,7 +39,7 @@ pub enum WarningCode {
     ModeSwitch,
     /// Too few curves to say how good the model is.
     TooFewCurves,
-    /// The force was scaled so that the curve takes up the impact's energy.
+    /// The force was scaled so that the curve absorbs the impact's energy.
     EnergyCorrected,
     /// Nothing that was left out tells how far FE may lie from this curve.
     NoBand,
@@ -157,7 +157,7 @@ impl Warning {
         Self {
             code: WarningCode::ModeSwitch,
             message: format!(
-                "peaks of the training curves jump between {} and {}: the collapse changes its mode there, and a curve between the two may be of either",
+                "peaks of the training curves jump between {} and {}: the collapse mode changes there, and a curve between the two may follow either",
                 km_per_h(below),
                 km_per_h(above)
             ),
@@ -168,7 +168,7 @@ impl Warning {
         Self {
             code: WarningCode::TooFewCurves,
             message: format!(
-                "the model rests on {}: with fewer than 3 no speed can be left out to see how good it is",
+                "the model rests on {}: with fewer than 3, no speed can be left out to assess it",
                 counted(curves, "training curve")
             ),
         }
@@ -178,7 +178,7 @@ impl Warning {
         Self {
             code: WarningCode::EnergyCorrected,
             message: format!(
-                "the force was multiplied by {factor:.4}, so that the curve takes up the impact's kinetic energy"
+                "the force was multiplied by {factor:.4}, so that the curve absorbs the impact's kinetic energy"
             ),
         }
     }
@@ -187,7 +187,7 @@ impl Warning {
         Self {
             code: WarningCode::EnergyMismatch,
             message: format!(
-                "the curve takes up {:.1} % of the impact's kinetic energy",
+                "the curve absorbs {:.1} % of the impact's kinetic energy",
                 ratio * 100.0
             ),
         }

@@ -97,7 +97,7 @@ fn ordered(files: &mut [ShardFile]) -> Result<ShardHeader, Error> {
         if count != first_count {
             return Err(error!(
                 Sweep,
-                "{path} is one of {count} shards, {first_path} one of {first_count}: merge those of one division"
+                "{path} is one of {count} shards, {first_path} one of {first_count}: merge shards of one division"
             ));
         }
     }

@@ -247,7 +247,7 @@ impl ShardHeader {
         let path = path.display();
         Err(error!(
             Sweep,
-            "{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it"
+            "{path} belongs to another sweep: {differs}; --restart replaces it, another -o keeps it"
         ))
     }
 }
@@ -320,7 +320,7 @@ fn each_line(
         0 => Ok(()),
         _ => Err(damaged(
             path,
-            "there is something behind the last row: run its sweep again with --restart",
+            "there is unexpected data after the last row: run its sweep again with --restart",
         )),
     }
 }

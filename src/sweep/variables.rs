@@ -312,7 +312,7 @@ fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     if name.is_empty() || name.contains(breaks) {
         Err(
-            error!(Sweep at key, "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
+            error!(Sweep at key, "the name \"{}\" appears in the result and may not be empty or contain , | [ ] # or quotes",
                 name.escape_debug()
             ),
         )

@@ -146,7 +146,7 @@ fn compared(
             let m_per_s = train.speed.0;
             if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
                 let vehicle = name.clone();
-                return Err(error!(Comparison, "in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
+                return Err(error!(Comparison, "in FE's record {vehicle} starts at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
             }
         }
     }
@@ -196,7 +196,7 @@ fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
             let (straight, crossed) = (off(own, a) + off(others, b), off(own, b) + off(others, a));
             if crossed < SWAPPED * straight {
                 warnings.push(format!(
-                    "reference: FE's record of {one} fits the run's {other}, and that of {other} its {one}: their nodes may be swapped"
+                    "reference: FE's record of {one} matches {other} in the run, and that of {other} matches {one}: their nodes may be swapped"
                 ));
             }
         }
@@ -221,7 +221,7 @@ fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
         .min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((error, shift_s)) = best.filter(|(error, _)| *error < SHIFTED * shifted(0.0)) {
         warnings.push(format!(
-            "reference: FE's record fits better by {:.0} % when it is moved by {:+.0} ms: look at contact in [reference]",
+            "reference: FE's record fits better by {:.0} % when it is shifted by {:+.0} ms: check contact in [reference]",
             100.0 * (1.0 - error / shifted(0.0)),
             shift_s * 1e3
         ));
@@ -274,7 +274,7 @@ impl FeTrain {
         let mut velocities = Vec::new();
         for (name, &node) in &reference.nodes {
             let missing = || {
-                error!(Comparison, "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]", component = reference.component, path = file.display()).at(KeyPath::of("reference.nodes").key(name))
+                error!(Comparison, "{path}: node {node} has no complete {component}: see crumple inspect, and name another node or component in [reference]", component = reference.component, path = file.display()).at(KeyPath::of("reference.nodes").key(name))
             };
             let history = read.history(Some(EntityId::new(node)), &reference.component);
             let values = &history.ok_or_else(missing)?.values[first..];

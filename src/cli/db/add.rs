@@ -89,7 +89,7 @@ fn items(args: &Args) -> Result<Vec<Item>, Failure> {
     for (option, given) in [("--speed", args.speed.len()), ("--case", args.case.len())] {
         if given != 0 && given != files {
             return Err(Failure::Usage(format!(
-                "{option} is given {} for {}: give it once for each file, in their order",
+                "{option} is given {} for {}: give it once for each file, in the same order",
                 counted(given, "time"),
                 counted(files, "file")
             )));

@@ -78,7 +78,7 @@ pub(super) struct CopyArgs {
 pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     if args.to.is_none() && args.to_group.is_none() {
         return Err(Failure::Usage(
-            "say where the cases are copied: with --to-group, --to (another database) or both"
+            "name the destination with --to-group, --to (another database) or both"
                 .into(),
         ));
     }
@@ -123,7 +123,7 @@ impl From {
 fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -> CommandResult {
     for (from, items) in &joined.not_taken {
         options.warn(&format!(
-            "{} holds what crumple has not written and does not take along: {items}",
+            "{} holds objects that crumple did not write and does not copy: {items}",
             from.display()
         ));
     }
@@ -162,7 +162,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     let did = if *dry_run { "would write" } else { "wrote" };
     writeln!(
         out,
-        "{did} {database}: {} added, {} replaced, {} there already",
+        "{did} {database}: {} added, {} replaced, {} already present",
         output::counted(added.len() + renamed.len(), "case"),
         replaced.len(),
         equal.len()

@@ -87,7 +87,7 @@ fn run(
     options: GlobalOptions,
 ) -> CommandResult {
     if *labels == Labels::default() {
-        return Err(Failure::Usage("say what is changed: with --add, --remove or --clear".into()));
+        return Err(Failure::Usage("nothing to do: give --add, --remove or --clear".into()));
     }
     let cases = curate::label(database, selection, labels)?;
     let database = database.display().to_string();

@@ -28,7 +28,7 @@ const STATES: usize = 100;
 const SAMPLED_OFF: f64 = 0.02;
 /// Where two histories of one record cannot be one run's.
 const OTHER_FILES: &str =
-    "likely files of two runs, another node or wall, or a clock that was changed";
+    "likely files of two runs, the wrong node or wall, or shifted times";
 /// A peak is a spike above these multiples of the states beside it and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Free flight in fewer states says nothing of gravity.
@@ -87,14 +87,14 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     let Difference { largest, since_s } = Difference::of((0..t.len()).map(off), DISPLACEMENT);
     let Some(since_s) = since_s else { return Ok(remarks) };
     let found = format!(
-        "displacement: from {} on it is not the integral of the velocity, by up to {:.1} % of its range",
+        "displacement: from {} on it deviates from the integral of the velocity by up to {:.1} % of its range",
         milliseconds(since_s),
         largest * 100.0
     );
     if largest > IMPOSSIBLE_ALONG_TIME {
         return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
     }
-    remarks.warn(format!("{found}: one of the two is damaged, scaled or of another node"));
+    remarks.warn(format!("{found}: one of the two is damaged, scaled or from another node"));
     Ok(remarks)
 }
 
@@ -107,7 +107,7 @@ pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
     let others = others.fold(0.0, f64::max);
     (force_n[peak] > SPIKE.0 * beside && force_n[peak] > SPIKE.1 * others).then(|| {
         format!(
-            "force: the peak of {:.3} MN is a single state, at {}; the states beside it have up to {:.3} MN, all others up to {:.3} MN: look whether it is damaged",
+            "force: the peak of {} is a single state, at {}; its neighbours reach {}, all other states {}: check whether it is damaged",
             force_n[peak] / 1e6,
             milliseconds(time_s[peak]),
             beside / 1e6,
@@ -177,7 +177,7 @@ impl<'a> Motion<'a> {
         let Difference { largest, since_s } = Difference::of((0..=self.end).map(off), IMPULSE);
         if let Some(since_s) = since_s {
             let found = format!(
-                "impulse: from {} on the force does not give the body's change of momentum, by up to {:.1} % of the impact's",
+                "impulse: from {} on it deviates from the body's change of momentum by up to {:.1} % of the impact's momentum",
                 milliseconds(since_s),
                 largest * 100.0
             );
@@ -185,7 +185,7 @@ impl<'a> Motion<'a> {
                 return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
             }
             remarks.warn(format!(
-                "{found}: the times of force and motion differ, the force is another body's, or not all of it is in the recipe"
+                "{found}: the times of force and motion differ, the force acts on another body, or the recipe lacks part of it"
             ));
         }
         let peak_n = force_n[..=self.end].iter().copied().fold(0.0, f64::max);
@@ -198,7 +198,7 @@ impl<'a> Motion<'a> {
             let lost_ns = self.lost_ns(first - 1, last);
             if given_ns > LATE_FORCE.1 * whole_ns && (given_ns - lost_ns).abs() > 0.5 * given_ns {
                 remarks.warn(format!(
-                    "force: between {} and {}, after the contact, it gives {:.3} kN·s, and the momentum changes by {lost:.3} kN·s: this force, of up to {:.3} MN, does not act on this body",
+                    "force: between {} and {}, after the contact, its impulse is {:.3} kN·s, but the momentum changes by {lost:.3} kN·s: this force, of up to {}, does not act on this body",
                     milliseconds(self.at(first)),
                     milliseconds(self.at(last)),
                     given_ns / 1e3,
@@ -230,7 +230,7 @@ impl<'a> Motion<'a> {
         }
         let ratio = integral(&times, &force_n)[times.len() - 1] / lost_ns;
         let found = format!(
-            "mass: up to the largest crush the contact force gives {ratio:.3} times the momentum that {:.4} t lose; it asks for {:.4} t",
+            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum that {:.4} t lose; it would fit {:.4} t",
             self.masses.body_kg / 1e3,
             ratio * self.masses.body_kg / 1e3
         );
@@ -242,7 +242,7 @@ impl<'a> Motion<'a> {
             ));
         }
         if (ratio - 1.0).abs() > IMPULSE {
-            let or = if ratio < 1.0 { ", or more acts than this contact" } else { "" };
+            let or = if ratio < 1.0 { ", or other forces act besides this contact" } else { "" };
             remarks.warn(format!("{found}: the mass of the run is wrong{or}"));
         }
         Ok(remarks)
@@ -263,7 +263,7 @@ impl<'a> Motion<'a> {
         let share = rate * crush_m / energy;
         if share.abs() > OTHER_WORK {
             remarks.warn(format!(
-                "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass leave this force out, whose work over the crush is {:.1} % of the kinetic energy",
+                "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass neglect this force, whose work over the crush is {:.1} % of the kinetic energy",
                 share * 100.0
             ));
         }
@@ -281,19 +281,19 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     let halved = off_at(original, &halved).unwrap_or(0.0);
     if end < STATES && end > 0 {
         let found = format!(
-            "sampling: the record has {end} states up to the largest crush, one each {:.3} ms; without each second of them the curve changes by {:.1} % of its mean force",
+            "sampling: the record has {end} states up to the largest crush, one every {:.3} ms; dropping every second one changes the curve by {:.1} % of its mean force",
             interval_ms(original.time_s(), end),
             halved * 100.0
         );
         if halved > SAMPLED_OFF {
-            remarks.warn(format!("{found}: about as much may lie between those that were written, and peaks are cut; write histories more often"));
+            remarks.warn(format!("{found}: a similar error may remain between the recorded states, and peaks are cut off; write histories at shorter intervals"));
         } else {
             remarks.note(found);
         }
     }
     if let Some(off) = off_at(original, sampled.time_s()).filter(|&off| off > SAMPLED_OFF) {
         remarks.warn(format!(
-            "sampling: the recipe's times, one each {:.3} ms, change the curve by {:.1} % of its mean force: shorten interval_ms",
+            "sampling: the recipe's times, one every {:.3} ms, change the curve by {:.1} % of its mean force: shorten interval_ms",
             interval_ms(sampled.time_s(), sampled.time_s().len() - 1),
             off * 100.0
         ));

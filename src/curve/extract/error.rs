@@ -42,7 +42,7 @@ pub enum ExtractError {
     NoOverlap,
     /// A time of the manifest lies outside the record.
     #[error(
-        "{key} = {at} lies outside the record, which goes from {first} to {last}",
+        "{key} = {at} lies outside the record, which runs from {first} to {last}",
         at = milliseconds(*time_s), first = milliseconds(*first_s), last = milliseconds(*last_s)
     )]
     OutsideRecord {
@@ -57,7 +57,7 @@ pub enum ExtractError {
     },
     /// The bodies never close the gap that the manifest states.
     #[error(
-        "gap = {gap_mm} mm is never closed: the bodies move towards each other by {most_mm:.3} mm at most",
+        "gap = {gap_mm} mm is never closed: the bodies approach each other by at most {most_mm:.3} mm",
         gap_mm = gap_m * 1e3, most_mm = most_m * 1e3
     )]
     GapStaysOpen {
@@ -82,7 +82,7 @@ pub enum ExtractError {
     ImpossibleRun(#[from] energy::ImpossibleRun),
     /// The body moves as it was told to, whatever the force.
     #[error(
-        "{0}. Such a curve belongs to no impact of this mass and speed; crumple histories gives its force and displacement"
+        "{0}. No impact of this mass and speed has such a curve; crumple histories writes its force and displacement"
     )]
     Prescribed(String),
     /// The deflection does not grow after contact.

@@ -126,7 +126,7 @@ impl Record {
         let lost = impulse(&force.time_s[..lead], &force.values[..lead]);
         if lost.abs() > LEFT_OUT * whole.abs() {
             remarks.warn(format!(
-                "times: the force begins at {}, the motion at {}: {:.1} % of the force's impulse lie before it and are left out; the clocks of the two files differ, or the first states of the motion are missing",
+                "times: the force starts at {}, the motion at {}: {:.1} % of the impulse precede the motion and are left out; the time origins of the two files differ, or the first states of the motion are missing",
                 milliseconds(force.time_s[0]),
                 milliseconds(from),
                 100.0 * lost / whole
@@ -371,7 +371,7 @@ pub(super) fn sample(
     if window_s < end_s && times.len() == sampling.states && setup.stated.truncate_s.is_none() {
         return Err(error!(
             Run at "sampling",
-            "recipe.sampling has {sampling}, which ends {} after contact, before the largest crush at {}: raise states to {:.0} or more, or say truncate in the run",
+            "recipe.sampling has {sampling}, which ends {} after contact, before the largest crush at {}: raise states to {:.0} or more, or set truncate in the run",
             milliseconds(window_s),
             milliseconds(end_s),
             (end_s / sampling.interval_s).ceil() + 1.0

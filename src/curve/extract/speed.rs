@@ -41,7 +41,7 @@ impl ImpactSpeed {
             && differ(first, recorded)
         {
             remarks.warn(format!(
-                "speed: the first state moves at {}, the last before contact at {}; the latter is the record's",
+                "speed: the first state moves at {}, the last before contact at {}; the latter is used",
                 km_per_h(first),
                 km_per_h(recorded)
             ));
@@ -63,7 +63,7 @@ impl ImpactSpeed {
         for (who, other) in of_record.into_iter().chain(of_deck) {
             if differ(m_per_s, other) {
                 remarks.warn(format!(
-                    "speed: {who} says {}, the {name} {} is used",
+                    "speed: {who} states {}; the {name} {} is used",
                     km_per_h(other),
                     km_per_h(m_per_s)
                 ));

@@ -112,7 +112,7 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
     let points = points(curve);
     (resampling(&points) == MOST_RESAMPLED).then(|| {
         format!(
-            "{}: its points are uneven, so LCINT is {MOST_RESAMPLED}, the most that is asked for: LS-DYNA resamples it evenly every {:.3} mm, and what lies closer together is evened out",
+            "{}: its points are unevenly spaced, so LCINT is {MOST_RESAMPLED}, the largest used: LS-DYNA resamples the curve every {:.3} mm and smooths what is finer",
             curve.headline(),
             curve.loading.end_m() / (MOST_RESAMPLED - 1) as f64 * 1e3
         )

@@ -23,7 +23,7 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
         let most = MAX_CURVES;
         return Err(error!(
             CurveFile,
-            "the file has more than {most} curves: take out the one that is meant"
+            "the file has more than {most} curves: extract the one you need"
         ));
     }
     Ok(())
@@ -33,7 +33,7 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
 pub(super) fn check_points(points: usize) -> Result<(), Error> {
     if points > MAX_POINTS {
         let most = MAX_POINTS;
-        return Err(error!(CurveFile, "the curve has more than {most} points: thin it"));
+        return Err(error!(CurveFile, "the curve has more than {most} points: thin it out"));
     }
     Ok(())
 }
@@ -145,7 +145,7 @@ impl Columns {
         match envelope.first_pulling_point() {
             Some(point) => Err(error!(
                 CurveFile,
-                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+                "the force of point {point} is below 0: an interface only pushes, so write compression positive and tension as 0"
             )),
             None => Ok(self.facts.driving(envelope)),
         }
@@ -251,7 +251,7 @@ impl Points {
         self.check_order()?;
         if self.list[0].d > 0.0 {
             let (d, place) = (self.list[0].d, self.list[0].place.clone());
-            notes.push(format!("points: the curve begins at {d} m, a point (0, 0) is put before"));
+            notes.push(format!("points: the curve starts at {d} m; a point (0, 0) is added in front"));
             self.list.insert(0, Point { d: 0.0, f: 0.0, place });
         }
         Ok(std::mem::take(&mut self.list))
@@ -264,9 +264,9 @@ impl Points {
         let push = on_side.map(|p| p.f).sum::<f64>();
         let push = if push < 0.0 { -1.0 } else { 1.0 };
         let what = match (side < 0.0, push < 0.0) {
-            (true, true) => "the curve lies in the third quadrant; deflection and force are turned",
-            (true, false) => "the deflection is turned",
-            (false, true) => "the force is turned",
+            (true, true) => "the curve lies in the third quadrant; deflection and force are reversed",
+            (true, false) => "the deflection is reversed",
+            (false, true) => "the force is reversed",
             (false, false) => return,
         };
         notes.push(format!("sign: {what}, positive in compression"));
@@ -296,7 +296,7 @@ impl Points {
             if point.f < -ZERO_SHARE * most_f {
                 return Err(error!(
                     CurveFile,
-                    "{place}: the force is {force_n} N against the others' sign: an interface only pushes, so write pull as 0",
+                    "{place}: the force is {force_n} N, opposite in sign to the others: an interface only pushes, so write tension as 0",
                     force_n = point.f,
                     place = place()
                 ));
@@ -335,7 +335,7 @@ impl Points {
             && ((held.d - last.d) / -first - 1.0).abs() < SAME_DISTANCE
         {
             notes.push(format!(
-                "points: the last, at {} m, repeats the force before and is removed (guard point)",
+                "points: the last, at {} m, repeats the previous force and is removed (guard point)",
                 held.d
             ));
             self.list.pop();
@@ -347,7 +347,7 @@ impl Points {
         self.list.dedup_by(|b, a| a.d == b.d && a.f == b.f);
         let removed = before - self.list.len();
         if removed > 0 {
-            notes.push(format!("points: {removed} that repeat the one before removed"));
+            notes.push(format!("points: {removed} removed (repeats of the previous one)"));
         }
     }
 
@@ -362,12 +362,12 @@ impl Points {
         self.list.retain(|p| !is_beyond(p));
         let removed = before - self.list.len();
         notes.push(format!(
-            "points: {removed} beyond the maximal crush of {crush_m} m, which the file states, removed"
+            "points: {removed} removed beyond the maximum crush of {crush_m} m that the file states"
         ));
         if last.d < crush_m * (1.0 - SAME_DISTANCE) {
             let f = last.f + (next.f - last.f) * (crush_m - last.d) / (next.d - last.d);
             self.list.insert(first, Point { d: crush_m, f, place: next.place });
-            notes.push("points: one put at the maximal crush, between its neighbours".into());
+            notes.push("points: one interpolated at the maximum crush".into());
         }
     }
 
@@ -414,12 +414,12 @@ impl Points {
             let (fits, way) = if i <= end {
                 (d[i] > d[i - 1], "increase up to the largest")
             } else {
-                (d[i] < d[i - 1], "decrease behind the largest")
+                (d[i] < d[i - 1], "decrease after the largest")
             };
             if !fits {
                 return Err(error!(
                     CurveFile,
-                    "{place}: the deflection must {way}, found {deflection_m} m after {before_m} m: give the loading branch and at most one unloading branch behind it, or a column of times",
+                    "{place}: the deflection must {way}, found {deflection_m} m after {before_m} m: give the loading branch and at most one unloading branch after it, or a time column",
                     before_m = d[i - 1],
                     deflection_m = d[i],
                     place = self.list[i].place
@@ -464,7 +464,7 @@ fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
     };
     (!steps.is_empty()).then(|| {
         format!(
-            "points: the force jumps {}{more}: the points there are set apart by {STEP_WIDTH_SHARE} of the largest deflection, at most half the way to the next",
+            "points: the force jumps {}{more}: the points there are set apart by {STEP_WIDTH_SHARE} of the maximum deflection, at most halfway to the next",
             shown.join(", ")
         )
     })
@@ -517,7 +517,7 @@ mod tests {
             let curve = columns.curve().unwrap();
             let last = (curve.deflection_m.last(), curve.force_n.last());
             assert_eq!(last, (Some(&end.0), Some(&end.1)));
-            assert!(curve.notes[0].starts_with("points: 2 beyond the maximal crush"));
+            assert!(curve.notes[0].starts_with("points: 2 removed beyond the maximum crush"));
         }
     }
 
@@ -541,7 +541,7 @@ mod tests {
         t(
             &drop,
             &apart,
-            "the force jumps from 5 to 2 N at 1 m (line 2): the points there are set apart by 0.0001 of the largest deflection",
+            "the force jumps from 5 to 2 N at 1 m (line 2): the points there are set apart by 0.0001 of the maximum deflection",
         );
         // Of many points, the ends and the extremes; at contact, too.
         let many = [(0.0, 0.0), (0.0, 2.0), (1.0, 5.0), (1.0, 6.0), (1.0, 4.0), (1.0, 1.0)];
@@ -552,7 +552,7 @@ mod tests {
         // At most half the way to the next point.
         let close = [(0.0, 0.0), (1.0, 5.0), (1.0, 2.0), (1.0001, 3.0), (4.0, 3.0)];
         let halved = [(0.0, 0.0), (1.0, 5.0), (1.00005, 2.0), (1.0001, 3.0), (4.0, 3.0)];
-        t(&close, &halved, "at most half the way to the next");
+        t(&close, &halved, "at most halfway to the next");
         // At the end a rise is loading and a fall is unloading.
         let rise = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (4.0, 9.0)];
         t(&rise, &[&rise[..4], &[(4.0 + h, 9.0)]].concat(), "from 3 to 9 N at 4 m (line 4)");
@@ -586,11 +586,11 @@ mod tests {
         let wave = [&plain[..], &[(2.5, 1.0), (2.8, 0.0)]].concat();
         t(
             &wave,
-            "line 6: the deflection must decrease behind the largest, found 2.8 m after 2.5 m",
+            "line 6: the deflection must decrease after the largest, found 2.8 m after 2.5 m",
         );
         let back = [(0.0, 0.0), (2.0, 5.0), (1.0, 3.0), (3.0, 3.0)];
         t(&back, "line 3: the deflection must increase up to the largest, found 1 m after 2 m");
-        t(&[&plain[..], &[(3.5, -1.0)]].concat(), "line 5: the force is -1 N against");
+        t(&[&plain[..], &[(3.5, -1.0)]].concat(), "line 5: the force is -1 N, opposite in sign");
         t(&[&[(-1.0, -4.0)], &plain[..]].concat(), "line 1: the force is -4 N on the other side");
     }
 }

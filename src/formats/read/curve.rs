@@ -62,7 +62,7 @@ impl ReadCurve {
                 });
                 let deflection_m = rest.iter().map(|v| (v - rest[0]) * farthest.signum()).collect();
                 changes.push(format!(
-                    "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add takes all of it)",
+                    "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add keeps all of it)",
                     1e3 * time_s[first]
                 ));
                 changes.extend(onset.warnings);
@@ -73,7 +73,7 @@ impl ReadCurve {
         if let Some(point) = envelope.first_pulling_point() {
             return Err(error!(
                 CurveFile,
-                "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and pull as 0"
+                "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and tension as 0"
             ));
         }
         let known = self.facts.unloading_stiffness_n_per_m;
@@ -207,11 +207,11 @@ pub(super) fn units(
 ) -> Result<UnitSystem, Error> {
     match (stated, given) {
         (Some((units, line)), None) => {
-            notes.push(format!("units: {units} by line {line} of the file"));
+            notes.push(format!("units: {units} from line {line} of the file"));
             Ok(units)
         }
         (Some((stated, line)), Some(given)) if stated != given => {
-            notes.push(format!("units: {given} as given; line {line} of the file says {stated}"));
+            notes.push(format!("units: {given} as given; line {line} of the file states {stated}"));
             Ok(given)
         }
         (_, Some(given)) => {
@@ -220,7 +220,7 @@ pub(super) fn units(
         }
         (None, None) => Err(error!(
             CurveFile,
-            "the file does not say its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
+            "the file does not state its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
         )),
     }
 }
@@ -284,7 +284,7 @@ pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
 }
 
 /// What to do with a file that is shorter than it says.
-pub(super) const CUT: &str = "write the file anew, it may be cut";
+pub(super) const CUT: &str = "write the file again: it may be truncated";
 
 /// Another number of values than the file declares.
 pub(super) fn miscounted(

@@ -56,7 +56,7 @@ fn utf8_or_latin1(bytes: &[u8]) -> Decoded<'_> {
         // A character of Latin-1 has the number of its byte.
         Err(_) => Decoded {
             text: bytes.iter().copied().map(char::from).collect(),
-            note: Some("text: Latin-1, as it is no UTF-8"),
+            note: Some("text: Latin-1, because it is not UTF-8"),
         },
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), Error> {
             let (tests, known) = (tests.len(), known.collect::<Vec<_>>().join(" "));
             Err(error!(
                 CurveFile,
-                "the folder holds {tests} ISO-MME tests: give those that are meant, each by itself: {known}"
+                "the folder holds {tests} ISO-MME tests: give each one you need separately: {known}"
             ))
         }
     }
@@ -104,7 +104,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
             .map_err(|e| error!(CurveFile, "expected common times, found {e}"))?;
     }
     columns.notes.push(format!(
-        "times: the channels differ in them; the displacement was interpolated to {} of the force's",
+        "times: they differ between the channels; the displacement was interpolated to {} of the force's",
         time_s.len()
     ));
     columns.force_n = common.iter().map(|&i| force.values[i]).collect();

@@ -54,7 +54,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     if both {
         notes.push(match curve.body_force_n {
             Some(_) => "force: the contact force, and the body force for the motion".into(),
-            None => "force: the one that was asked for; the file has another beside it".into(),
+            None => "force: the requested one; the file also holds the other".into(),
         });
     }
     // The body's force along the deflection is what tells the motion; a contact force alone is

@@ -164,7 +164,7 @@ pub(super) fn layout(
                 let usual = names.get(usize::from(quantity == Quantity::Force));
                 return Err(error!(
                     CurveFile,
-                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or say which column it is with {option}",
+                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or choose the column with {option}",
                     example = quantity.example(),
                     found = shown(usual.map_or("", |(_, name)| name)),
                     option = quantity.option(),
@@ -178,7 +178,7 @@ pub(super) fn layout(
     if !others.is_empty() {
         let shown = |c: &Named| format!("\"{}\" ({})", shown(&c.name), c.label.quantity.name());
         let others: Vec<String> = others.iter().map(shown).collect();
-        notes.push(format!("columns: not taken: {}", others.join(", ")));
+        notes.push(format!("columns: not used: {}", others.join(", ")));
     }
     let (mut columns, mut said, mut are_used) = (Vec::new(), Vec::new(), false);
     for Named { field, name, label, line } in taken {

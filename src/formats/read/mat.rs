@@ -169,7 +169,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
                 Place::Byte(at),
                 format_args!("matrix {}", shown(&name)),
                 format_args!("{} rows of {}", head.rows, head.columns),
-                format_args!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
+                format_args!("{} bytes after its name", bytes.len().saturating_sub(begin)),
                 CUT,
             ));
         };

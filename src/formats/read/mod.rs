@@ -353,7 +353,7 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
         .iter()
         .find(|r| (r.recognise)(input))
         .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
-        .ok_or_else(|| error!(CurveFile, "{path}: the format of this file follows neither from its content nor from its extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
+        .ok_or_else(|| error!(CurveFile, "{path}: the format of this file cannot be recognised by its content or extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.

@@ -15,7 +15,7 @@ use crate::unit::UnitSystem;
 /// Name of the table and of the matrix that our exports write, in SI.
 pub(super) const OURS: &str = "fd_load";
 
-const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
+const REMEDY: &str = " (or after the table's size: \"# d [m], F [N]\")";
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.text.strip_prefix("#1").is_some_and(|rest| rest.starts_with(['\n', '\r', ' ']))
@@ -115,7 +115,7 @@ impl File {
         for (field, word) in words.enumerate() {
             let place = Place::Field { line, field: field + 1 };
             let Some(table) = self.tables.last_mut() else {
-                let what = "a table such as \"double fd_load(4,2)\" in front of values";
+                let what = "a table such as \"double fd_load(4,2)\" before the values";
                 return Err(expected(place, what, word));
             };
             let value = value(place.clone(), word)?;

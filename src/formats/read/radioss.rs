@@ -24,7 +24,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
     if deck.functions.is_empty() {
-        let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
+        let found = "none in this file (in a run, the starter, _0000.rad, has them)";
         return Err(error!(CurveFile, "expected a /FUNCT, found {found}"));
     }
     let names = deck.functions.iter().map(|f| (f.curve.id.clone(), f.curve.title.clone()));
@@ -33,7 +33,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     if keyword != FUNCTION || unit.is_some() {
         return Err(error!(
             CurveFile,
-            "{place}: expected /FUNCT/{id} with points between which it is straight, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
+            "{place}: expected /FUNCT/{id} with linear interpolation between its points, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
             id = curve.id,
             place = Place::Line(line),
             unit = unit.map(|unit| format!("/{unit}")).unwrap_or_default()

@@ -342,7 +342,7 @@ impl<'a> Table<'a> {
         let shown = self.titles.iter().take(TITLES).map(|(_, title)| shown(title));
         let more = if self.titles.len() > TITLES { ", …" } else { "" };
         let shown: Vec<String> = shown.map(|title| format!("\"{title}\"")).collect();
-        Some(format!("titles: {lines} and no part of the table: {}{more}", shown.join(", ")))
+        Some(format!("titles: {lines}, not part of the table: {}{more}", shown.join(", ")))
     }
 
     /// The rows in their order; those of separators alone, as spreadsheets write them, are not.
@@ -423,7 +423,7 @@ pub(super) fn is_pair(line: &str) -> bool {
 }
 
 fn not_two(line: u64, found: &str) -> Error {
-    expected(Place::Line(line), "two numbers, or CONTINUE behind a curve", found)
+    expected(Place::Line(line), "two numbers, or CONTINUE after a curve", found)
 }
 
 /// How the first of these lines fits as the header of a table, and its names.

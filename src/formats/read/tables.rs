@@ -226,7 +226,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         if let Some(&before) = history.time.last().filter(|&&before| before >= at) {
             return Err(error!(
                 Rating,
-                "line {line}, column {column} (\"{name}\"): time {at} does not come after {before}: times must rise strictly, so cut or sort the file first",
+                "line {line}, column {column} (\"{name}\"): time {at} does not come after {before}: times must increase strictly, so cut or sort the file first",
                 column = time + 1,
                 name = name_of(time)
             ));
@@ -309,7 +309,7 @@ mod tests {
         t(
             "#\nt,a\n0,1\n2,1\n1,1\n",
             None,
-            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must rise strictly, so cut or sort the file first",
+            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must increase strictly, so cut or sort the file first",
         );
         t(
             "t,a\n0,1\n0,5,2\n",

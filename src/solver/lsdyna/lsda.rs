@@ -213,7 +213,7 @@ fn record<'a>(
     let Some(head) = window.get(at, frame, ahead)? else { return Ok(Err(None)) };
     let (length, command) = (header.unsigned(&head[..width]), head[width]);
     if !COMMANDS.contains(&command) || length < frame as u64 {
-        return Ok(Err(Some(format!("command {command} and {length} bytes make no record"))));
+        return Ok(Err(Some(format!("command {command} and {length} bytes are not a record"))));
     }
     if length > size - at {
         return Ok(Err(None));
@@ -248,7 +248,7 @@ fn record<'a>(
             let bytes = payload - before;
             if !bytes.is_multiple_of(item as u64) {
                 return Ok(Err(Some(format!(
-                    "{name} has {bytes} bytes, no whole number of values"
+                    "{name} has {bytes} bytes, not a whole number of values"
                 ))));
             }
             let payload = Payload { kind, at: from + before, bytes };

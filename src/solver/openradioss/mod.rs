@@ -113,4 +113,4 @@ fn empty(section: &str) -> SolverFile {
     }
 }
 
-const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so that the last force changes where the record goes on";
+const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so the last force changes when the record continues";

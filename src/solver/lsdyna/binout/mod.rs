@@ -76,7 +76,7 @@ fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<Solv
 /// A directory whose data are not histories.
 fn unread(name: &str, records: usize) -> SolverFile {
     let message = format!(
-        "{name}: {} not read: they do not stand in states (d000001, d000002, …) with times",
+        "{name}: {} not read: they are not in states (d000001, d000002, …) with times",
         counted(records, "record")
     );
     SolverFile {

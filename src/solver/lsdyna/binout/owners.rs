@@ -74,7 +74,7 @@ impl Entities {
             return Ok(Found::Entities(Self::Global, 1));
         }
         let message = format!(
-            "{}: {} has {width} values a state and no ids of that number; it is not read",
+            "{}: {} has {width} values per state but a different number of ids; it is not read",
             section.name, component.name
         );
         Ok(Found::Unfit(Problem::new(ProblemCode::UnreadRows, message)))
@@ -141,7 +141,7 @@ impl EntityList {
             let again = rows().filter(|(row, _)| **row == limit + 1).count();
             let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
             let message = format!(
-                "{}: {again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
+                "{}: {again} ids, the first {}, occur more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
                 section.name,
                 first.unwrap_or_default(),
                 if limit == 1 { "once".to_string() } else { format!("{limit} times") },

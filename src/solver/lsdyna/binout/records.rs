@@ -101,7 +101,7 @@ impl Tree {
             }
             Event::Damage { at, resumed, message } => {
                 let rest = match resumed {
-                    Some(byte) => format!("reading goes on at byte {byte}"),
+                    Some(byte) => format!("reading continues at byte {byte}"),
                     None => "what follows is left out".into(),
                 };
                 let message = format!("damaged record: {message}; {rest}");

@@ -67,7 +67,7 @@ impl StateReader {
 fn order_of(section: &Section) -> Option<Problem> {
     if section.repeated > 0 {
         let message = format!(
-            "{}: {} records are there again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
+            "{}: {} records occur again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
             section.name,
             section.repeated,
             section.first_repeated.unwrap_or_default()
@@ -230,7 +230,7 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
     });
     let twice = changed.map(twice).max().unwrap_or(0);
     let message = format!(
-        "{}: {twice} ids are there twice in one state; the last value of each is returned",
+        "{}: {twice} ids occur twice in one state; the last value of each is returned",
         section.name
     );
     (twice > 0).then(|| Problem::new(ProblemCode::RepeatedLabel, message))

@@ -65,7 +65,7 @@ impl Context {
             Defined::Full => self.note_full("parameters"),
             Defined::Contradicts => {
                 let message = format!(
-                    "parameter \"{name}\" has another value above; it is taken as not known"
+                    "parameter \"{name}\" has another value above; it is treated as unknown"
                 );
                 self.problem(ProblemCode::BadField, place, None, message);
             }

@@ -100,7 +100,7 @@ impl<'a, 'o> Includes<'a, 'o> {
             None if too_deep => {
                 format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out")
             }
-            None => format!("include \"{name}\" is not there"),
+            None => format!("include \"{name}\" is missing"),
         };
         context.problem(ProblemCode::UnreadRows, place, None, problem);
         None

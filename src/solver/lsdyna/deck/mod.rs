@@ -287,7 +287,7 @@ after the end
             [
                 "line 5: include \"parts.k\" includes itself; it is not read again (in \"mesh/fine/parts.k\")",
                 "line 8, columns 1-1: expected an integer, found \"x\" (in \"mesh/fine/parts.k\")",
-                "line 8: include \"gone.k\" is not there",
+                "line 8: include \"gone.k\" is missing",
                 "line 11: *INCLUDE_TRANSFORM: files included by this keyword are not read",
             ]
         );
