@@ -105,6 +105,31 @@ impl Shown {
     pub(crate) fn text(self, value: f64) -> String {
         format!("{:.*} {}", self.decimals, value / self.size, self.unit)
     }
+
+    /// One force in the unit that fits it.
+    pub(crate) fn one_force(force_n: f64) -> String {
+        Self::force(force_n).text(force_n)
+    }
+
+    /// One mass in the unit that fits it.
+    pub(crate) fn one_mass(mass_kg: f64) -> String {
+        Self::mass(mass_kg).text(mass_kg)
+    }
+
+    /// One energy in the unit that fits it.
+    pub(crate) fn one_energy(energy_j: f64) -> String {
+        Self::energy(energy_j).text(energy_j)
+    }
+
+    /// One stiffness in the unit that fits it.
+    pub(crate) fn one_stiffness(stiffness_n_per_m: f64) -> String {
+        Self::stiffness(stiffness_n_per_m).text(stiffness_n_per_m)
+    }
+
+    /// One impulse in the unit that fits it.
+    pub(crate) fn one_impulse(impulse_ns: f64) -> String {
+        Self::fitting(impulse_ns, 0.1, &[(1e3, "kN·s", 3), (1.0, "N·s", 2)]).text(impulse_ns)
+    }
 }
 
 /// A speed as people in the field read it: `36 km/h`, at most two decimals.

@@ -165,7 +165,10 @@ fn a_killed_run_says_nothing_of_the_others() {
     let first: Vec<&str> = text.split_inclusive('\n').take(40).collect();
     fs::write(&rwforc, first.concat()).unwrap();
     let printed = crumple_ok(here, &["init", "runs", "-o", "force.toml"]);
-    assert!(printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."), "{printed}");
+    assert!(
+        printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."),
+        "{printed}"
+    );
     assert!(printed.contains("\n36kmh  36 km/h     24.00 "), "{printed}");
 }
 
@@ -196,8 +199,9 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     let printed = crumple_ok(here, &["init", "runs"]);
     assert!(printed.contains("left out: runs/48kmh: the folder is empty"), "{printed}");
     assert!(
-        printed
-            .ends_with("wrote study.toml (1 run): check the guessed values, then run crumple build\n")
+        printed.ends_with(
+            "wrote study.toml (1 run): check the guessed values, then run crumple build\n"
+        )
     );
     // What is left to fill in is counted where the next step is named.
     fs::remove_file(here.join("runs/36kmh/rwforc")).unwrap();

@@ -276,8 +276,9 @@ fn wrong_input_says_where_and_what_to_do() {
     );
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
     assert!(
-        error
-            .contains("a CSV file has the extension .csv, or its column after its name: note:COLUMN"),
+        error.contains(
+            "a CSV file has the extension .csv, or its column after its name: note:COLUMN"
+        ),
         "{error}"
     );
     t(

@@ -780,9 +780,7 @@ fn of_a_state_written_twice_the_last_writing_counts() {
     assert_eq!(values(&file, 1, "normal_force"), [1e6, 1e5, 1e6]);
     assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
     let message = file.problems[0].to_string();
-    assert!(
-        message.ends_with("the state at time 0.045002 is written twice: the last one counts")
-    );
+    assert!(message.ends_with("the state at time 0.045002 is written twice: the last one counts"));
     // States as near to each other as their times can tell are not.
     let near = ["1.00000E+01", "1.00001E+01", "1.00001E+01", "1.00002E+01"].map(|t| (t, one));
     let file = read("rwforc", &wall_rows(&near));

@@ -8,7 +8,7 @@ use crate::init::{
     self, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal, UserHints,
 };
 use crate::study::StudyKind;
-use crate::unit::{UnitSystem, km_per_h};
+use crate::unit::{Shown, UnitSystem, km_per_h};
 use serde::Serialize;
 
 use super::arguments;
@@ -206,7 +206,7 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     }
     writeln!(out)?;
     let rows: Vec<Vec<String>> = proposal.runs.iter().map(row).collect();
-    output::table(out, &["run", "speed", "mass (t)", "max crush (m)", "states"], &rows)?;
+    output::table(out, &["run", "speed", "mass", "max crush (m)", "states"], &rows)?;
     for note in &proposal.notes {
         writeln!(out, "note: {note}")?;
     }
@@ -256,7 +256,7 @@ fn row(run: &ProposedRun) -> Vec<String> {
     vec![
         run.name.clone(),
         shown(run.speed_m_per_s.value().map(|v| km_per_h(*v))),
-        shown(run.mass_kg.value().map(|kg| format!("{:.2}", kg / 1e3))),
+        shown(run.mass_kg.value().map(|kg| Shown::one_mass(*kg))),
         shown(run.crush_m.map(|m| format!("{m:.3}"))),
         run.states.to_string(),
     ]

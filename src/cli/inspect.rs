@@ -18,15 +18,13 @@ use crate::solver::runs::{output_files, run_folders};
 
 /// Say what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
-#[command(
-    after_help = "Titles missing from a file are taken from the keyword deck next to it.
+#[command(after_help = "Titles missing from a file are taken from the keyword deck next to it.
 Examples:
   crumple inspect run/nodout
   crumple inspect run/main.k               # what a deck says of its run
   crumple inspect runs                     # the files of every run below a folder
   crumple inspect run/nodout run/rcforc --json
-  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged"
-)]
+  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged")]
 pub(super) struct Args {
     /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]

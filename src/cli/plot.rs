@@ -146,7 +146,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage("standard output can take only one of them: one \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: one \"-o -\", or --json".into(),
+        ));
     }
     let mut chart = chart(args, options)?;
     if let Some(title) = &args.title {

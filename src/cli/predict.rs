@@ -66,7 +66,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.target.check(&formats)?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage("standard output can take only one of them: one \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: one \"-o -\", or --json".into(),
+        ));
     }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
@@ -165,7 +167,9 @@ fn files<'a>(
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
     let (one, how) = match band.left_out {
-        LeftOutSpeeds::Inner => ("curve", "left out in turn, scaled to the interval between the neighbouring speeds"),
+        LeftOutSpeeds::Inner => {
+            ("curve", "left out in turn, scaled to the interval between the neighbouring speeds")
+        }
         LeftOutSpeeds::Ends => ("end", "of the range left out, growing with the distance"),
     };
     format!("{place}, from {} {how}", counted(band.curves, one))

@@ -241,7 +241,8 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
     let both = &args.both;
     let [a_is_table, b_is_table] = is_table;
     let (any_table, all_tables) = (a_is_table || b_is_table, a_is_table && b_is_table);
-    let column = "names a column of a CSV file, but this is a solver file: use --id and --component";
+    let column =
+        "names a column of a CSV file, but this is a solver file: use --id and --component";
     let history = "chooses a history of a solver file, but this is a CSV file: use --column";
     for (option, given, fits, why) in [
         ("--column", both.column.is_some(), any_table, column),

@@ -67,7 +67,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
     options.keep_others(&args.output, FileKind::Curve)?;
     if is_stdout(&args.output) && options.json {
-        return Err(Failure::Usage("standard output can take only one of them: \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: \"-o -\", or --json".into(),
+        ));
     }
     let database = Database::read(&args.database)?;
     let settings = ReportSettings {

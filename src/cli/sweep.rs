@@ -235,8 +235,10 @@ impl<'a> Document<'a> {
 fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> CommandResult {
     let Document { report, seconds, output } = document;
     if report.failed > 0 {
-        let mut text =
-            format!("{} of {} items failed; their rows give the reason", report.failed, report.rows);
+        let mut text = format!(
+            "{} of {} items failed; their rows give the reason",
+            report.failed, report.rows
+        );
         for (item, message) in &report.messages {
             text.push_str(&format!("\n  item {item}: {message}"));
         }

@@ -385,12 +385,15 @@ fn band_line(force: &str, band: &Band) -> String {
                 "between training speeds {span} apart, otherwise scaled by the interval to the power {POWER_OF_GAP}"
             ),
         ),
-        LeftOutSpeeds::Ends => {
-            ("end", format!("{span} outside the training speeds, elsewhere in proportion to the distance"))
-        }
+        LeftOutSpeeds::Ends => (
+            "end",
+            format!("{span} outside the training speeds, elsewhere in proportion to the distance"),
+        ),
     };
     let coverage = match band.coverage {
-        Some(share) => format!("covers {} of the points of the other left-out curves", percent(share)),
+        Some(share) => {
+            format!("covers {} of the points of the other left-out curves", percent(share))
+        }
         None => format!("one {of} cannot be checked against others"),
     };
     let parts = match band.scatter {

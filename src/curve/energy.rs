@@ -228,10 +228,11 @@ impl StatedConditions<'_> {
     }
 
     fn shown_mass(&self) -> String {
-        let tonnes = |kg: f64| format!("{} t", significant(kg / 1e3));
         match self.masses.other_kg {
-            Some(other) => format!("{} on {}", tonnes(self.masses.body_kg), tonnes(other)),
-            None => tonnes(self.masses.body_kg),
+            Some(other) => {
+                format!("{} on {}", significant_mass(self.masses.body_kg), significant_mass(other))
+            }
+            None => significant_mass(self.masses.body_kg),
         }
     }
 
@@ -267,10 +268,7 @@ impl StatedConditions<'_> {
         let mass = balance
             .impulse
             .map(|i| {
-                format!(
-                    " (impulse and speeds give {} t)",
-                    significant(i * self.masses.body_kg / 1e3)
-                )
+                format!(" (impulse and speeds give {})", significant_mass(i * self.masses.body_kg))
             })
             .unwrap_or_default();
         match work {
@@ -322,6 +320,15 @@ impl StatedConditions<'_> {
                 && (USUAL_LOADING_S.0..=USUAL_LOADING_S.1).contains(&(loading_s * time));
             all.then_some(name)
         })
+    }
+}
+
+/// A mass with four digits, in t or kg.
+fn significant_mass(kg: f64) -> String {
+    if kg < 1e3 {
+        format!("{} kg", significant(kg))
+    } else {
+        format!("{} t", significant(kg / 1e3))
     }
 }
 

@@ -15,6 +15,7 @@ use super::{Curve, EnergyAudit, Quality, RecordedCurves, contact, energy, loadin
 use crate::error::{Error, ErrorCode, error};
 use crate::plural::counted;
 use crate::signal::interpolate;
+use crate::unit::Shown;
 
 /// Study of the cases that were added from files and not built of FE runs.
 pub(crate) const IMPORTED: &str = "imported";
@@ -219,8 +220,8 @@ fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String
     match found {
         Some(found) => Ok(format!(
             "unloading: {} in the record, {} is stated",
-            found / 1e6,
-            stated / 1e6
+            Shown::one_stiffness(found),
+            Shown::one_stiffness(stated)
         )),
         None => Err("unloading: a record over time keeps its own, which it does not hold; the stated one is not used".into()),
     }

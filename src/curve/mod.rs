@@ -133,9 +133,7 @@ impl ForceKind {
     pub fn drives(self) -> &'static str {
         match self {
             Self::Body => "bodies of one mass",
-            Self::Contact => {
-                "bodies whose crush zone is a separate mass, not a single rigid mass"
-            }
+            Self::Contact => "bodies whose crush zone is a separate mass, not a single rigid mass",
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::{ForceKind, Masses};
 use crate::error::{Error, error};
-use crate::unit::{Speed, UnitSystem};
+use crate::unit::{Shown, Speed, UnitSystem};
 
 /// A table of force over deflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +237,7 @@ impl MotionBuilder {
             Some(stiffness) => {
                 self.motion.notes.push(format!(
                     "unloading: a line of {} from the maximum deflection",
-                    stiffness / 1e6
+                    Shown::one_stiffness(stiffness)
                 ));
                 stiffness
             }
@@ -251,7 +251,7 @@ impl MotionBuilder {
                 }
                 self.motion.warnings.push(format!(
                     "unloading: neither the file nor --unloading gives it; the steepest rise, {}, is used: give --unloading …MN/m",
-                    steepest / 1e6
+                    Shown::one_stiffness(steepest)
                 ));
                 steepest
             }

@@ -182,7 +182,10 @@ impl Findings<'_> {
             {
                 let odd = least_like_neighbours(&values);
                 let which = odd.map_or(String::new(), |i| {
-                    format!("; the one that fits its neighbours least is {path}[{i}] = {}", values[i])
+                    format!(
+                        "; the one that fits its neighbours least is {path}[{i}] = {}",
+                        values[i]
+                    )
                 });
                 let message =
                     format!("the values of {path} differ from those that were written{which}");

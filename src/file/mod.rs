@@ -178,10 +178,7 @@ pub(super) fn explained(path: &Path, source: io::Error) -> io::Error {
         (io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem, Ok(meta))
             if meta.is_dir() && source.raw_os_error().is_some() =>
         {
-            format!(
-                "cannot write in the folder {} ({source}): name another",
-                folder.display()
-            )
+            format!("cannot write in the folder {} ({source}): name another", folder.display())
         }
         _ => return source,
     };

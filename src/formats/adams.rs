@@ -124,7 +124,14 @@ impl<'a> Spline<'a> {
             };
             Some((length.to_string(), force))
         };
-        let (length, force) = names.and_then(words).ok_or_else(|| error!(Export, "columns need units that have a name: lengths in {lengths}, forces in {forces}", forces = "N, kN", lengths = LENGTH.known_units()))?;
+        let (length, force) = names.and_then(words).ok_or_else(|| {
+            error!(
+                Export,
+                "columns need units that have a name: lengths in {lengths}, forces in {forces}",
+                forces = "N, kN",
+                lengths = LENGTH.known_units()
+            )
+        })?;
         let mut lines = Lines::default();
         self.comments(&mut lines, "$");
         lines.add(format_args!("[MDI_HEADER]"));

@@ -9,7 +9,7 @@ use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::Beyond;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl ExportCurve {
                     return Err(error!(
                         Export,
                         "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
-                        stiffness / 1e6
+                        Shown::one_stiffness(stiffness)
                     ));
                 }
             }
@@ -144,9 +144,9 @@ impl ExportCurve {
         Some(format!(
             "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}",
             self.headline(),
-            self.stiffness_n_per_m() / 1e6,
-            before / 1e6,
-            after / 1e6
+            Shown::one_stiffness(self.stiffness_n_per_m()),
+            Shown::one_force(before),
+            Shown::one_force(after)
         ))
     }
 
@@ -238,7 +238,7 @@ impl ExportCurve {
         let theirs = self.restitution(unloading);
         let how = match unloading {
             TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),
-            TargetUnloading::Line(k) => format!("it unloads with {}", k / 1e6),
+            TargetUnloading::Line(k) => format!("it unloads with {}", Shown::one_stiffness(k)),
         };
         format!(
             "{}: restitution {theirs:.3} in {target} ({how}), {ours:.3} in crumple's own runs",
@@ -255,8 +255,8 @@ impl ExportCurve {
         if steepest > own * 1.01 {
             notes.push(format!(
                 "{target} unloads with the steepest rise, {}, which is more than the curve's own {}: --soften makes the steep rise less steep at equal energy{other}",
-                steepest / 1e6,
-                own / 1e6
+                Shown::one_stiffness(steepest),
+                Shown::one_stiffness(own)
             ));
         }
         notes

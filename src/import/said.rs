@@ -4,7 +4,7 @@ use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
 use crate::error::{Error, error};
 use crate::formats::read::{Metadata, ReadCurve};
-use crate::unit::{Speed, SpeedKind, km_per_h};
+use crate::unit::{Shown, Speed, SpeedKind, km_per_h};
 
 /// The impact of a curve, and which force it is.
 pub(super) struct Said {
@@ -114,10 +114,12 @@ impl StatedAndFound<'_> {
     }
 
     fn masses(&mut self, kind: SpeedKind) -> Result<Masses, Error> {
-        let tonnes = |kg: f64| format!("{} t", kg / 1e3);
-        let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), tonnes)?;
+        let shown = |kg: f64| {
+            if kg < 1e3 { format!("{kg} kg") } else { format!("{} t", kg / 1e3) }
+        };
+        let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), shown)?;
         let others = (self.settings.other_mass_kg, self.facts.other_mass_kg);
-        let other = self.either("other mass", others, tonnes)?;
+        let other = self.either("other mass", others, shown)?;
         let body_kg =
             mass.ok_or_else(|| self.missing("the mass of the body", "--mass, such as --mass 24t"))?;
         let other_kg = match (kind, other) {
@@ -142,8 +144,7 @@ impl StatedAndFound<'_> {
     fn unloading(&mut self) -> Result<(), Error> {
         let stated = self.settings.unloading_stiffness_n_per_m;
         let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
-        let shown = |k: f64| format!("{:.4} MN/m", k / 1e6);
-        self.either("unloading stiffness", both, shown).map(|_| ())
+        self.either("unloading stiffness", both, Shown::one_stiffness).map(|_| ())
     }
 
     fn force(&mut self) -> Result<ForceKind, Error> {
@@ -157,8 +158,9 @@ impl StatedAndFound<'_> {
             )),
             (Some(force), _) | (None, Some(force)) => Ok(force),
             (None, None) => {
-                self.notes
-                    .push("force: taken as the contact force, because nothing states which it is".into());
+                self.notes.push(
+                    "force: taken as the contact force, because nothing states which it is".into(),
+                );
                 Ok(ForceKind::Contact)
             }
         }

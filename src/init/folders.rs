@@ -233,7 +233,9 @@ pub(crate) enum Reason {
     #[error("it holds no solver files")]
     NoSolverFiles,
     /// A solver's file has another name than the solver gave it.
-    #[error("it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly")]
+    #[error(
+        "it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly"
+    )]
     Renamed {
         file: String,
         /// What it looks like.

@@ -80,8 +80,9 @@ impl Sources {
         }
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
-            let hint = misnamed(folder)
-                .map_or(String::new(), |name| format!("; if {name} is the {MOTION}, rename it accordingly"));
+            let hint = misnamed(folder).map_or(String::new(), |name| {
+                format!("; if {name} is the {MOTION}, rename it accordingly")
+            });
             found.extend(unread.iter().map(|why| format!("({why})")));
             Reason::NoMotion { found: found.join(", ") + &hint }
         })?;

@@ -259,8 +259,7 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         ));
     }
     if reference.iter().all(|&r| r == 0.0) {
-        warnings
-            .push("the reference is zero throughout: relative measures are undefined".into());
+        warnings.push("the reference is zero throughout: relative measures are undefined".into());
     }
     if rating.iso18571.is_none() {
         warnings.push(format!(

@@ -240,8 +240,7 @@ impl Validated<'_> {
         if let Ok(set) = TrainingSet::new(group, *cases)
             && let Some(next) = next_run(&set, validation)
         {
-            let advice =
-                format!("Next FE run: {}: {}.", km_per_h(next.speed_m_per_s), next.reason);
+            let advice = format!("Next FE run: {}: {}.", km_per_h(next.speed_m_per_s), next.reason);
             parts.push(Part::Text(advice));
         }
         Ok(())

@@ -173,6 +173,7 @@ fn methods(comparison: &TrainComparison) -> Table {
         cells.extend(row.vehicles.iter().map(|v| percent(v.velocity_l1).into()));
         cells
     });
-    let caption = format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
+    let caption =
+        format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
     table(&caption, &heading, rows.collect())
 }

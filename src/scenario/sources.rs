@@ -196,6 +196,8 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, Error> {
         f.push(to);
     }
     Envelope::new(d, f).map_err(|error| {
-        Error::below(ErrorCode::Scenario, error).of("its stages do not form a curve").at_key("stages")
+        Error::below(ErrorCode::Scenario, error)
+            .of("its stages do not form a curve")
+            .at_key("stages")
     })
 }

@@ -8,6 +8,7 @@ use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::predict_driving;
 use crate::surrogate::{Model, PredictedCurve, Query, Warning, invalid};
+use crate::unit::Shown;
 
 /// The curve at one interface, with its warnings.
 pub(super) struct Spring {
@@ -186,7 +187,7 @@ impl Spring {
         if asked.is_none() && known.is_none() && steepest > 0.0 {
             warnings.push(format!(
                 "it has no unloading stiffness: it unloads with its steepest rise, {}, which decides the rebound: set unloading = \"…MN/m\"",
-                steepest / 1e6
+                Shown::one_stiffness(steepest)
             ));
         }
         if let Some(asked) = asked
@@ -195,8 +196,8 @@ impl Spring {
         {
             warnings.push(format!(
                 "unloading {} is softer than the curve's steepest rise ({}): there it unloads as steeply as it rises",
-                asked / 1e6,
-                steepest / 1e6
+                Shown::one_stiffness(asked),
+                Shown::one_stiffness(steepest)
             ));
         }
         let stiffness = asked.or(known).unwrap_or(steepest);

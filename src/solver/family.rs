@@ -127,9 +127,7 @@ fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<Stri
     for file in files {
         if is_file(&file)? {
             let missing = name_of(&missing);
-            return Ok(Some(format!(
-                "{missing} is missing, so its continuation is not read"
-            )));
+            return Ok(Some(format!("{missing} is missing, so its continuation is not read")));
         }
     }
     Ok(None)

@@ -12,7 +12,7 @@ use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::file::is_file;
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
-use crate::unit::UnitSystem;
+use crate::unit::{Shown, UnitSystem};
 
 impl LocatedRun<'_> {
     /// Reads the selected histories and extracts the case.
@@ -146,9 +146,9 @@ impl LocatedRun<'_> {
         ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
             format!(
                 "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies moves",
-                found_j / 1e6,
-                stated_j / 1e6,
-                ratio * masses.body_kg / 1e3
+                Shown::one_energy(found_j),
+                Shown::one_energy(stated_j),
+                Shown::one_mass(ratio * masses.body_kg)
             )
         })
     }

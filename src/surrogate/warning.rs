@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::plural::counted;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -223,9 +223,9 @@ impl Warning {
         Self {
             code: WarningCode::OtherMass,
             message: format!(
-                "the mass of {:.3} t differs from the training runs' {:.3} t: rate effects are those of the training mass",
-                mass_kg / 1e3,
-                trained_kg / 1e3
+                "the mass of {} differs from the training runs' {}: rate effects are those of the training mass",
+                Shown::one_mass(mass_kg),
+                Shown::one_mass(trained_kg)
             ),
         }
     }

@@ -78,8 +78,7 @@ pub(super) struct CopyArgs {
 pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     if args.to.is_none() && args.to_group.is_none() {
         return Err(Failure::Usage(
-            "name the destination with --to-group, --to (another database) or both"
-                .into(),
+            "name the destination with --to-group, --to (another database) or both".into(),
         ));
     }
     let selection = args.chosen.some("copied")?;
@@ -148,9 +147,9 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     print_together(out, "added", added)?;
     let (own, other): (Vec<&From>, Vec<&From>) =
         equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
-    print_together(out, "there already:", own)?;
+    print_together(out, "already present:", own)?;
     for (what, cases) in [
-        ("there already:", other),
+        ("already present:", other),
         ("renamed", renamed.iter().collect()),
         ("replaced", replaced.iter().collect()),
     ] {

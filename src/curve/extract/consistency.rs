@@ -9,6 +9,7 @@ use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, loading};
 use crate::signal::interpolate;
+use crate::unit::Shown;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
 /// time; a clock that is 10 ms off makes it 11 to 45 %.
@@ -27,8 +28,7 @@ const STATES: usize = 100;
 /// Effect of the sampling on the curve, as a share of its mean force, that deserves a warning.
 const SAMPLED_OFF: f64 = 0.02;
 /// Where two histories of one record cannot be one run's.
-const OTHER_FILES: &str =
-    "likely files of two runs, the wrong node or wall, or shifted times";
+const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or shifted times";
 /// A peak is a spike above these multiples of the states beside it and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Free flight in fewer states says nothing of gravity.
@@ -108,10 +108,10 @@ pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
     (force_n[peak] > SPIKE.0 * beside && force_n[peak] > SPIKE.1 * others).then(|| {
         format!(
             "force: the peak of {} is a single state, at {}; its neighbours reach {}, all other states {}: check whether it is damaged",
-            force_n[peak] / 1e6,
+            Shown::one_force(force_n[peak]),
             milliseconds(time_s[peak]),
-            beside / 1e6,
-            others / 1e6
+            Shown::one_force(beside),
+            Shown::one_force(others)
         )
     })
 }
@@ -198,12 +198,14 @@ impl<'a> Motion<'a> {
             let lost_ns = self.lost_ns(first - 1, last);
             if given_ns > LATE_FORCE.1 * whole_ns && (given_ns - lost_ns).abs() > 0.5 * given_ns {
                 remarks.warn(format!(
-                    "force: between {} and {}, after the contact, its impulse is {:.3} kN·s, but the momentum changes by {lost:.3} kN·s: this force, of up to {}, does not act on this body",
+                    "force: between {} and {}, after the contact, its impulse is {}, but the momentum changes by {lost}: this force, of up to {}, does not act on this body",
                     milliseconds(self.at(first)),
                     milliseconds(self.at(last)),
-                    given_ns / 1e3,
-                    force_n[first..=last].iter().copied().fold(0.0, f64::max) / 1e6,
-                    lost = lost_ns / 1e3,
+                    Shown::one_impulse(given_ns),
+                    Shown::one_force(
+                        force_n[first..=last].iter().copied().fold(0.0, f64::max)
+                    ),
+                    lost = Shown::one_impulse(lost_ns),
                 ));
             }
             from = last + 1;
@@ -230,9 +232,9 @@ impl<'a> Motion<'a> {
         }
         let ratio = integral(&times, &force_n)[times.len() - 1] / lost_ns;
         let found = format!(
-            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum that {:.4} t lose; it would fit {:.4} t",
-            self.masses.body_kg / 1e3,
-            ratio * self.masses.body_kg / 1e3
+            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum that {} lose; it would fit {}",
+            Shown::one_mass(self.masses.body_kg),
+            Shown::one_mass(ratio * self.masses.body_kg)
         );
         // Other contacts may act as well, but none pulls.
         if ratio > POSSIBLE.1 {

@@ -149,10 +149,8 @@ fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
     let mut remarks = Notes::default();
     // Of a run that ended while loading: of what it had stopped by then.
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
-        remarks.warn(format!(
-            "energy: the curve absorbs {:.1} % of the kinetic energy",
-            work * 100.0
-        ));
+        remarks
+            .warn(format!("energy: the curve absorbs {:.1} % of the kinetic energy", work * 100.0));
     }
     if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
         remarks.warn(format!(

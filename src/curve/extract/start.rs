@@ -7,6 +7,7 @@ use super::record::{Record, impulse};
 use super::remarks::Notes;
 use crate::curve::contact::{self, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
+use crate::unit::Shown;
 
 /// A beginning of the crush, as a share of it, that brings less than this share of the impulse
 /// is doubtful: light noses of real runs bring twice as much and more.
@@ -154,10 +155,10 @@ impl Start {
         let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);
         if early_ns > EARLY_SHARE * (early_ns + rest_ns) {
             remarks.warn(format!(
-                "contact: before {}, the start set in the manifest, the force reaches {} and its impulse {:.3} kN·s, {:.1} % of that up to the maximum crush: the curve leaves it out; check contact_time, gap and offset",
+                "contact: before {}, the start set in the manifest, the force reaches {} and its impulse {}, {:.1} % of that up to the maximum crush: the curve leaves it out; check contact_time, gap and offset",
                 milliseconds(contact.time_s),
-                force_n[..before].iter().copied().fold(0.0, f64::max) / 1e6,
-                early_ns / 1e3,
+                Shown::one_force(force_n[..before].iter().copied().fold(0.0, f64::max)),
+                Shown::one_impulse(early_ns),
                 100.0 * early_ns / (early_ns + rest_ns)
             ));
         }

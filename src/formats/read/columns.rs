@@ -251,7 +251,9 @@ impl Points {
         self.check_order()?;
         if self.list[0].d > 0.0 {
             let (d, place) = (self.list[0].d, self.list[0].place.clone());
-            notes.push(format!("points: the curve starts at {d} m; a point (0, 0) is added in front"));
+            notes.push(format!(
+                "points: the curve starts at {d} m; a point (0, 0) is added in front"
+            ));
             self.list.insert(0, Point { d: 0.0, f: 0.0, place });
         }
         Ok(std::mem::take(&mut self.list))
@@ -264,7 +266,9 @@ impl Points {
         let push = on_side.map(|p| p.f).sum::<f64>();
         let push = if push < 0.0 { -1.0 } else { 1.0 };
         let what = match (side < 0.0, push < 0.0) {
-            (true, true) => "the curve lies in the third quadrant; deflection and force are reversed",
+            (true, true) => {
+                "the curve lies in the third quadrant; deflection and force are reversed"
+            }
             (true, false) => "the deflection is reversed",
             (false, true) => "the force is reversed",
             (false, false) => return,
@@ -584,10 +588,7 @@ mod tests {
         t(&plain.map(|(d, _)| (d, 0.0)), "the force is 0 in every point");
         t(&plain.map(|(_, f)| (0.0, f)), "the deflection is 0 in every point");
         let wave = [&plain[..], &[(2.5, 1.0), (2.8, 0.0)]].concat();
-        t(
-            &wave,
-            "line 6: the deflection must decrease after the largest, found 2.8 m after 2.5 m",
-        );
+        t(&wave, "line 6: the deflection must decrease after the largest, found 2.8 m after 2.5 m");
         let back = [(0.0, 0.0), (2.0, 5.0), (1.0, 3.0), (3.0, 3.0)];
         t(&back, "line 3: the deflection must increase up to the largest, found 1 m after 2 m");
         t(&[&plain[..], &[(3.5, -1.0)]].concat(), "line 5: the force is -1 N, opposite in sign");

@@ -173,7 +173,8 @@ impl Reader<'_, '_> {
     /// Reads a card; `Some` if it includes a file that is there.
     fn card(&mut self, block: &mut Block, line: &Line<'_>) -> Option<Included> {
         if line.overlong {
-            let message = "expected a card, found a line of more than 4096 bytes; the rest of it is left out";
+            let message =
+                "expected a card, found a line of more than 4096 bytes; the rest of it is left out";
             self.context.problem(ProblemCode::BadLine, line.into(), None, message.into());
         }
         let card = Card::new(line, block.format);
