@@ -24,7 +24,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
   crumple build other-study.toml -o curves.h5     # adds a group
 Only runs that changed since the last build are read again. A run that cannot be used is
 reported and left out (exit code 1); the others are built. W/E is the work of a curve over the
-energy of its impact: up to 5 % off 1 is usual, more is a wrong mass, speed or unit.")]
+energy of its impact: within 5 % of 1 is usual; more points to a wrong mass, speed or unit.")]
 pub(super) struct Args {
     /// Study manifest (TOML); study.toml if absent
     study: Option<PathBuf>,

@@ -20,24 +20,24 @@ use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
-/// Compare FE with FDRM, NSDM, DDTCM and the best model, each in the same multi-body model
+/// Compare FE with FDRM, NSDM, DDTCM and the best model, all in the same multi-body model
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple compare curves.h5 --group lead-car-wall --speed 48km/h
   crumple compare curves.h5 --group lead-car-wall                 # every inner speed, and means
   crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
   crumple compare --train train-set.toml
-Rows: fe is FE's own curve in the one-mass model, the floor for predictions of that force; fe_body is
-made from FE's own speeds and checks that curve, force law and run are consistent; fdrm is the FE
-curve of one speed, nsdm the spring and damper fitted to that run; ddtcm the reference
-method's forest and spline; best the model that leaving speeds out chooses
-among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
-largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
-those under velocity and acceleration are taken at 10 kHz, as crumple rate takes them.
-With --train, a scenario whose curves are cases of a database runs with the curves of each method,
-and the vehicles' speeds are compared with FE's, which its [reference] names. rate_live lets the
-crush force follow the speeds of the run; split_ends gives each vehicle two ends with the mass that
-they stop. Several trains are compared one by one and in their means.")]
+Rows: fe is FE's own contact force in the one-mass model, the floor for predictions of that force;
+fe_body is derived from FE's own speeds and checks that curve, force law and run agree; fdrm is
+FE's curve at one other speed; nsdm is the spring and damper fitted to that run; ddtcm is the
+reference method's random forest and spline; best is the model chosen by leaving speeds out,
+without this one, driven by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after
+FE's maximum crush; accelerations are filtered with CFC 60, unfiltered in brackets. --json has
+every measure; those of velocity and acceleration are evaluated at 10 kHz, as by crumple rate.
+With --train, a scenario whose curves are database cases is run with the curves of each method, and
+the vehicles' speeds are compared with the FE run in its [reference]. rate_live lets the crush
+force follow the closing speeds of the run; split_ends gives each vehicle two ends with the mass
+that they stop. Several trains are compared one by one and on average.")]
 pub(super) struct Args {
     /// Curve database
     #[arg(required_unless_present = "train", conflicts_with = "train")]

@@ -9,19 +9,19 @@ use super::arguments::{mass, one_of};
 /// How a curve's file is read.
 #[derive(clap::Args)]
 pub(super) struct Reading {
-    /// Format of the file, if not by its content (crumple db add --list)
+    /// Format of the file, if not recognised by its content (crumple db add --list)
     #[arg(long)]
     from: Option<String>,
-    /// Number or name of the curve in a file of several
+    /// Number or name of the curve in a file that holds several
     #[arg(long)]
     curve: Option<String>,
-    /// Column of the deflection in a table, by its header or its number from 1
+    /// Deflection column of a table, by its header or its number from 1
     #[arg(long, value_name = "COLUMN")]
     deflection_column: Option<String>,
-    /// Column of the force
+    /// Force column
     #[arg(long, value_name = "COLUMN")]
     force_column: Option<String>,
-    /// Column of the time; none for force over deflection without times (slow tests)
+    /// Time column; none for force over deflection without times (quasi-static tests)
     #[arg(long, value_name = "COLUMN")]
     time_column: Option<String>,
 }
@@ -29,10 +29,10 @@ pub(super) struct Reading {
 /// How a file is read, and the impact that its curve belongs to.
 #[derive(clap::Args)]
 pub(super) struct CurveFile {
-    /// What the speed is measured against [default: what the file says, else the group's]
+    /// What the speed is measured against [default: as the file states, else the group's]
     #[arg(long, value_parser = one_of(KINDS))]
     kind: Option<SpeedKind>,
-    /// Mass of the other body of a pair [default: what the file says, else that of the body]
+    /// Mass of the other body of a pair [default: as the file states, else that of the body]
     #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     other_mass: Option<f64>,
     /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
@@ -40,7 +40,7 @@ pub(super) struct CurveFile {
     unloading: Option<f64>,
     #[command(flatten)]
     reading: Reading,
-    /// Take curves whose energy cannot be that of speed and mass
+    /// Accept curves whose energy is impossible for the speed and mass
     #[arg(long)]
     accept_energy: bool,
 }

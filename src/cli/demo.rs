@@ -25,7 +25,7 @@ use serde::Serialize;
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 
-/// Run the whole flow on bundled FE runs: database, forest, prediction, MB run, exports
+/// Run the whole workflow on bundled FE runs: database, models, prediction, multi-body run, exports
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple demo

@@ -28,12 +28,12 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
   crumple export test12.csv --speed 50km/h --kind wall --mass 24t --to lsdyna -o test12.k
   crumple export --list
 
-Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model has them,
-else at the level of the curve's last tenth to 1.5 times the maximal crush, and then rising with the
-unloading stiffness. --tail changes that.
+Beyond the maximum crush, files for multi-body tools continue along faster runs where a model has
+them, else at the mean level of the curve's last tenth up to 1.5 times the maximum crush, and then
+rise with the unloading stiffness. --tail changes this.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
-parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
+parameters); output is force_N, float, N x 1. Splits are evaluated in double; the force is rounded to float (6e-8).")]
 pub(super) struct Args {
     /// Predicted curve (JSON of crumple predict), model (of crumple train), curve database, or a measured
     /// or legacy curve's file (crumple db add --list)
@@ -49,7 +49,7 @@ pub(super) struct Args {
     which: Which,
     #[command(flatten)]
     target: Target,
-    /// Units of a measured or legacy curve's file where it does not say them
+    /// Units of a measured or legacy curve's file if it does not state them
     #[arg(long, value_parser = units)]
     input_units: Option<UnitSystem>,
     #[command(flatten, next_help_heading = "Measured and legacy curves")]
@@ -59,16 +59,16 @@ pub(super) struct Args {
 /// Which curves of a model or database.
 #[derive(clap::Args)]
 struct Which {
-    /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or after commas
+    /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
     #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
     /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for a model's maximal crush [default: the model's own]
+    /// Rule for a model's maximum crush [default: the model's own]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
     max_crush: Option<MaxCrushRule>,
-    /// Answer further outside a model's training speeds than a third of their range
+    /// Allow speeds outside a model's training speeds by more than a third of their range
     #[arg(long)]
     extrapolate: bool,
     /// Value of a model's further parameter, as NAME=VALUE; may be repeated
@@ -85,7 +85,7 @@ struct Which {
 /// The target's format and what it leaves open.
 #[derive(clap::Args)]
 pub(super) struct Target {
-    /// Format, if not by the file's extension (crumple export --list)
+    /// Format, if not given by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
@@ -97,10 +97,10 @@ pub(super) struct Target {
     /// Number of the first curve in the target's deck [default: 101]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
     curve_id: Option<u32>,
-    /// What the curve does beyond the maximal crush [default: bottom for multi-body tools]
+    /// How the curve continues beyond the maximum crush [default: bottom for multi-body tools]
     #[arg(long, value_parser = one_of(TAILS))]
     tail: Option<Tail>,
-    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy
+    /// Reduce rises steeper than the unloading stiffness, at equal energy
     #[arg(long)]
     soften: bool,
     /// Spring material of LS-DYNA [default: s08]

@@ -15,7 +15,7 @@ use super::arguments;
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress};
 
-/// Look into run folders and write a commented study; or a scenario for models
+/// Examine run folders and write a commented study; or write a scenario for models
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple init                                 # the run folders below this one
@@ -23,8 +23,8 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress}
   crumple init runs --half-model               # one body of a pair, cut at the symmetry plane
   crumple init runs --node 900001 --force rcforc:3:surfa --mass 24t
   crumple init --scenario lead.model -o scenario.toml
-Each value in the study says whether it was read, computed or guessed, and from what. Then
-crumple build makes the curves of it.")]
+Each value in the study says whether it was read, computed or guessed, and from what. Then run
+crumple build to extract the curves.")]
 pub(super) struct Args {
     /// Run folders, or folders above them; with --scenario model files
     #[arg(value_name = "RUN|MODEL")]
@@ -47,10 +47,10 @@ struct GivenArgs {
     /// Units of the solver's files, such as mm-t-s
     #[arg(long, value_parser = |text: &str| UnitSystem::parse(text))]
     units: Option<UnitSystem>,
-    /// What hits what
+    /// Kind of impact
     #[arg(long, value_parser = arguments::one_of(KINDS))]
     kind: Option<StudyKind>,
-    /// The runs are of one body against the symmetry plane of a pair
+    /// The runs model one body of a pair, cut at the symmetry plane
     #[arg(long, conflicts_with = "minus_node")]
     half_model: bool,
     /// Node of the body

@@ -16,12 +16,12 @@ use super::{CommandResult, GlobalOptions, Outcome};
 use crate::solver::decks::Search;
 use crate::solver::runs::{output_files, run_folders};
 
-/// Say what solver files hold: format, version, entities, components, states, damage
+/// Show what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
 #[command(after_help = "Titles missing from a file are taken from the keyword deck next to it.
 Examples:
   crumple inspect run/nodout
-  crumple inspect run/main.k               # what a deck says of its run
+  crumple inspect run/main.k               # what a deck says about its run
   crumple inspect runs                     # the files of every run below a folder
   crumple inspect run/nodout run/rcforc --json
   crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged")]
@@ -29,10 +29,10 @@ pub(super) struct Args {
     /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Kind of the files (nodout, rcforc, …), if not by their content
+    /// Kind of the files (nodout, rcforc, …), if not recognised by their content
     #[arg(long)]
     format: Option<String>,
-    /// Read through a memory map: faster, but only for files that nothing writes to
+    /// Read through a memory map: faster, but only for files that no process is writing to
     #[arg(long)]
     map: bool,
 }

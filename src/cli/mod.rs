@@ -70,7 +70,7 @@ pub struct GlobalOptions {
     /// Exit with code 3 if there was damage or a warning
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub strict: bool,
-    /// Read databases, models and unfinished sweeps whose numbers are not those that were written
+    /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
     /// Replace an output that is a file of another kind: a database, a model, a manifest, a solver's file

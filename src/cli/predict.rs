@@ -34,10 +34,10 @@ pub(super) struct Args {
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for the maximal crush [default: the one that was best when speeds were left out]
+    /// Rule for the maximum crush [default: the best one when speeds were left out]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
     max_crush: Option<MaxCrushRule>,
-    /// The reference method's choices: maximal crush by the cubic spline
+    /// The reference method's choices: maximum crush by the cubic spline
     #[arg(long, conflicts_with = "max_crush")]
     paper: bool,
     /// Value of a further parameter of the training cases, as NAME=VALUE; may be repeated
@@ -46,7 +46,7 @@ pub(super) struct Args {
     /// Scale the force so that the curve absorbs the impact's kinetic energy (by 0.8 to 1.25)
     #[arg(long)]
     energy_correct: bool,
-    /// Answer further outside the training speeds than a third of their range
+    /// Allow speeds outside the training speeds by more than a third of their range
     #[arg(long)]
     extrapolate: bool,
     /// File to write, in the format of its extension or of --to; may be repeated

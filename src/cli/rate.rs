@@ -28,15 +28,16 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
   crumple rate test.csv,time=ms model.csv,time=s
 A is the reference r, B the prediction p. Each is a CSV file (a header line; the first column is the
 time), FILE:COLUMN, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
-several sections FILE:SECTION:ID:COMPONENT; behind it ,scale=FACTOR on the values and ,time=UNIT of
-the times (s, ms, us). What both share may stand once, as --id and --component or --column. Both are filtered if asked, then interpolated
-linearly at common times 0.1 ms apart (10 kHz, as ISO/TS 18571 wants it). Accelerations are negative
-while the body is slowed down. ISO/TS 18571 and CORA take up to 2 s: choose with --from and --to.")]
+several sections FILE:SECTION:ID:COMPONENT; append ,scale=FACTOR for the values and ,time=UNIT for
+the times (s, ms, us). What both share can be given once, by --id and --component or --column. Both
+are filtered on request, then interpolated linearly at common times 0.1 ms apart (10 kHz, as required
+by ISO/TS 18571). Accelerations are negative during deceleration. ISO/TS 18571 and CORA take at most 2 s:
+choose with --from and --to.")]
 pub(super) struct Args {
-    /// Reference: CSV or a solver's file, with what to take from it
+    /// Reference: CSV or solver file, with the column or history to take
     #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
     reference: Address,
-    /// Prediction: CSV or a solver's file, with what to take from it
+    /// Prediction: CSV or solver file, with the column or history to take
     #[arg(value_name = "B", value_parser = Address::parse, allow_hyphen_values = true)]
     prediction: Address,
     #[command(flatten)]
@@ -44,13 +45,13 @@ pub(super) struct Args {
     /// Filter both with this channel frequency class, such as 60 or 180
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
-    /// Begin of what is rated, with its unit, such as 10ms
+    /// Start of the rated interval, with its unit, such as 10ms
     #[arg(long, value_parser = time, allow_hyphen_values = true)]
     from: Option<f64>,
-    /// End of what is rated, with its unit
+    /// End of the rated interval, with its unit
     #[arg(long, value_parser = time, allow_hyphen_values = true)]
     to: Option<f64>,
-    /// What the signals are (default: an acceleration if both names say so)
+    /// Kind of the signals (default: acceleration if both names indicate it)
     #[arg(long, value_parser = one_of(QUANTITIES))]
     quantity: Option<Quantity>,
 }
@@ -70,7 +71,7 @@ struct Both {
     /// Section of binouts, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
-    /// Kind of the solver's files (nodout, rcforc, …), if not by their content
+    /// Kind of the solver files (nodout, rcforc, …), if not recognised by their content
     #[arg(long)]
     format: Option<String>,
 }

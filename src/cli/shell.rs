@@ -25,8 +25,8 @@ pub(super) struct Completions {
   crumple man | man -l -
   crumple man -o ~/.local/share/man/man1      # then: man crumple-build")]
 pub(super) struct Man {
-    /// Folder for crumple.1 and a page of every command, such as crumple-build.1; made if it is
-    /// not there
+    /// Folder for crumple.1 and a page of every command, such as crumple-build.1; created if it does
+    /// not exist
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 }

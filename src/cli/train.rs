@@ -42,23 +42,23 @@ pub(super) struct Args {
     /// Kind of model
     #[arg(long, value_parser = model_names(), default_value = AUTO)]
     model: String,
-    /// Where the model will be asked: at vehicles of a train also far below the speeds of the runs, so
+    /// What the model is for: interfaces of a train also close far below the speeds of the runs, so
     /// that auto counts the ends of the range and prefers a force that follows the closing speed
     #[arg(long = "for", value_name = "USE", value_parser = one_of(PURPOSES), default_value = "vehicle")]
     purpose: Purpose,
     /// Number of trees [default: 50 of a forest, 500 of extra]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     trees: Option<u32>,
-    /// Seed of all random draws
+    /// Random seed
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Fewest samples of a leaf
+    /// Minimum samples per leaf
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_samples_leaf: u32,
-    /// Thresholds of splits [default: midpoint of a forest, random of extra]
+    /// Split thresholds [default: midpoint of a forest, random of extra]
     #[arg(long, value_parser = one_of(THRESHOLDS))]
     thresholds: Option<Thresholds>,
-    /// When a node is not split any more
+    /// When a node is no longer split
     #[arg(long, value_parser = one_of(STOP_RULES), default_value = "std-over-mean")]
     stop: StopRuleAt,
     /// Threshold of the stop rule: in N for var-over-mean, dimensionless for std-over-mean
@@ -98,7 +98,7 @@ const THRESHOLDS: &[(&str, Thresholds, &str)] = &[
 /// A rule with the threshold that it is given.
 type StopRuleAt = fn(f64) -> StopRule;
 
-/// When a node is not split any more.
+/// When a node is no longer split.
 const STOP_RULES: &[(&str, StopRuleAt, &str)] = &[
     ("never", |_| StopRule::Unpruned, "Grow until leaves are pure"),
     ("var-over-mean", StopRule::VarOverMean, "Var/Mean, as printed in the reference"),

@@ -22,24 +22,24 @@ use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
-/// Leave every speed out in turn, predict it by every model, and compare with FE
+/// Leave out every speed in turn, predict it with every model, and compare with FE
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple validate curves.h5
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
-Without --verbose only the mean errors, the choice and the bands are printed.
-Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (in
-the means by each rule for the crush, the model's own marked); peaks are the first two of FE's curve
-(force and place); velocity and acceleration (CFC 60; in brackets not filtered) are those of a
+Without --verbose, only mean errors, choice and bands are printed.
+Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (the
+means show crush by each rule, with the model's own marked); peaks are the first two of FE's curve
+(force and position); velocity and acceleration (CFC 60; unfiltered in brackets) are those of a
 multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to 30 ms after FE's
-largest crush. The means are over inner speeds; the ends of the range are extrapolation and stand
-apart. FE contact (floor) is FE's own contact force in that run: no prediction of that force
-can be expected to do better. FE body (check) is made from FE's own speeds, and only checks curve,
-force law and run. FE scatter (floor) is how far a run lies from the mean of several at its speed,
-which stands for them: no model can remove this part of an error, though the mean over n runs has
+maximum crush. The means are over inner speeds; the ends of the range are extrapolation and are listed
+separately. FE contact (floor) is FE's own contact force in that run: no prediction of that force
+can be expected to do better. FE body (check) is derived from FE's own speeds and only checks curve,
+force law and run. FE scatter (floor) is how far a run deviates from the mean of repeated runs at its
+speed: no model can remove this part of an error, though the mean over n runs has
 only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
-model and rule chosen without the speed that is left out.")]
+model and rule chosen without the left-out speed.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,
@@ -49,7 +49,7 @@ pub(super) struct Args {
     /// Propose the speed whose FE run would help most
     #[arg(long)]
     next: bool,
-    /// Also leave speeds out of the choice itself: the honest error of auto (takes longer)
+    /// Also leave speeds out of the choice itself, for an unbiased error of auto (takes longer)
     #[arg(long)]
     nested: bool,
     /// Seed of the forests

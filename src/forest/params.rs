@@ -194,7 +194,7 @@ impl<F: Float> ForestParams<F> {
         })
     }
 
-    /// Seed of all random draws. The same seed gives the same forest on any number of threads.
+    /// Random seed. The same seed gives the same forest on any number of threads.
     pub fn seed(mut self, seed: u64) -> Self {
         self.0.seed = seed;
         self
@@ -218,7 +218,7 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
-    /// Fewest samples of a leaf; samples drawn twice count twice.
+    /// Minimum samples per leaf; samples drawn twice count twice.
     pub fn min_samples_leaf(mut self, samples: usize) -> Self {
         self.0.min_samples_leaf = samples;
         self

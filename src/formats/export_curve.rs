@@ -332,7 +332,7 @@ impl ExportCurve {
         }
     }
 
-    /// What hits what.
+    /// Kind of impact.
     fn impact(&self) -> String {
         match self.other_mass_kg() {
             None => "one body of this mass against a rigid wall".into(),

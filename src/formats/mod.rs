@@ -207,7 +207,7 @@ pub struct Options {
     pub force: ForceKind,
     /// What curves do beyond the maximal crush; the target's usual way if absent.
     pub tail: Option<Tail>,
-    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy.
+    /// Reduce rises steeper than the unloading stiffness, at equal energy.
     pub soften: bool,
     /// Which spring material of LS-DYNA.
     pub material: Material,

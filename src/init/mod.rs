@@ -51,9 +51,9 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
 pub struct UserHints {
     /// Units of the solver's files.
     pub units: Option<UnitSystem>,
-    /// What hits what.
+    /// Kind of impact.
     pub(crate) kind: Option<StudyKind>,
-    /// The runs are of one body against the symmetry plane of a pair.
+    /// The runs model one body of a pair, cut at the symmetry plane.
     pub half_model: bool,
     /// Node of the (moving) body.
     pub node: Option<i64>,

@@ -17,7 +17,7 @@ pub struct Proposal {
     pub(crate) group: Proposed<String>,
     /// Units of the solver's files.
     pub(crate) units: Proposed<UnitSystem>,
-    /// What hits what.
+    /// Kind of impact.
     pub(crate) kind: Proposed<StudyKind>,
     /// Whether the runs are of one body against the symmetry plane of a pair: only known if the
     /// caller says so.

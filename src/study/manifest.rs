@@ -35,7 +35,7 @@ pub(crate) struct StudyHeader {
     pub units: Option<UnitSystem>,
     /// Group of the curve database.
     pub group: String,
-    /// What hits what.
+    /// Kind of impact.
     pub kind: StudyKind,
     /// The pair is modelled as one body against its symmetry plane: closing speed and
     /// deflection are twice the run's.
@@ -47,7 +47,7 @@ pub(crate) struct StudyHeader {
     pub accept_energy: bool,
 }
 
-/// What hits what.
+/// Kind of impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StudyKind {

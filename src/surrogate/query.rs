@@ -34,7 +34,7 @@ pub struct Query {
     pub parameters: BTreeMap<String, Parameter>,
     /// Scale the force so that the curve absorbs the impact's energy.
     pub energy_correct: bool,
-    /// Answer further outside the training speeds than a third of their range.
+    /// Allow speeds outside the training speeds by more than a third of their range.
     pub extrapolate: bool,
 }
 

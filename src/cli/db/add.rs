@@ -20,7 +20,7 @@ use output::ListedFormat;
 /// Files, the group they join, and what they do not say of themselves.
 #[derive(clap::Args)]
 pub(super) struct Args {
-    /// Curve database; made if it is not there
+    /// Curve database; created if it does not exist
     #[arg(required_unless_present = "list")]
     database: Option<PathBuf>,
     /// Curves: tables (CSV and the like), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
@@ -32,20 +32,20 @@ pub(super) struct Args {
     /// Group of the database
     #[arg(long, required_unless_present = "list")]
     group: Option<String>,
-    /// Impact speed, one for each file in their order; repeated or after commas [default: what the
-    /// file says]
+    /// Impact speed, one for each file in the same order; repeated or separated by commas [default: as the
+    /// file states]
     #[arg(long, value_parser = speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
-    /// Mass of the body [default: what the file says]
+    /// Mass of the body [default: as the file states]
     #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Which force the curves are [default: what the file says, else contact]
+    /// Which force the curves hold [default: as the file states, else contact]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
-    /// Units of values that do not say their own, such as mm-t-s or SI
+    /// Units of values that state none, such as mm-t-s or SI
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Name of the case, once for each file in their order [default: the file's name]
+    /// Name of the case, once for each file in the same order [default: the file's name]
     #[arg(long)]
     case: Vec<String>,
     /// Further parameter of the cases: NAME=NUMBER or NAME=CATEGORY

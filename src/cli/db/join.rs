@@ -14,13 +14,13 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 /// What happens to a case whose name another curve has, and whether anything is written.
 #[derive(clap::Args)]
 struct How {
-    /// Give a new case whose name another curve has another name, such as 36kmh_2
+    /// Rename a new case whose name is taken by a different curve, such as 36kmh_2
     #[arg(long, conflicts_with = "replace")]
     rename: bool,
-    /// Let a new case take the place of another curve of its name
+    /// Replace a different curve of the same name by the new case
     #[arg(long)]
     replace: bool,
-    /// Only say what would be done
+    /// Only show what would be done
     #[arg(long)]
     dry_run: bool,
 }
@@ -65,7 +65,7 @@ pub(super) struct CopyArgs {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Database to copy to; made if it is not there [default: the same]
+    /// Database to copy to; created if it does not exist [default: the same]
     #[arg(long, value_name = "DATABASE")]
     to: Option<PathBuf>,
     /// Group to copy to [default: the case's own]

@@ -16,10 +16,10 @@ pub(super) struct TagArgs {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Tag to add; repeated or after commas
+    /// Tag to add; repeated or separated by commas
     #[arg(long, value_name = "TAG", value_delimiter = ',')]
     add: Vec<String>,
-    /// Tag to remove; repeated or after commas
+    /// Tag to remove; repeated or separated by commas
     #[arg(long, value_name = "TAG", value_delimiter = ',')]
     remove: Vec<String>,
     /// Remove all tags that they have

@@ -22,7 +22,7 @@ pub(super) struct Args {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Hold the cases against the first of them, in the order of --case
+    /// Compare the cases with the first of them, in the order of --case
     #[arg(long)]
     compare: bool,
 }

@@ -140,7 +140,7 @@ pub struct ReadOptions {
     pub format: Option<String>,
     /// Units of values that do not say their own.
     pub units: Option<UnitSystem>,
-    /// Number or name of the curve in a file of several.
+    /// Number or name of the curve in a file that holds several.
     pub curve: Option<String>,
     /// The force, where the file has both.
     pub force: Option<ForceKind>,
