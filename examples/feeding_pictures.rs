@@ -68,7 +68,7 @@ fn overview(predicted: &ExportInput, recorded: &ExportInput) -> Anything<String>
     let mut left = Sheet::whole("predicted for 50 km/h");
     left.line(0, points(&contact.loading));
     left.line(1, points(&body.loading));
-    left.mark("maximal crush", body.max_crush_m());
+    left.mark("maximum crush", body.max_crush_m());
     let mut right = Sheet::around_end(&one, "run at 48 km/h: ways back");
     right.line(2, on_line(&one, one.stiffness_n_per_m()));
     right.line(3, on_line(&one, one.loading.max_slope()));
@@ -89,7 +89,7 @@ fn lsdyna(recorded: &ExportInput) -> Anything<String> {
     let own = on_line(&curve, curve.stiffness_n_per_m());
     let steepest = on_line(&curve, curve.loading.max_slope().max(curve.stiffness_n_per_m()));
     let mut left = Sheet::whole("run at 48 km/h, body force");
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     for panel in [&mut left, &mut right] {
         panel.line(0, both_ways(&curve));
         panel.line(1, own.clone());
@@ -126,7 +126,7 @@ fn adams(predicted: &ExportInput) -> Anything<String> {
     elastic(predicted, "Adams, MotionView", rows)
 }
 
-/// A target that goes back on the loading branch, with its points at the maximal crush.
+/// A target that goes back on the loading branch, with its points at the maximum crush.
 fn elastic(input: &ExportInput, name: &str, rows: Points) -> Anything<String> {
     let curve = ready(input, ForceKind::Body)?;
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
@@ -187,7 +187,7 @@ fn modelica(predicted: &ExportInput) -> Anything<String> {
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
     left.line(0, points(&curve.loading));
     left.line(2, combi.clone());
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     right.line(0, both_ways(&curve));
     right.line(1, spring);
     right.line(2, combi);
@@ -202,7 +202,7 @@ fn matlab(predicted: &ExportInput) -> Anything<String> {
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
     left.line(0, both_ways(&curve));
     left.line(1, points(&curve.loading));
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     right.line(0, both_ways(&curve));
     right.line(1, points(&curve.loading));
     right.line(2, unloading.clone());
@@ -236,7 +236,7 @@ fn two_variables(model: &Model) -> Anything<String> {
         ..Options::default()
     };
     let table = text(by_name("table")?.export_model(model, &options)?)?;
-    let mut panel = Sheet::wide("body force; behind the maximal crush, which is marked, the tail");
+    let mut panel = Sheet::wide("body force; behind the maximum crush, which is marked, the tail");
     let mut legend = Vec::new();
     let names = speeds.map(|kmh| format!("{kmh} km/h"));
     for (k, kmh) in speeds.iter().enumerate() {
@@ -285,23 +285,23 @@ fn points(curve: &Envelope) -> Points {
     curve.deflection_m().iter().copied().zip(curve.force_n().iter().copied()).collect()
 }
 
-/// To the maximal crush.
+/// To the maximum crush.
 fn loading(curve: &ExportCurve) -> Points {
     points(&curve.loading)[..=curve.end].to_vec()
 }
 
-/// From a largest deflection until there is no force.
+/// From a maximum deflection until there is no force.
 fn back(law: &ForceLaw, largest_m: f64) -> Points {
     let way = (0..=200).map(|i| largest_m - 0.1 * f64::from(i) / 200.0);
     way.map(|d| (d, law.force_n(d, largest_m))).collect()
 }
 
-/// Loading to the maximal crush and unloading from it, in crumple's own runs.
+/// Loading to the maximum crush and unloading from it, in crumple's own runs.
 fn both_ways(curve: &ExportCurve) -> Points {
     [loading(curve), back(&curve.law(), curve.max_crush_m())].concat()
 }
 
-/// From the maximal crush along a straight line.
+/// From the maximum crush along a straight line.
 fn on_line(curve: &ExportCurve, n_per_m: f64) -> Points {
     let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
     vec![(end_m, end_n), (end_m - end_n / n_per_m, 0.0)]

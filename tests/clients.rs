@@ -531,7 +531,7 @@ fn exudyn_moves_eight_cars_against_eight_alike() {
             assert_eq!(run.time_s.len(), theirs.len());
             for seen in &run.interfaces {
                 let (now, most) = (&seen.deflection_m, &seen.largest_deflection_m);
-                // Until it is touched an interface's largest deflection is 0.
+                // Until it is touched an interface's maximum deflection is 0.
                 assert!(now.iter().zip(most).all(|(now, most)| now.max(0.0) == *most), "loads");
             }
             let touched = run.interfaces.iter().filter(|i| i.max_deflection_m > 1e-3).count();

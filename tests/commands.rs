@@ -563,7 +563,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         assert!(close(point[..20].trim().parse::<f64>().unwrap() * 1e-3, *d));
         assert!(close(point[20..].trim().parse().unwrap(), *f));
     }
-    // Behind the maximal crush, the tail: no text, and the same in both files.
+    // Behind the maximum crush, the tail: no text, and the same in both files.
     assert!(csv.len() > d.len());
     assert_eq!(keyword[3 + csv.len()], "*MAT_SPRING_INELASTIC_TITLE");
 }
@@ -894,7 +894,7 @@ fn scenarios_choose_the_force() {
         let result = json(&crumple_ok(here, &["simulate", "s.toml", "--json"]));
         result["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
     };
-    // FE's largest crush is 0.8749 m; a contact force stops the body short of it.
+    // FE's maximum crush is 0.8749 m; a contact force stops the body short of it.
     for source in [
         "model = \"a.model\"",
         "file = \"a.json\"",

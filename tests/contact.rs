@@ -240,7 +240,7 @@ fn a_run_that_ends_while_loading_is_held_against_what_it_stopped() {
     let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "c.h5"]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("truncated: the largest deflection is the last state"), "{said}");
+    assert!(said.contains("truncated: the maximum deflection is the last state"), "{said}");
     assert!(!said.contains("energy:") && !said.contains("short:"), "{said}");
 }
 
@@ -487,7 +487,7 @@ fn histories_that_contradict_each_other_are_said() {
                     history.values = history.values.iter().copied().step_by(8).collect();
                 }
             },
-            "sampling: the record has 21 states up to the largest crush",
+            "sampling: the record has 21 states up to the maximum crush",
         ),
         (
             "a fall",
@@ -538,7 +538,7 @@ fn a_record_that_is_not_one_impact_is_refused() {
     let window = format!("{CONTACT_RECIPE}\nsampling = {{ states = 100, interval_ms = 0.75 }}");
     let said = refused(&Run::read(48), &window, Stated::default());
     assert!(
-        said.contains("ends 74.25 ms after contact, before the largest crush at 126.")
+        said.contains("ends 74.25 ms after contact, before the maximum crush at 126.")
             && said.contains("raise states to 171 or more"),
         "{said}"
     );

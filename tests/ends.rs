@@ -51,7 +51,7 @@ fn a_body_stops_by_a_rate_as_on_paper() {
         let found = run.interfaces[0].max_deflection_m;
         assert!((found / crush_m - 1.0).abs() < 2e-6, "{method:?}: {found} m, {crush_m} m");
     }
-    // The stop shows in the time of the largest deflection; Verlet sees it between outputs.
+    // The stop shows in the time of the maximum deflection; Verlet sees it between outputs.
     let at_s = run(&chain, 0.2, Method::Verlet).interfaces[0].max_deflection_time_s;
     assert!((at_s / stop_s - 1.0).abs() < 1e-3, "{at_s} s, {stop_s} s");
 }
@@ -199,7 +199,7 @@ const HEAD: &str = "[run]\nduration = \"150ms\"\n[curves]\nnose = { model = \"le
     end = { model = \"vehicle-pair.model\" }\nnoses = { model = \"lead-car-pair.model\" }\n";
 
 /// FE's contact force at a training speed, driven by the crush law, gives FE's velocity within 0.8 %
-/// from contact to 30 ms after the largest crush, from 7.2 km/h against the wall on; at 4.5 and 6 km/h
+/// from contact to 30 ms after the maximum crush, from 7.2 km/h against the wall on; at 4.5 and 6 km/h
 /// within 1.2 %; in the mean of a group's inner speeds within 1 %.
 #[test]
 fn fes_contact_force_gives_fes_velocity() {

@@ -73,7 +73,7 @@ fn spike(points: u32) -> Vec<(f64, f64)> {
 }
 
 /// Force at 200 deflections within the digits of the format, or within 0.2 % of the largest force where a format
-/// takes few points; energy to the maximal crush within 0.1 % as the tool interpolates, also of a sharp spike.
+/// takes few points; energy to the maximum crush within 0.1 % as the tool interpolates, also of a sharp spike.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn other_tools_read_the_exported_points() {
@@ -104,7 +104,7 @@ fn other_tools_read_the_exported_points() {
             let bound = if is_thinned { 2e-3 } else { 2e-8 };
             assert!(of("force") < bound, "{curve} {name}: force off by {}", of("force"));
             assert!(of("linear").abs() < 1e-3, "{curve} {name}: energy, {seen}");
-            assert!(of("beyond") > 1.5, "{curve} {name} ends at the maximal crush: {seen}");
+            assert!(of("beyond") > 1.5, "{curve} {name} ends at the maximum crush: {seen}");
             // Tools that interpolate by splines.
             if ["a.cmd", "a.adm", "a.spr"].iter().any(|f| name.starts_with(f)) {
                 assert!(of("akima").abs() < 1e-3, "{curve} {name}: energy, {seen}");
@@ -460,7 +460,7 @@ fn h5py_reads_the_table_of_a_model() {
         assert!(off < 2e-3, "at {d} m: {off}");
     }
     let worst = found["worst_energy"].as_f64().unwrap();
-    assert!(worst < 1e-3, "energy of a speed's row to its maximal crush is off by {worst}");
+    assert!(worst < 1e-3, "energy of a speed's row to its maximum crush is off by {worst}");
     assert!(found["speeds"].as_u64().unwrap() >= 25);
     assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
     assert_eq!(found["compared_bands"], 8, "four speeds, two forces: {found}");

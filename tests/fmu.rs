@@ -177,7 +177,7 @@ fn odd_names_make_sound_archives() {
     }
 }
 
-/// 10 000 pairs of deflection and largest deflection for each law: the same bits.
+/// 10 000 pairs of deflection and maximum deflection for each law: the same bits.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn the_c_law_is_ours_bit_by_bit() {

@@ -759,7 +759,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t(
         1,
         &["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"],
-        "is softer than the line from the largest deflection",
+        "is softer than the line from the maximum deflection",
     );
     // The second file is missing: the first is not written either.
     t(
@@ -991,7 +991,7 @@ fn exported_curves_come_back() {
         let stiffness = facts.unloading_stiffness_n_per_m.unwrap();
         assert!((stiffness / expected.unloading_stiffness_n_per_m.unwrap() - 1.0).abs() < 1e-8);
         assert!(
-            curve.notes.iter().any(|n| n.contains("beyond the maximal crush of")),
+            curve.notes.iter().any(|n| n.contains("beyond the maximum crush of")),
             "{file}: {:?}",
             curve.notes
         );

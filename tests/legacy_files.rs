@@ -719,7 +719,7 @@ fn an_impossible_import_speaks_of_the_file() {
         crumple_fails(folder.path(), 1, &[&arguments[..], &WALL, more].concat())
     };
     let error = refused(speed() * 0.577, &[]);
-    assert!(error.contains("takes up 3.0") && error.contains("look at units, speed and mass; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
+    assert!(error.contains("takes up 3.0") && error.contains("look at units, speed and mass; at whether the curve ends at the maximum crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
     let error = refused(speed() * 0.5_f64.sqrt(), &[]);
     assert!(error.contains("likely the mass, half a structure taken for a whole one"), "{error}");
     let error = refused(speed() * 0.5, &[]);

@@ -1061,7 +1061,7 @@ fn a_speed_without_an_answer_is_named() {
     }
     assert_eq!(missing, 1, "{:?}", found.notes);
     let said = found.notes.iter().find(|n| n.starts_with("forest at 108 km/h: no row: ")).unwrap();
-    assert!(said.contains("the maximal crush by the spline rule is -"), "{said}");
+    assert!(said.contains("the maximum crush by the spline rule is -"), "{said}");
 }
 
 /// With three speeds there is nothing to choose by without one of them.
@@ -1204,7 +1204,7 @@ fn contact_and_body_force_rebound_alike() {
 }
 
 /// FE's own body force, with its own unloading, gives FE's motion back at every speed: velocity
-/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the largest crush.
+/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the maximum crush.
 #[test]
 fn the_recorded_force_gives_the_recorded_motion_back() {
     for (group, speeds) in [("lead-car-wall", 7), ("vehicle-pair", 9)] {

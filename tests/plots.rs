@@ -210,7 +210,7 @@ fn every_kind_of_file_is_drawn() {
             &[
                 "FE at 48 km/h",
                 "FE at 60 km/h",
-                "maximal crush",
+                "maximum crush",
                 "empirical 90 % range from 5 left-out inner speeds",
             ],
         ),

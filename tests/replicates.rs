@@ -82,7 +82,7 @@ fn a_known_scatter_comes_out() {
     near(both.velocity_l1, (2.0 * three.velocity_l1 + both.speeds[1].velocity_l1) / 3.0);
 }
 
-/// The velocities by another route: sums over the states up to 30 ms after the largest deflection.
+/// The velocities by another route: sums over the states up to 30 ms after the maximum deflection.
 #[test]
 fn the_scatter_of_velocities_is_that_of_the_records() {
     let mut cases = [8.0, 16.0].map(|v| flat(&format!("v{v}"), v, 0.0)).to_vec();

@@ -30,12 +30,12 @@ pub(crate) struct Comparison {
     pub inner: bool,
     /// Mass of the one-mass model: the body's, or the reduced mass of a pair.
     pub mass_kg: f64,
-    /// From contact to 30 ms after FE's largest deflection, as far as the record reaches.
+    /// From contact to 30 ms after FE's maximum deflection, as far as the record reaches.
     pub window_s: f64,
     /// Largest force of FE's record, in N.
     #[serde(rename = "reference_peak_force_N")]
     pub reference_peak_force_n: f64,
-    /// Largest deflection of FE's record, in m.
+    /// Maximum deflection of FE's record, in m.
     pub reference_max_crush_m: f64,
     /// Time by the clock that FE took for this run, in s; null where its case file is missing.
     pub fe_time_s: Option<f64>,

@@ -115,7 +115,7 @@ impl<'a> LeftOutCase<'a> {
         }
     }
 
-    /// Predicts the case by one model and every rule for the maximal crush.
+    /// Predicts the case by one model and every rule for the maximum crush.
     pub(super) fn trial(&self, kind: ModelKind) -> LeftOutRun<'_> {
         let to_text = |error: Error| error.to_string();
         let answers = || -> Result<Answers, Error> {
@@ -223,7 +223,7 @@ pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> ForceCurve 
     )
 }
 
-/// A prediction by one rule for the maximal crush.
+/// A prediction by one rule for the maximum crush.
 pub(super) struct Answer {
     curve: PredictedCurve,
     pub energy_error: f64,
@@ -286,7 +286,7 @@ fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakE
 /// Why a case cannot be left out.
 #[derive(Debug, thiserror::Error)]
 pub enum NotLeftOut {
-    /// Its largest deflection is not known.
+    /// Its maximum deflection is not known.
     #[error("case \"{case}\" ended while loading: not left out")]
     Truncated {
         /// Its name.

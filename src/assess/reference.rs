@@ -13,7 +13,7 @@ use crate::multibody::{
 };
 use crate::signal::{derivative, interpolate, l1_ratio};
 
-/// The comparison ends this long after FE's largest deflection, so that rebound counts.
+/// The comparison ends this long after FE's maximum deflection, so that rebound counts.
 const AFTER_MAX_CRUSH_S: f64 = 0.030;
 /// The record is followed so much longer that the filter does not see its end.
 const FOR_FILTER_S: f64 = 0.050;
@@ -33,7 +33,7 @@ pub struct Reference {
     acceleration_filtered: Vec<f64>,
 }
 
-/// Errors of a multi-body run against FE, from contact to 30 ms after FE's largest
+/// Errors of a multi-body run against FE, from contact to 30 ms after FE's maximum
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionErrors {

@@ -1,6 +1,6 @@
 //! Validation: every model at every speed that is left out, and the model that is chosen.
 //!
-//! Each speed is left out and predicted by every model with every rule for the largest crush, and each prediction drives
+//! Each speed is left out and predicted by every model with every rule for the maximum crush, and each prediction drives
 //! the multi-body model of one mass. Accelerations are compared after CFC 60 on both sides, the class of SAE J211 for
 //! comparing structures of vehicles, and unfiltered beside it: above 100 Hz FE's body oscillates on its crush zone, which
 //! no curve over deflection can hold. FE's own curves in the same model stand beside them.
@@ -319,7 +319,7 @@ impl Tables {
 /// Residuals of each force at the inner speeds, and at the ends.
 type ResidualsOf = BTreeMap<(ForceKind, LeftOutSpeeds), Vec<Residuals>>;
 
-/// The rows of one model, by its rule for the maximal crush.
+/// The rows of one model, by its rule for the maximum crush.
 struct ModelTable {
     rule: MaxCrushRule,
     rows: Vec<LeftOut>,

@@ -109,7 +109,7 @@ pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
         panel.series.push(Series::line(&name, look, case.deflection_m.clone(), force_n.clone()));
     }
     add_prediction(&mut panel, curve);
-    panel.marks.push(Mark { name: "maximal crush".into(), x: curve.max_deflection_m });
+    panel.marks.push(Mark { name: "maximum crush".into(), x: curve.max_deflection_m });
     let title = format!(
         "{} at {}: {} force by the model {}",
         curve.provenance.group,

@@ -35,7 +35,7 @@ pub(super) struct CurveFile {
     /// Mass of the other body of a pair [default: as the file states, else that of the body]
     #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     other_mass: Option<f64>,
-    /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
+    /// Unloading stiffness from the maximum deflection, such as 80MN/m [default: the file's]
     #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
     unloading: Option<f64>,
     #[command(flatten)]

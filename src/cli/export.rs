@@ -121,9 +121,9 @@ pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
     ),
 ];
 
-/// What a curve does beyond its maximal crush.
+/// What a curve does beyond its maximum crush.
 const TAILS: &[(&str, Tail, &str)] = &[
-    ("none", Tail::None, "Nothing: the last point is the maximal crush"),
+    ("none", Tail::None, "Nothing: the last point is the maximum crush"),
     ("hold", Tail::Hold, "Continues along faster runs, or at the mean level of its last tenth"),
     ("bottom", Tail::Bottom, "The same, and then rises with the unloading stiffness"),
 ];

@@ -179,7 +179,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
     if !truncated.is_empty() {
         options.warn(&format!(
-            "runs that ended while loading are left out of the maximal crush: {}",
+            "runs that ended while loading are left out of the maximum crush: {}",
             truncated.join(", ")
         ));
     }

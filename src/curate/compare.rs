@@ -32,7 +32,7 @@ pub(crate) struct Difference {
     pub force_kind: ForceKind,
     /// Mass of the body, in kg.
     pub mass_kg: f64,
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub max_deflection_m: f64,
     /// ∫F dd up to it, in J.
     #[serde(rename = "work_J")]
@@ -44,7 +44,7 @@ pub(crate) struct Difference {
     pub speed_difference: f64,
     /// Difference of the mass.
     pub mass_difference: f64,
-    /// Difference of the largest deflection.
+    /// Difference of the maximum deflection.
     pub max_deflection_difference: f64,
     /// Difference of the work.
     pub work_difference: f64,

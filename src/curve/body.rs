@@ -15,7 +15,7 @@ pub struct BodyMotion {
     /// Closing speed in m/s over deflection: an envelope by its shape, not a force.
     pub closing_speed: Envelope,
     /// Speed of separation in m/s, the mean over up to 5 ms after the body force has first fallen to
-    /// zero behind the largest deflection; `None` if the record ends before it does.
+    /// zero behind the maximum deflection; `None` if the record ends before it does.
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
 pub(crate) struct RecordedForce {
     /// Loading branch, in N.
     pub loading: Envelope,
-    /// Unloading branch from the largest deflection to where the force is first zero.
+    /// Unloading branch from the maximum deflection to where the force is first zero.
     pub unloading_deflection_m: Vec<f64>,
     pub unloading_force_n: Vec<f64>,
     /// Stiffness in N/m of the straight line that gives back the energy of the separation.
@@ -99,7 +99,7 @@ fn separation_m_per_s(time_s: &[f64], closing_m_per_s: &[f64], from: usize) -> f
     -after.iter().sum::<f64>() / after.len() as f64
 }
 
-/// Near the largest deflection the force still swings in time while the deflection hardly
+/// Near the maximum deflection the force still swings in time while the deflection hardly
 /// moves: over the last share of it one mean force stands for all, so that the rebound does not depend on
 /// where exactly a run stops.
 const LAST_SHARE: f64 = 0.005;

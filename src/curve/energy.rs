@@ -9,7 +9,7 @@ use super::loading::loading_end;
 use super::{Curve, EnergyAudit, Masses};
 use crate::unit::{Speed, UnitSystem, km_per_h};
 
-/// `W = ∫F dd` up to the largest deflection by the trapezoidal rule over the samples,
+/// `W = ∫F dd` up to the maximum deflection by the trapezoidal rule over the samples,
 /// and `E`, the kinetic energy of the impact.
 pub fn audit(curve: &Curve, masses: Masses, speed: Speed) -> EnergyAudit {
     let work_j = work_to_end(curve);
@@ -205,7 +205,7 @@ impl StatedConditions<'_> {
         let mut found = Vec::new();
         if beyond {
             found.push(format!(
-                "the largest crush is {} m after {} ms",
+                "the maximum crush is {} m after {} ms",
                 significant(crush_m),
                 significant(loading_s * 1e3)
             ));

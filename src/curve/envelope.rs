@@ -99,7 +99,7 @@ impl Envelope {
         &self.work_j
     }
 
-    /// Largest deflection of the table, in m.
+    /// Maximum deflection of the table, in m.
     pub fn end_m(&self) -> f64 {
         self.deflection_m[self.deflection_m.len() - 1]
     }

@@ -9,9 +9,9 @@ use crate::unit::SpeedKind;
 /// A force–deflection curve that can drive an interface, with what its source knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceCurve {
-    /// Loading branch from (0, 0) to the maximal crush.
+    /// Loading branch from (0, 0) to the maximum crush.
     pub loading: Envelope,
-    /// The same force along deflections of which some lie beyond the maximal crush: neighbours
+    /// The same force along deflections of which some lie beyond the maximum crush: neighbours
     /// in a train push on where a body by itself would have stopped.
     pub beyond: Option<Envelope>,
     /// From the end of the loading branch.
@@ -26,14 +26,14 @@ pub struct ForceCurve {
     pub data_end_m: Option<f64>,
 }
 
-/// What is known of a curve's unloading from its largest deflection.
+/// What is known of a curve's unloading from its maximum deflection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CurveUnloading {
     /// Nothing.
     Unknown,
     /// A straight line of this stiffness in N/m.
     Stiffness(f64),
-    /// The recorded branch, from the largest deflection to where the force is first zero.
+    /// The recorded branch, from the maximum deflection to where the force is first zero.
     Recorded {
         /// Of the straight line that gives back the same energy, in N/m.
         stiffness_n_per_m: f64,

@@ -1,7 +1,7 @@
 //! From a table of force over deflection to the curve of a case: with times as of an FE record,
 //! without them by the motion that the table itself asks for.
 //!
-//! **Without times** the largest deflection of the table is taken as the largest crush. A body
+//! **Without times** the maximum deflection of the table is taken as the maximum crush. A body
 //! that starts at the impact speed `v0` and is stopped there by the table's own force has
 //! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. Behind it the table's own
 //! unloading branch, or a line of the unloading stiffness, drives the body back; then both part.
@@ -347,7 +347,7 @@ mod tests {
         assert!(from_table(&table, &accepted).unwrap().1.warnings[1].starts_with("accept_energy"));
         let ends = Table { force_n: &[0.0, 1e6, 2e6, 0.0], ..table };
         let error = from_table(&ends, &accepted).unwrap_err().to_string();
-        assert!(error.contains("the force at the largest deflection is 0"), "{error}");
+        assert!(error.contains("the force at the maximum deflection is 0"), "{error}");
         // A force of next to nothing at the end would take for ever.
         let crawls = Table { force_n: &[1e6, 1e-9, 1e-9, 1e-9], ..table };
         let error = from_table(&crawls, &accepted).unwrap_err().to_string();

@@ -62,7 +62,7 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     all
 }
 
-/// Impulse up to the largest deflection over mass times speed.
+/// Impulse up to the maximum deflection over mass times speed.
 fn impulse_ratio(case: &Case) -> f64 {
     let (t, f) = (case.curves.original.time_s(), case.curves.original.force_n());
     let end = case.loading_end();

@@ -207,7 +207,7 @@ pub enum Parameter {
 /// Energy of the loading branch against the kinetic energy it stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyAudit {
-    /// `W`: integral of force over deflection up to the largest deflection.
+    /// `W`: integral of force over deflection up to the maximum deflection.
     pub work_j: f64,
     /// `E`: kinetic energy of the impact.
     pub kinetic_j: f64,
@@ -329,7 +329,7 @@ impl Case {
         loading::loading_branch(&self.curves.original)
     }
 
-    /// Index of the largest deflection in the original curve.
+    /// Index of the maximum deflection in the original curve.
     pub fn loading_end(&self) -> usize {
         loading::loading_end(&self.curves.original)
     }
@@ -348,7 +348,7 @@ impl Case {
         recipe.is_some_and(|r| r["imported"]["moves_by_its_force"] == true)
     }
 
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub fn max_deflection_m(&self) -> f64 {
         self.curves.original.deflection_m[self.loading_end()]
     }

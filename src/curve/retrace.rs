@@ -30,7 +30,7 @@ pub struct Impact {
     pub speed: Speed,
     /// Of the body, or of both bodies.
     pub masses: Masses,
-    /// From the largest deflection, in N/m, if it is known.
+    /// From the maximum deflection, in N/m, if it is known.
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// The same of the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
@@ -71,7 +71,7 @@ const STEPS: f64 = 20_000.0;
 const MAX_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
-/// Nor than this share of the largest deflection: states closer than a millionth of it are none of a
+/// Nor than this share of the maximum deflection: states closer than a millionth of it are none of a
 /// loading branch, and its last one shall be the table's.
 const FINEST: f64 = 5e-6;
 
@@ -90,7 +90,7 @@ pub(super) fn retrace(
         let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
         return Err(error!(
             Other,
-            "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points after the end of the force, or give the record with its times",
+            "the force at the maximum deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points after the end of the force, or give the record with its times",
             from_m = d[last.map_or(0, |i| i + 1)]
         ));
     }
@@ -218,7 +218,7 @@ impl MotionBuilder {
         Ok(())
     }
 
-    /// The unloading branch from the largest deflection: the table's own, else a line.
+    /// The unloading branch from the maximum deflection: the table's own, else a line.
     fn unloading(
         &mut self,
         table: &Table<'_>,
@@ -265,7 +265,7 @@ impl MotionBuilder {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
             return Err(error!(
                 Other,
-                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: give a stiffer one with --unloading"
+                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the maximum deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: give a stiffer one with --unloading"
             ));
         }
         let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];

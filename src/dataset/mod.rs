@@ -38,7 +38,7 @@ pub struct TrainingCase {
     pub sampled: Envelope,
     /// The body's motion, and the force that follows from it.
     pub motion: BodyMotion,
-    /// Whether the record ended while loading, so that the largest deflection is not known.
+    /// Whether the record ended while loading, so that the maximum deflection is not known.
     pub truncated: bool,
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     pub unloading_stiffness_n_per_m: Option<f64>,

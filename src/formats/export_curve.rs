@@ -16,7 +16,7 @@ use crate::unit::{Shown, km_per_h};
 pub struct ExportInput {
     /// With both forces, where it has both.
     pub curve: PredictedCurve,
-    /// The forces beyond the maximal crush, where a model tells them.
+    /// The forces beyond the maximum crush, where a model tells them.
     pub beyond: Option<Beyond>,
 }
 
@@ -27,13 +27,13 @@ pub struct ExportCurve {
     pub predicted: PredictedCurve,
     /// Loading branch with its tail.
     pub loading: Envelope,
-    /// Index of the maximal crush among the points of `loading`.
+    /// Index of the maximum crush among the points of `loading`.
     pub end: usize,
     /// Lower and upper edge of the band at the points of `loading`, in N.
     pub band: Option<(Vec<f64>, Vec<f64>)>,
     /// Why a predicted curve has none.
     pub no_band: Option<&'static str>,
-    /// How the target goes on beyond the maximal crush.
+    /// How the target goes on beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
     /// Largest force before and after, in N, where a steep flank was made less steep.
@@ -42,7 +42,7 @@ pub struct ExportCurve {
     pub ordinal: usize,
 }
 
-/// How a target lets go of the energy that it has stored at the maximal crush.
+/// How a target lets go of the energy that it has stored at the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TargetUnloading {
     /// On a straight line of this stiffness in N/m.
@@ -121,13 +121,13 @@ impl ExportCurve {
         })
     }
 
-    /// The same curve through other points; `end` is the index of the maximal crush among them.
+    /// The same curve through other points; `end` is the index of the maximum crush among them.
     pub fn through(self, loading: Envelope, end: usize) -> Self {
         Self { loading, end, band: None, ..self }
     }
 
     /// The same curve for tools that need the origin: a force at contact is reached over a
-    /// thousandth of the maximal crush, with the same energy.
+    /// thousandth of the maximum crush, with the same energy.
     ///
     /// # Errors
     /// If that makes no curve.
@@ -165,17 +165,17 @@ impl ExportCurve {
         self.loading.force_n()
     }
 
-    /// Maximal crush of the curve's own impact, in m.
+    /// Maximum crush of the curve's own impact, in m.
     pub fn max_crush_m(&self) -> f64 {
         self.deflection_m()[self.end]
     }
 
-    /// Force at the maximal crush, in N.
+    /// Force at the maximum crush, in N.
     pub fn end_n(&self) -> f64 {
         self.force_n()[self.end]
     }
 
-    /// Unloading stiffness from the maximal crush, in N/m.
+    /// Unloading stiffness from the maximum crush, in N/m.
     pub fn stiffness_n_per_m(&self) -> f64 {
         self.predicted.unloading_stiffness_n_per_m
     }
@@ -201,7 +201,7 @@ impl ExportCurve {
         self.other_mass_kg().map_or(mass, |other| mass * other / (mass + other))
     }
 
-    /// Speed of separation over impact speed, as the target unloads from the maximal crush.
+    /// Speed of separation over impact speed, as the target unloads from the maximum crush.
     pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
@@ -322,9 +322,9 @@ impl ExportCurve {
     fn unloading(&self, steepest_n_per_m: f64) -> &'static str {
         let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
         match (self.predicted.rebound.is_some(), softer) {
-            (true, false) => "along this stiffness from the maximal crush it gives the rebound",
+            (true, false) => "along this stiffness from the maximum crush it gives the rebound",
             (true, true) => {
-                "along this stiffness from the maximal crush it gives the rebound; from a point of the steepest rise it would give energy"
+                "along this stiffness from the maximum crush it gives the rebound; from a point of the steepest rise it would give energy"
             }
             (false, _) => {
                 "no run shows the rebound: at least the steepest rise, so that it gives no energy"

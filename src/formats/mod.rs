@@ -47,7 +47,7 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// One line for `export --list`.
     pub description: &'static str,
-    /// What its curves do beyond the maximal crush if nothing else is asked for; `Tail::None` of
+    /// What its curves do beyond the maximum crush if nothing else is asked for; `Tail::None` of
     /// files whose curves cannot go on.
     pub tail: Tail,
     /// Whether it can be a complete input of one mass on the spring (`--deck`).
@@ -205,7 +205,7 @@ pub struct Options {
     pub id: u32,
     /// Which force.
     pub force: ForceKind,
-    /// What curves do beyond the maximal crush; the target's usual way if absent.
+    /// What curves do beyond the maximum crush; the target's usual way if absent.
     pub tail: Option<Tail>,
     /// Reduce rises steeper than the unloading stiffness, at equal energy.
     pub soften: bool,
@@ -304,7 +304,7 @@ impl Format {
         matches!(self.writer, Writer::Whole(_))
     }
 
-    /// Whether its curves can go on beyond the maximal crush.
+    /// Whether its curves can go on beyond the maximum crush.
     pub(crate) fn takes_tail(&self) -> bool {
         self.tail != Tail::None
     }

@@ -1,6 +1,6 @@
 //! Table of a model: force over speed and deflection, for tools that interpolate in both; SI.
 //!
-//! Each speed's curve goes on beyond its maximal crush as a tail that is held, so that the table is a full rectangle.
+//! Each speed's curve goes on beyond its maximum crush as a tail that is held, so that the table is a full rectangle.
 
 use super::export_curve::in_lines;
 use super::tail::Tail;
@@ -171,7 +171,7 @@ impl Table {
     }
 }
 
-/// The forces of a curve at these deflections, with its own energy to its maximal crush, and the edges of its
+/// The forces of a curve at these deflections, with its own energy to its maximum crush, and the edges of its
 /// band, which go with them.
 fn rows(curve: &ExportCurve, deflection_m: &[f64]) -> Result<(Vec<f64>, [Vec<f64>; 2]), Error> {
     let at = |curve: &Envelope| deflection_m.iter().map(|&d| curve.force_at(d)).collect::<Vec<_>>();
@@ -227,7 +227,7 @@ fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         ("speed_kind", model.speed_kind.name().into()),
         ("mass_kg", model.mass_kg.to_string()),
         ("fitted_between", format!("{low} and {high} m/s")),
-        ("beyond", "each curve goes on beyond its maximal crush, along faster runs".into()),
+        ("beyond", "each curve goes on beyond its maximum crush, along faster runs".into()),
         ("model", model.name().into()),
         ("training_hash", model.training_hash.clone()),
         ("written_by", concat!("crumple ", env!("CARGO_PKG_VERSION")).into()),

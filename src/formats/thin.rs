@@ -9,7 +9,7 @@ use crate::curve::Envelope;
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
 /// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
 /// Whyatt, Cartographic Journal 30, 1993). The forces at the others are then those of the least squares
-/// over the whole curve. `kept` is the index of a point that stays, such as the maximal crush; the forces up
+/// over the whole curve. `kept` is the index of a point that stays, such as the maximum crush; the forces up
 /// to it are scaled so that the energy to it is the same. A curve of so few points stays as it is.
 pub(crate) fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
@@ -204,9 +204,9 @@ fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelo
     }
 }
 
-/// Share by which the force at the maximal crush may change.
+/// Share by which the force at the maximum crush may change.
 const SAME_END: f64 = 0.01;
-/// Up to this share of the maximal crush forces may be raised: the end, from which a body rebounds,
+/// Up to this share of the maximum crush forces may be raised: the end, from which a body rebounds,
 /// stays.
 const REACH: f64 = 0.95;
 /// Forces are raised by at most this factor.
@@ -235,7 +235,7 @@ pub(crate) fn from_origin(
     Ok(Some((Envelope::new(deflection_m, force_n)?, end + 1)))
 }
 
-/// A force at contact is reached over this share of the maximal crush.
+/// A force at contact is reached over this share of the maximum crush.
 const RAMP: f64 = 1e-3;
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ pub(crate) struct ProposedRun {
     /// Solver's time behind which the record is not used, in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) truncate_s: Option<Proposed<f64>>,
-    /// Largest crush in m, if the units are known: doubled for half a model.
+    /// Maximum crush in m, if the units are known: doubled for half a model.
     pub(crate) crush_m: Option<f64>,
     /// Whole states that motion and force both have.
     pub(crate) states: usize,

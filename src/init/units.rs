@@ -1,7 +1,7 @@
 //! The unit system of a run: what its deck states, or the one in which its impact is possible.
 //!
 //! Momentum and energy balance in every consistent system, so only magnitudes tell: an impact
-//! has a speed, a crush, a time to the largest crush, a mean deceleration and a mass that vehicles
+//! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
 use super::proposal::{Evidence, Proposed};
@@ -29,7 +29,7 @@ struct Range {
 const SPEED_M_PER_S: Range = Range { low: 0.05, high: 200.0, usual: 10.0, spread: 3.0 };
 const CRUSH_M: Range = Range { low: 3e-4, high: 30.0, usual: 0.3, spread: 4.0 };
 const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 };
-/// First closing speed over the time to the largest crush: from a train against soft buffers to
+/// First closing speed over the time to the maximum crush: from a train against soft buffers to
 /// some hundred g. Speed and time may each be possible and what they make together not: the mean
 /// force is mass times deceleration, and no crush zone stops its own vehicle with hundreds of its
 /// weights. A shunting impact at 0.5 km/h, recorded in mm and s, is not an impact at 139 m/s that

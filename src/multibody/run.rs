@@ -130,7 +130,7 @@ pub struct InterfaceHistory {
     pub deflection_m: Vec<f64>,
     /// Net force in N, below 0 where a coupling pulls.
     pub force_n: Vec<f64>,
-    /// Largest deflection so far, in m.
+    /// Maximum deflection so far, in m.
     pub largest_deflection_m: Vec<f64>,
     /// Energy that would come back, in J.
     pub stored_j: Vec<f64>,
@@ -142,11 +142,11 @@ pub struct InterfaceHistory {
     pub peak_tension_n: f64,
     /// Largest extension of the coupling in m; 0 without one.
     pub max_extension_m: f64,
-    /// Largest deflection in m.
+    /// Maximum deflection in m.
     pub max_deflection_m: f64,
     /// Deflection up to which the curve has data, in m: beyond it the force is an assumption.
     pub data_end_m: f64,
-    /// Time of the largest deflection in s.
+    /// Time of the maximum deflection in s.
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,

@@ -83,7 +83,7 @@ fn runs(group: &str, cases: &[Case]) -> Table {
         &format!("{kind} speed"),
         "mass",
         "largest force",
-        "largest crush",
+        "maximum crush",
         "work",
         "work / energy",
         "warnings",
@@ -189,7 +189,7 @@ impl Validated<'_> {
         let Self { group, validation, .. } = self;
         let speeds = validation.means.first().map_or(0, |means| means.speeds);
         let heading =
-            ["model", "force", "energy", "largest crush", "velocity", "acceleration (CFC 60)"];
+            ["model", "force", "energy", "maximum crush", "velocity", "acceleration (CFC 60)"];
         let row = |means: &Means| {
             let is_chosen = means.model == validation.chosen;
             let texts = [
@@ -253,7 +253,7 @@ impl Validated<'_> {
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
             ("largest force".into(), force(peak)),
-            ("largest crush".into(), metres(curve.max_deflection_m)),
+            ("maximum crush".into(), metres(curve.max_deflection_m)),
             ("energy of the curve".into(), energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
             ("nearest FE run".into(), km_per_h(curve.provenance.nearest_training_speed_m_per_s)),
@@ -314,7 +314,7 @@ impl Validated<'_> {
                 .map(|text| Cell { text, title: String::new(), is_chosen: row.method == "best" })
                 .to_vec()
         });
-        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "largest crush"];
+        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "maximum crush"];
         parts.push(Part::Heading("Methods".into()));
         parts.push(Part::Table(Table {
             caption: format!(

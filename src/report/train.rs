@@ -44,7 +44,7 @@ pub(super) fn add(
     let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
     content
         .figures
-        .push(KeyFigure { value: metres(crush), name: format!("largest crush, {name}") });
+        .push(KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") });
     let mut warnings = prepared.warnings.clone();
     warnings.extend(run.all_warnings());
     warnings.into_iter().for_each(|warning| content.warn(format!("{name}: {warning}")));
@@ -122,7 +122,7 @@ fn interfaces(prepared: &Prepared, run: &Run) -> Table {
     let heading = [
         "interface",
         "largest force",
-        "largest crush",
+        "maximum crush",
         "at",
         "energy lost",
         "energy stored",

@@ -4,7 +4,7 @@
 //! closes at depends on the curves of all, so both are sought together, by iteration.
 //!
 //! Local speeds are a fixed point: curves for the present speeds; a run; each interface's largest closing speed up to the
-//! first peak of its force; and again, until none changes by 0.1 m/s. Models are asked beyond their largest crush here,
+//! first peak of its force; and again, until none changes by 0.1 m/s. Models are asked beyond their maximum crush here,
 //! because neighbours push on; the closing speed that rate effects follow is then zero.
 
 use std::collections::BTreeMap;

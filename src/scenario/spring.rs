@@ -95,7 +95,7 @@ pub(super) fn spring(
     Ok(Spring { curve, warnings })
 }
 
-/// The curve of a model, with what lies beyond its maximal crush.
+/// The curve of a model, with what lies beyond its maximum crush.
 fn of_model(
     model: &Model,
     table: &Table,

@@ -147,7 +147,7 @@ pub(crate) struct CurveTable {
     /// What the force does beyond the curve.
     #[serde(default)]
     pub(crate) end: EnvelopeEnd,
-    /// Of a model: the rule for the maximal crush; the model's own if absent.
+    /// Of a model: the rule for the maximum crush; the model's own if absent.
     #[serde(default)]
     pub(crate) max_crush: Option<MaxCrushRule>,
     /// Of a model: values of its further parameters.

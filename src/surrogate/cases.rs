@@ -22,7 +22,7 @@ pub struct ModelCase {
     /// Values of the model's features.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub features: Vec<f64>,
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub max_deflection_m: f64,
     /// Whether the record ended while loading, so that a larger deflection may follow.
     pub truncated: bool,
@@ -86,7 +86,7 @@ impl ModelCase {
             && (end / self.max_deflection_m - 1.0).abs() > 1e-9
         {
             let max = self.max_deflection_m;
-            return Err(format!("its curve ends at {end} m, its maximal deflection is {max} m"));
+            return Err(format!("its curve ends at {end} m, its maximum deflection is {max} m"));
         }
         Ok(())
     }

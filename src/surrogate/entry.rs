@@ -31,7 +31,7 @@ pub struct ModelEntry {
     pub needs_crush_law: bool,
     /// Fewest training curves that it answers from.
     pub least_curves: usize,
-    /// The rule for the maximal crush of a model that was not validated, if speed alone differs.
+    /// The rule for the maximum crush of a model that was not validated, if speed alone differs.
     pub crush_rule: MaxCrushRule,
     /// Options of its forest; `None` for a model without one.
     pub(super) forest: Option<fn() -> ForestOptions>,

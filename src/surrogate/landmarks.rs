@@ -6,7 +6,7 @@ use crate::piecewise;
 use crate::signal::peaks::{PROMINENCE, peaks};
 
 /// Landmarks of neighbouring cases match if they lie no further apart than this share of
-/// the larger maximal crush.
+/// the larger maximum crush.
 const NEAR: f64 = 0.15;
 /// Step at which curves are searched, as a share of their end.
 const STEPS: usize = 500;

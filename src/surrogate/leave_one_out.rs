@@ -26,9 +26,9 @@ pub struct LeftOut {
     pub force_l1: f64,
     /// Energy of the predicted curve.
     pub energy_error: f64,
-    /// Maximal crush by the model's rule.
+    /// Maximum crush by the model's rule.
     pub max_crush_error: f64,
-    /// Maximal crush by every rule that has an answer.
+    /// Maximum crush by every rule that has an answer.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
     /// The first two peaks of FE's curve.
     pub peaks: Vec<PeakError>,

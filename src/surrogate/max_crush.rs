@@ -1,4 +1,4 @@
-//! Maximal crush as a function of impact speed: four rules, and their spread.
+//! Maximum crush as a function of impact speed: four rules, and their spread.
 //!
 //! Four rules: a cubic spline over the speeds, a monotone interpolation, the kinetic energy, and the motion: where the
 //! body's force stops the body. `energy` solves the same on the declared force, which as a contact force takes up the
@@ -12,7 +12,7 @@ use super::Model;
 use crate::curve::Envelope;
 use crate::error::{Error, error};
 
-/// How the maximal crush is found.
+/// How the maximum crush is found.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -46,7 +46,7 @@ impl MaxCrushRule {
     }
 }
 
-/// The maximal crush by all rules, in m; `None` where a rule has no answer.
+/// The maximum crush by all rules, in m; `None` where a rule has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaxCrush {
     /// By a cubic spline over the speeds.
@@ -168,7 +168,7 @@ pub(crate) fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)
 }
 
-/// The maximal crush by every rule.
+/// The maximum crush by every rule.
 pub(super) fn by_all_rules(
     model: &Model,
     v: f64,
@@ -209,7 +209,7 @@ pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error>
     match crush.by(rule) {
         Some(end) if end > 0.0 && end.is_finite() => Ok(end),
         found => Err(
-            error!(Prediction at "max_crush", "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
+            error!(Prediction at "max_crush", "the maximum crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
                 .map_or("(no rule applies here)", MaxCrushRule::name), rule = rule.name()),

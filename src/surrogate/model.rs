@@ -49,7 +49,7 @@ pub struct Model {
     pub cases: Vec<ModelCase>,
     /// Which model, with its options.
     pub kind: ModelKind,
-    /// How the maximal crush is found if a query does not say.
+    /// How the maximum crush is found if a query does not say.
     pub max_crush_rule: MaxCrushRule,
     /// Pairs of neighbouring training speeds between which the collapse changes its mode.
     pub mode_switches_m_per_s: Vec<(f64, f64)>,
@@ -179,7 +179,7 @@ impl Model {
         self.fitted.forest()
     }
 
-    /// The largest crush of its runs, in m.
+    /// The maximum crush of its runs, in m.
     pub(crate) fn largest_crush_m(&self) -> f64 {
         self.cases.iter().map(|case| case.max_deflection_m).fold(0.0, f64::max)
     }

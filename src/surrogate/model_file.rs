@@ -213,7 +213,7 @@ impl Model {
             return Err("its cases have not as many features as it names".into());
         }
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
-            return Err("a maximal deflection is not above 0".into());
+            return Err("a maximum deflection is not above 0".into());
         }
         for case in &self.cases {
             case.check().map_err(|detail| format!("case \"{}\": {detail}", case.name))?;

@@ -1,7 +1,7 @@
 //! Prediction in stages: what is asked → the body's motion → the declared force and the maximal
 //! crush by every rule → the curve to one of them, with its audit and warnings.
 //!
-//! Order of work: body force → motion u(d) → largest crush → declared force at these speeds → band → audit. The motion
+//! Order of work: body force → motion u(d) → maximum crush → declared force at these speeds → band → audit. The motion
 //! is what makes `rate` more than an interpolation.
 //!
 //! A model has two forces. The **declared** one is the recipe's: it is exported and compared along FE's crush. The
@@ -11,7 +11,7 @@
 //!
 //! Unloading: FE curves begin with a flank far steeper than the line of the rebound. One stiffness for both would have
 //! to be the steep one (else a deflection creates energy) and would lose most of the rebound. A predicted curve has one
-//! stiffness per force, from its largest crush, which gives the measured speed of separation (`rebound`). The body force
+//! stiffness per force, from its maximum crush, which gives the measured speed of separation (`rebound`). The body force
 //! of the bundled runs rises less steeply than that, so tools with one constant get the rebound and create no energy.
 //! Exports take the body force by default and state its steepest rise beside it.
 
@@ -34,13 +34,13 @@ const REACH: f64 = 1.5;
 ///
 /// # Errors
 /// If the speed is not above 0 or far outside the training speeds, a parameter is missing, the rule gives no
-/// maximal crush, or an energy correction is out of bounds.
+/// maximum crush, or an energy correction is out of bounds.
 pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, Error> {
     let prediction = Prediction::new(model, query)?;
     prediction.curve(prediction.rule())
 }
 
-/// The curve of one force that drives an interface, with what lies beyond its maximal crush;
+/// The curve of one force that drives an interface, with what lies beyond its maximum crush;
 /// `member` of its band's half width added, from −1 (lower edge) to 1.
 ///
 /// For the body's own force the declared one is not looked at: many interfaces of a train or a
@@ -72,7 +72,7 @@ pub fn predict_driving(
     Ok((ForceCurve { beyond: Some(beyond), ..driving }, curve.warnings))
 }
 
-/// The forces of a prediction along deflections of which some lie beyond its maximal crush.
+/// The forces of a prediction along deflections of which some lie beyond its maximum crush.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beyond {
     /// What the recipe declares.
@@ -81,7 +81,7 @@ pub struct Beyond {
     pub body: Envelope,
 }
 
-/// [`predict`], and how its forces go on beyond the maximal crush.
+/// [`predict`], and how its forces go on beyond the maximum crush.
 ///
 /// # Errors
 /// As [`predict`].
@@ -92,7 +92,7 @@ pub fn predict_beyond(model: &Model, query: &Query) -> Result<(PredictedCurve, B
     Ok((curve, Beyond { declared, body: motion.body }))
 }
 
-/// The motion that the body's force gives, beyond any maximal crush.
+/// The motion that the body's force gives, beyond any maximum crush.
 struct Motion<'a> {
     asked: ResolvedQuery<'a>,
     query: &'a Query,
@@ -127,7 +127,7 @@ impl<'a> Motion<'a> {
         without_spikes(model, deflection_m, model.force_n(&at, deflection_m), false)
     }
 
-    /// The body's force to the maximal crush and how it unloads, without the declared force.
+    /// The body's force to the maximum crush and how it unloads, without the declared force.
     fn driving(self) -> Result<(ForceCurve, Vec<Warning>), Error> {
         let Self { asked, body: beyond, .. } = &self;
         let model = asked.model;
@@ -153,7 +153,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// What a prediction is before a rule for the maximal crush is chosen: the forces beyond any
+/// What a prediction is before a rule for the maximum crush is chosen: the forces beyond any
 /// crush, and the crush by every rule. One such serves all rules.
 pub(crate) struct Prediction<'a> {
     motion: Motion<'a>,
@@ -162,14 +162,14 @@ pub(crate) struct Prediction<'a> {
     crush: MaxCrush,
 }
 
-/// Both forces to the maximal crush.
+/// Both forces to the maximum crush.
 struct Forces {
     declared: Envelope,
     body: Option<Envelope>,
 }
 
 impl<'a> Prediction<'a> {
-    /// The stages that no rule for the maximal crush changes.
+    /// The stages that no rule for the maximum crush changes.
     pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
         Self::of(Motion::new(model, query)?)
     }
@@ -186,7 +186,7 @@ impl<'a> Prediction<'a> {
         self.motion.rule()
     }
 
-    /// The curve to the maximal crush of one rule.
+    /// The curve to the maximum crush of one rule.
     pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, Error> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;

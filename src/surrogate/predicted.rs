@@ -16,7 +16,7 @@ use crate::unit::{SpeedKind, UnitSystem};
 /// A predicted curve: the master format of exports (JSON).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PredictedCurve {
-    /// Loading branch from (0, 0) to the maximal crush.
+    /// Loading branch from (0, 0) to the maximum crush.
     pub deflection_m: Vec<f64>,
     /// Force in N, one value per deflection; which force it is says `provenance.force_kind`.
     #[serde(rename = "force_N")]
@@ -42,7 +42,7 @@ pub struct PredictedCurve {
     /// tell how the training points scatter, not how far FE lies off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forest_quantiles: Option<ForestQuantiles>,
-    /// Unloading stiffness that belongs to `force_N`, from its maximal crush: that of the
+    /// Unloading stiffness that belongs to `force_N`, from its maximum crush: that of the
     /// rebound where one is known, else the measured one, at least the steepest rise.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: f64,
@@ -59,10 +59,10 @@ pub struct PredictedCurve {
     /// Which runs `body_force_N` may drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_drives: Option<String>,
-    /// The rebound from the maximal crush.
+    /// The rebound from the maximum crush.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound: Option<Rebound>,
-    /// Maximal crush, in m: the last deflection.
+    /// Maximum crush, in m: the last deflection.
     pub max_deflection_m: f64,
     /// Speed that the curve is for, in m/s.
     pub speed_m_per_s: f64,
@@ -94,13 +94,13 @@ pub struct ForestQuantiles {
     pub high_n: Vec<f64>,
 }
 
-/// How the bodies part after the maximal crush.
+/// How the bodies part after the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rebound {
     /// In m/s; interpolated as a power of the impact speed, since the share that comes back
     /// falls with it.
     pub speed_m_per_s: f64,
-    /// Unloading stiffness from the maximal crush that gives this speed: `F²/(m v²)` with the
+    /// Unloading stiffness from the maximum crush that gives this speed: `F²/(m v²)` with the
     /// force and mass of the body.
     #[serde(rename = "stiffness_N_per_m")]
     pub stiffness_n_per_m: f64,
@@ -131,10 +131,10 @@ pub struct Provenance {
     pub nearest_training_speed_m_per_s: f64,
     /// Distance to it, in m/s.
     pub distance_to_nearest_m_per_s: f64,
-    /// How the maximal crush was found; absent for a recorded curve, which has its own.
+    /// How the maximum crush was found; absent for a recorded curve, which has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_crush_rule: Option<MaxCrushRule>,
-    /// The maximal crush by every rule.
+    /// The maximum crush by every rule.
     pub max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]
@@ -379,7 +379,7 @@ impl PredictedCurve {
     }
 }
 
-/// The last point may differ by this share from the maximal crush beside it.
+/// The last point may differ by this share from the maximum crush beside it.
 const SAME_END: f64 = 1e-6;
 
 /// An envelope of the forces called `name`, none of which pulls.

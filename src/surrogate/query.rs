@@ -16,7 +16,7 @@ use crate::unit::Speed;
 
 /// Deviation of the mass from the training runs' that needs no warning.
 const SAME_MASS: f64 = 1e-3;
-/// Share of a curve over which the force before its largest crush is averaged.
+/// Share of a curve over which the force before its maximum crush is averaged.
 const LAST_SHARE_OF_CRUSH: f64 = 0.05;
 /// Power of that force with which the speed of separation goes: the energy given back with its root.
 const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
@@ -28,7 +28,7 @@ pub struct Query {
     pub speed_m_per_s: f64,
     /// Mass of the body, or of each body of a pair; the training runs' if absent.
     pub mass_kg: Option<f64>,
-    /// How the maximal crush is found; the model's own way if absent.
+    /// How the maximum crush is found; the model's own way if absent.
     pub rule: Option<MaxCrushRule>,
     /// Values of the model's further parameters.
     pub parameters: BTreeMap<String, Parameter>,
@@ -51,7 +51,7 @@ impl Query {
         }
     }
 
-    /// The same with a rule for the maximal crush.
+    /// The same with a rule for the maximum crush.
     pub fn with_rule(self, rule: MaxCrushRule) -> Self {
         Self { rule: Some(rule), ..self }
     }
@@ -144,7 +144,7 @@ impl<'a> ResolvedQuery<'a> {
         }
     }
 
-    /// The rule for the maximal crush.
+    /// The rule for the maximum crush.
     pub(crate) fn rule(&self, query: &Query) -> MaxCrushRule {
         let (low, high) = self.model.range_m_per_s();
         query.rule.unwrap_or(match self.model.max_crush_rule {
@@ -172,7 +172,7 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
-    /// The maximal crush by every rule.
+    /// The maximum crush by every rule.
     pub(crate) fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
         max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
     }
@@ -195,7 +195,7 @@ impl<'a> ResolvedQuery<'a> {
     }
 }
 
-/// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the largest crush, `a` and `b` by
+/// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
 /// least squares of the runs' ratios to it. A structure behind one fold gives back the same energy whatever
 /// the force of that fold, the fold itself in proportion to it; the runs cannot tell how much is whose, and
 /// the root lies between. What a run has beside the line fades with the square of the nearness in speed.

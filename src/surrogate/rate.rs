@@ -41,7 +41,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// `F = Q(d; v) R(ḋ)` with `R(u) = 1 + β √u`.
 ///
 /// A run that hits slower passes the same deflection at a lower closing speed ḋ, and stands
-/// there at its own largest crush: a curve measured at a higher speed is too strong for it.
+/// there at its own maximum crush: a curve measured at a higher speed is too strong for it.
 /// Each training curve is divided by R of its own decreasing speed, the quotients Q are
 /// interpolated linearly in impact speed at equal deflection, and the query's own motion
 /// `m ḋ dḋ/dd = −F` brings R back. So crush and energy come out together, other masses and

@@ -27,7 +27,7 @@ pub enum WarningCode {
     NearSplitMidpoint,
     /// The curve takes up another energy than the impact has.
     EnergyMismatch,
-    /// A training run ended while loading; it is left out of the maximal crush.
+    /// A training run ended while loading; it is left out of the maximum crush.
     TruncatedTrainingRun,
     /// No training run holds an unloading branch.
     NoUnloading,
@@ -207,7 +207,7 @@ impl Warning {
         Self {
             code: WarningCode::TruncatedTrainingRun,
             message: format!(
-                "training run \"{name}\" ended while loading: it is left out of the maximal crush"
+                "training run \"{name}\" ended while loading: it is left out of the maximum crush"
             ),
         }
     }

@@ -82,7 +82,7 @@ pub(super) fn methods(
 
     let start = Instant::now();
     let forests = with_models(sources, &groups, |group, cases| {
-        // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
+        // Beyond the paper's speeds and masses the motion is asked for the maximum crush.
         ddtcm_model(&TrainingSet::new(group, cases)?, settings.seed)
     })?;
     let mut paper = with_declared();

@@ -127,7 +127,7 @@ fn between_vehicles(chain: &Chain, run: &Run, fe: &FeTrain, time_s: &[f64]) -> V
     crushes
 }
 
-/// FE's largest approach of two vehicles, or a vehicle and the wall, less the gap.
+/// FE's maximum approach of two vehicles, or a vehicle and the wall, less the gap.
 fn fe_crush_m(
     fe: &FeTrain,
     time_s: &[f64],

@@ -23,7 +23,7 @@ const LATE_FORCE: (f64, f64) = (0.15, 0.02);
 /// A body that has lost less than this share of its speed, under an impulse of half its momentum,
 /// does not move by that force.
 const SLOWED: f64 = 0.05;
-/// Fewer output intervals up to the largest crush than this may cut peaks.
+/// Fewer output intervals up to the maximum crush than this may cut peaks.
 const STATES: usize = 100;
 /// Effect of the sampling on the curve, as a share of its mean force, that deserves a warning.
 const SAMPLED_OFF: f64 = 0.02;
@@ -120,7 +120,7 @@ pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
 pub(super) struct Motion<'a> {
     pub contact: &'a FromContact,
     pub masses: Masses,
-    /// First state after the largest deflection at which the force is gone.
+    /// First state after the maximum deflection at which the force is gone.
     pub end: usize,
 }
 
@@ -157,7 +157,7 @@ impl<'a> Motion<'a> {
             return Ok(());
         }
         Err(ExtractError::Prescribed(format!(
-            "the motion is prescribed: the body keeps its {:.4} m/s up to the largest deflection, though the force would have stopped it {:.1} times",
+            "the motion is prescribed: the body keeps its {:.4} m/s up to the maximum deflection, though the force would have stopped it {:.1} times",
             closing[0],
             impulse / self.momentum_ns()
         )))
@@ -283,7 +283,7 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     let halved = off_at(original, &halved).unwrap_or(0.0);
     if end < STATES && end > 0 {
         let found = format!(
-            "sampling: the record has {end} states up to the largest crush, one every {:.3} ms; dropping every second one changes the curve by {:.1} % of its mean force",
+            "sampling: the record has {end} states up to the maximum crush, one every {:.3} ms; dropping every second one changes the curve by {:.1} % of its mean force",
             interval_ms(original.time_s(), end),
             halved * 100.0
         );

@@ -371,7 +371,7 @@ pub(super) fn sample(
     if window_s < end_s && times.len() == sampling.states && setup.stated.truncate_s.is_none() {
         return Err(error!(
             Run at "sampling",
-            "recipe.sampling has {sampling}, which ends {} after contact, before the largest crush at {}: raise states to {:.0} or more, or set truncate in the run",
+            "recipe.sampling has {sampling}, which ends {} after contact, before the maximum crush at {}: raise states to {:.0} or more, or set truncate in the run",
             milliseconds(window_s),
             milliseconds(end_s),
             (end_s / sampling.interval_s).ceil() + 1.0

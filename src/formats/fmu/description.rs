@@ -61,7 +61,7 @@ const VARIABLES: [Variable; 8] = [
         reference: 6,
         role: Role::Output(&[DEFLECTION]),
         unit: Some("m"),
-        description: "Largest deflection so far",
+        description: "Maximum deflection so far",
     },
     Variable {
         name: "force_scale",

@@ -75,7 +75,7 @@ pub fn binaries() -> impl Iterator<Item = &'static str> {
 /// The FMU as the bytes of its archive. The same input gives the same bytes.
 ///
 /// Deflection is in m, compression positive; the outputs are the law's force and energies, and the
-/// largest deflection so far. Beyond the curve's end [`crate::multibody::EnvelopeEnd::Error`] holds
+/// maximum deflection so far. Beyond the curve's end [`crate::multibody::EnvelopeEnd::Error`] holds
 /// the force.
 ///
 /// # Errors

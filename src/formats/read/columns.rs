@@ -212,7 +212,7 @@ struct Point {
 /// The points of a table without times; deflection and force have the file's signs at first.
 struct Points {
     list: Vec<Point>,
-    /// Largest deflection and force, without signs.
+    /// Maximum deflection and force, without signs.
     most: (f64, f64),
 }
 
@@ -231,7 +231,7 @@ impl Points {
     }
 
     /// The loading branch from (0, 0), then the unloading branch if there is one.
-    /// `crush_m`: the largest crush, if the file says it.
+    /// `crush_m`: the maximum crush, if the file says it.
     fn loading_then_unloading(
         &mut self,
         crush_m: Option<f64>,
@@ -310,12 +310,12 @@ impl Points {
         Ok(())
     }
 
-    /// A table that falls from its largest deflection is a loading branch from behind.
+    /// A table that falls from its maximum deflection is a loading branch from behind.
     fn put_in_order(&mut self, notes: &mut Vec<String>) {
         if self.list.windows(2).all(|w| w[1].d <= w[0].d) {
             self.list.reverse();
             notes.push(
-                "points: in reverse order, from the largest deflection to the smallest".into(),
+                "points: in reverse order, from the maximum deflection to the smallest".into(),
             );
         }
     }
@@ -355,7 +355,7 @@ impl Points {
         }
     }
 
-    /// Removes the points beyond the largest crush, which our exports add for other tools.
+    /// Removes the points beyond the maximum crush, which our exports add for other tools.
     fn remove_tail(&mut self, crush_m: Option<f64>, notes: &mut Vec<String>) {
         let Some(crush_m) = crush_m else { return };
         // As many digits as exports have.
@@ -376,7 +376,7 @@ impl Points {
     }
 
     /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still goes on.
-    /// Up to the largest deflection the later ones go forward; where the force has its peak at the largest
+    /// Up to the maximum deflection the later ones go forward; where the force has its peak at the maximum
     /// deflection, those behind the peak are unloading and go back, as all behind it do.
     fn set_steps_apart(&mut self, notes: &mut Vec<String>) {
         let largest_m = self.list.iter().map(|p| p.d).fold(0.0, f64::max);
@@ -410,7 +410,7 @@ impl Points {
         notes.extend(steps_note(&steps));
     }
 
-    /// Up to the largest deflection it must increase, behind it decrease.
+    /// Up to the maximum deflection it must increase, behind it decrease.
     fn check_order(&self) -> Result<(), Error> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
         let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });

@@ -113,7 +113,7 @@ pub struct Metadata {
     pub speed_m_per_s: Option<f64>,
     /// What the speed is measured against.
     pub speed_kind: Option<SpeedKind>,
-    /// From the largest deflection, in N/m.
+    /// From the maximum deflection, in N/m.
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// The same of the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
@@ -121,7 +121,7 @@ pub struct Metadata {
     pub mass_kg: Option<f64>,
     /// Mass of the other body in kg.
     pub other_mass_kg: Option<f64>,
-    /// Largest crush in m; points behind it are what other tools need beyond it.
+    /// Maximum crush in m; points behind it are what other tools need beyond it.
     pub max_deflection_m: Option<f64>,
 }
 

@@ -332,7 +332,7 @@ impl<'a> Contacts<'a> {
         what
     }
 
-    /// Largest deflection so far.
+    /// Maximum deflection so far.
     pub(crate) fn largest_m(&self, at: StepPoint, k: usize) -> f64 {
         match self.contacts[k].stage {
             Stage::Loading => self.deflection_m(at, k),

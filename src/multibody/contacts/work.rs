@@ -5,7 +5,7 @@ use super::super::rows::{LANES, LaneIndex, Row, Rows, each, larger};
 use super::contact::{Contact, Stage};
 use super::{Contacts, StepPoint};
 
-/// A point of the current piece of a row of interfaces and the work done up to it; the largest
+/// A point of the current piece of a row of interfaces and the work done up to it; the maximum
 /// deflection and what is dissipated once the deflection has fallen from there.
 #[derive(Clone, Debug)]
 pub(super) struct Totals {

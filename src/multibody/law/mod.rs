@@ -156,7 +156,7 @@ impl ForceLaw {
         Self { envelope, shape, end, data_end_m, slope_n_per_m, sum_jm, memory }
     }
 
-    /// Whether the largest deflection changes the force.
+    /// Whether the maximum deflection changes the force.
     pub(super) fn has_memory(&self) -> bool {
         self.memory.is_some()
     }
@@ -256,7 +256,7 @@ pub struct MemoryTables<'a> {
     pub steepest_n_per_m: f64,
     /// A branch stores at most this share of force times deflection.
     pub largest_share: f64,
-    /// Whether what is stored follows from the mean force up to the largest deflection, and not
+    /// Whether what is stored follows from the mean force up to the maximum deflection, and not
     /// from the force there.
     pub is_by_mean_force: bool,
 }

@@ -12,7 +12,7 @@ pub(in super::super) struct OnEnvelope {
     pub work_j: f64,
 }
 
-/// The unloading branch from the largest deflection so far.
+/// The unloading branch from the maximum deflection so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in super::super) struct Branch {
     pub largest_m: f64,

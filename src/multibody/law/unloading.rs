@@ -6,7 +6,7 @@ use crate::curve::{CurveUnloading, ForceCurve};
 /// What the stored energy of a structure follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StoredBy {
-    /// The force at the largest deflection.
+    /// The force at the maximum deflection.
     Force,
     /// The mean force up to there: a recorded force swings, what is stored does not.
     MeanForce,
@@ -56,7 +56,7 @@ impl Memory {
         self.steepest_n_per_m
     }
 
-    /// Energy that comes back from a largest deflection.
+    /// Energy that comes back from a maximum deflection.
     #[inline]
     pub(super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         // Within a piece work − storable is monotone for either bound, so its ends and the top
