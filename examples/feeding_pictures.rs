@@ -311,7 +311,7 @@ fn largest(points: &Points) -> f64 {
     points.iter().map(|p| p.0).fold(0.0, f64::max)
 }
 
-/// The file that `crumple export` writes of the body's force.
+/// The file that `crumple export` writes of the body force.
 fn exported(input: &ExportInput, format: &str, extension: &str) -> Anything<String> {
     let options = Options { extension: Some(extension.into()), ..Options::default() };
     text(by_name(format)?.export(std::slice::from_ref(input), &options)?)

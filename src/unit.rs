@@ -1,7 +1,7 @@
 //! Units: where numbers with units enter the program and become SI.
 //!
 //! Everything inside is SI. A number typed by a user carries its unit
-//! (`36km/h`, `24t`, `0.75ms`); a solver's file carries none, so a
+//! (`36km/h`, `24t`, `0.75ms`); a solver file carries none, so a
 //! [`UnitSystem`] is declared once in the study manifest.
 //!
 //! ```
@@ -287,7 +287,7 @@ fn continues_number(text: &str, i: usize, c: char) -> bool {
     }
 }
 
-/// The units in which a solver's files are written; factors turn a file's value into SI.
+/// The units in which a solver files are written; factors turn a file's value into SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitSystem {
     /// The files' unit of length, in m: 0.001 for mm.

@@ -188,7 +188,7 @@ fn a_family_is_one_tree() {
     assert_eq!(&section(&path, "nodout").time[..], [1.0, 2.0, 3.0, 5.0, 6.0, 7.0]);
 }
 
-/// A record without sense: the walk goes on at the next directory, one state is lost.
+/// A record without sense: the walk continues at the next directory, one state is lost.
 #[test]
 fn damage_in_the_middle_costs_one_state() {
     let folder = tempfile::tempdir().unwrap();

@@ -963,7 +963,7 @@ fn scenarios_choose_the_force() {
     assert!(error.contains("lengths in mm, cm, m, forces in N, kN, MN"), "{error}");
 }
 
-/// With -q a result is not printed: only errors, and what was asked for on standard output.
+/// With -q a result is not printed: only errors, and what was requested on standard output.
 #[test]
 fn quiet_commands_print_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -413,7 +413,7 @@ fn each(history: &mut History, value: impl Fn(f64, f64) -> f64) {
     }
 }
 
-/// Each kind of damage that leaves a plausible curve, and what is said of it.
+/// Each kind of damage that leaves a plausible curve, and what is reported of it.
 #[test]
 fn histories_that_contradict_each_other_are_said() {
     type Damage = fn(&mut Run);

@@ -482,7 +482,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
         replaced.all().all(|case| case.conditions.masses.body_kg == 24e3)
             && replaced.all().count() == 7
     );
-    // Masses that are none, copies, and nothing else: equal speeds of other masses are told apart.
+    // Masses that are none, copies, and nothing else: equal speeds of other masses are distinguished.
     let found = ok_json(here, "db check all.h5");
     for finding in found["findings"].as_array().unwrap() {
         let expected = ["extraction", "energy_mismatch", "copy"];
@@ -556,7 +556,7 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
         &["db", "note", "curves.h5", "--case", "72kmh", "--add", "rides up, from 80 ms on"],
     );
     let before = studied.bytes();
-    // What is there already changes nothing.
+    // What exists already changes nothing.
     ok(here, "db tag curves.h5 --group lead-car-wall --add a");
     assert!(studied.bytes() == before);
     studied.change("\"24t\"", "\"24.5t\"");

@@ -380,7 +380,7 @@ fn a_sweep_of_ends_does_not_depend_on_threads() {
     assert_eq!(one, rows("2"));
 }
 
-/// What is wrong is said with its place.
+/// What is wrong is reported with its place.
 #[test]
 fn wrong_ends_are_refused() {
     let fails = |from: &str, to: &str, expected: &str| {

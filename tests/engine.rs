@@ -600,7 +600,7 @@ fn points(shape: &[(f64, f64)]) -> UnloadingShape {
     UnloadingShape::of_branch(&deflection, &force).unwrap()
 }
 
-/// The branch gives back the energy of the line, `F²/2k_u`, whatever its shape: the rebound of
+/// The branch returns the energy of the line, `F²/2k_u`, whatever its shape: the rebound of
 /// case 4 in another way.
 #[test]
 fn a_shaped_branch_gives_back_what_is_stored() {

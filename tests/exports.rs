@@ -227,7 +227,7 @@ fn bands_stand_beside_their_curves() {
         serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     assert_ne!(column("force_low_N"), column("body_force_low_N"));
-    // The body force is what is written unless another is asked for.
+    // The body force is what is written unless another is requested.
     for (force, prefix) in [(&["--force", "contact"][..], ""), (&[], "body_")] {
         let keys = ["force_low_N", "force_high_N"].map(|edge| format!("{prefix}{edge}"));
         let [low, high] = keys.each_ref().map(|key| column(key));
@@ -362,7 +362,7 @@ fn packages_have_the_names_of_their_files() {
     assert_eq!(package("several/lead_car_wall_50kmh.mo"), "lead_car_wall_50kmh");
 }
 
-/// LS-DYNA resamples evenly: that it cannot keep an uneven curve is said.
+/// LS-DYNA resamples evenly: that it cannot keep an uneven curve is reported.
 #[test]
 fn uneven_curves_for_lsdyna_are_noted() {
     let folder = demo_folder();

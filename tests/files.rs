@@ -93,7 +93,7 @@ fn devices_pipes_and_folders_are_refused() {
     ];
     for (path, expected) in kinds {
         for command in READING {
-            // A solver's file may come through a pipe, and is asked first.
+            // A solver file may come through a pipe, and is asked first.
             if command.starts_with("rate") && path == "pipe" {
                 continue;
             }
@@ -115,7 +115,7 @@ fn devices_pipes_and_folders_are_refused() {
             soon_fails(here, &["simulate", "t.toml"], expected);
         }
     }
-    // A predicted curve is told by its ending.
+    // A predicted curve is recognised by its ending.
     fs::rename(here.join("pipe"), here.join("pipe.json")).unwrap();
     fs::write(here.join("t.toml"), format!("{SCENARIO}{{ file = \"pipe.json\" }}\n")).unwrap();
     soon_fails(here, &["simulate", "t.toml"], "pipe.json: this is a pipe");
@@ -978,7 +978,7 @@ fn the_only_group_needs_no_name() {
 }
 
 /// Changed numbers of a database stop every command that reads them, with the case named;
-/// `--accept-changed` goes on, and what changes or removes the case is let through.
+/// `--accept-changed` continues, and what changes or removes the case is let through.
 #[test]
 fn changed_numbers_are_not_read_in_silence() {
     let folder = demo_folder();

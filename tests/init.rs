@@ -1,4 +1,4 @@
-//! `crumple init`: studies proposed for run folders, held against the ones that were written by
+//! `crumple init`: studies proposed for run folders, compared with the ones that were written by
 //! hand and against crashes whose numbers are known; scenarios proposed for models; and the commands
 //! that go with them, `inspect` of folders and `build` without arguments.
 
@@ -437,7 +437,7 @@ fn pairs_have_both_bodies() {
     assert!(text.contains("or side = \"surfb\", which has the same force"), "{text}");
     assert!(text.contains("or node 9: follows the impulse within"), "{text}");
     assert!(text.contains("or rcforc 1: \"box of truck\", bodies follow it within"), "{text}");
-    // In the other order if that is asked for.
+    // In the other order if that is requested.
     crumple_ok(&here, &["init", "--node", "9", "--minus-node", "6", "-o", "turned.toml"]);
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(9));
@@ -615,7 +615,7 @@ fn a_section_is_the_last_choice() {
     assert_eq!(force["file"].as_str(), Some("rwforc"));
 }
 
-/// A last state right behind the one before would keep the force from being filtered.
+/// A last state right after the one before would keep the force from being filtered.
 #[test]
 fn a_last_state_off_the_raster_is_cut() {
     let mut history = Crash::default().run();
@@ -920,7 +920,7 @@ fn what_the_caller_knows_stands_above_what_is_found() {
     );
 }
 
-/// A run that holds its histories as text and as T01 is read from the text, and it is said.
+/// A run that holds its histories as text and as T01 is read from the text, and it is reported.
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn of_several_files_with_one_history_one_is_chosen() {

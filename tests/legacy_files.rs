@@ -23,7 +23,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// What is said where a file is refused.
+/// What is reported where a file is refused.
 fn refused(name: &str, bytes: &[u8], options: &ReadOptions) -> String {
     match read_bytes(name, bytes, options) {
         Ok((curve, format)) => panic!("{format} took {}: {curve:?}", text(bytes)),

@@ -151,7 +151,7 @@ vehicles = [ { name = \"A1\", mass = \"24t\" } ]
 curve = \"c\"
 ";
 
-/// With `--json` an error is one document on standard output, and nothing else is said.
+/// With `--json` an error is one document on standard output, and nothing else is reported.
 #[test]
 fn errors_as_json() {
     let folder = tempfile::tempdir().unwrap();

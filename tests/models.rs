@@ -276,7 +276,7 @@ fn student_t(n: usize) -> f64 {
     (n as f64).sqrt() * low.tan()
 }
 
-/// Root mean square of the residuals of one force at the inner speeds, left out, in ratio to the local level and over
+/// Root mean square of the residuals of one force at the inner speeds, left out, relative to the local level and over
 /// one gap, times Student's t for the independent stretches of the curves: the half width of its band at the mean of
 /// the gaps.
 fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f64 {
@@ -377,7 +377,7 @@ fn a_declared_body_force_has_one_band() {
     assert_eq!(bands, [ForceKind::Body]);
 }
 
-/// Models trained before the body force had a band are read; what they lack is said.
+/// Models trained before the body force had a band are read; what they lack is reported.
 #[test]
 fn older_models_have_no_band_of_the_body_force() {
     let folder = demo_folder();
@@ -642,7 +642,7 @@ fn several_parameters() {
             let curve = predict(&model, &ask(angle, obstacle)).unwrap();
             curve.force_n.iter().copied().fold(0.0, f64::max)
         };
-        // At the cases themselves the models must tell them apart.
+        // At the cases themselves the models must distinguish them.
         let (wall, pole, tilted) = (peak(0.0, "wall"), peak(0.0, "pole"), peak(10.0, "wall"));
         assert!((pole / wall - 0.7).abs() < 0.06, "{}: {}", options.name(), pole / wall);
         assert!((tilted / wall - 0.8).abs() < 0.06, "{}: {}", options.name(), tilted / wall);
@@ -871,7 +871,7 @@ fn parameters_through_the_commands() {
     assert!(!here.join("m2").exists());
 }
 
-/// For trains the ends of the range count; a group whose runs tell no stopped mass says so, and the choice goes on.
+/// For trains the ends of the range count; a group whose runs tell no stopped mass says so, and the choice continues.
 #[test]
 fn the_choice_for_trains_counts_the_ends() {
     let demo = demo_folder();
@@ -915,13 +915,13 @@ fn the_choice_for_trains_counts_the_ends() {
     let error = crumple_fails(demo.path(), 1, &arguments);
     assert!(error.contains("model crush-law needs runs from whose momentum"), "{error}");
     assert!(!demo.path().join("no.model").exists());
-    // That a group is not for one of the models is said, but is nothing to be warned of.
+    // That a group is not for one of the models is reported, but is nothing to be warned of.
     let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict", "-v"];
     let table = crumple_ok(demo.path(), &validated);
     assert!(table.contains("lead-car-pair: without crush-law: "), "{table}");
 }
 
-/// Left-out errors of the bundled groups: the crush law where the runs tell one, and what is said of them in the
+/// Left-out errors of the bundled groups: the crush law where the runs tell one, and what is reported of them in the
 /// documents, alone and with the second design. Bands cover what was left out as they promise, on average.
 #[test]
 fn left_out_speeds_of_the_bundled_groups() {
@@ -1250,7 +1250,7 @@ fn what_drives_a_train_is_the_prediction() {
 }
 
 /// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one
-/// is asked for. What is left is the error at the other one, trained with the one that was run.
+/// is requested. What is left is the error at the other one, trained with the one that was run.
 #[test]
 fn the_next_run_is_nearly_the_best_of_two() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! The way of a new user from raw run folders to the report: the commands of
 //! docs/from-runs-to-train.md and those that `crumple` names without arguments, in folders that hold
-//! nothing but what a solver wrote; and what is said when something is not as it should be.
+//! nothing but what a solver wrote; and what is reported when something is not as it should be.
 
 use std::fs;
 use std::path::Path;

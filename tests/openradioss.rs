@@ -315,7 +315,7 @@ fn restarted(bytes: &[u8], header: usize, first: usize, again: usize) -> [Vec<u8
     [part(&states[..first * state]), part(&states[(first - again) * state..])]
 }
 
-/// T01 and T02 are one record, whose impulses go on.
+/// T01 and T02 are one record, whose impulses continue.
 #[test]
 fn a_restart_goes_on_where_the_run_ended() {
     let folder = tempfile::tempdir().unwrap();
@@ -409,7 +409,7 @@ fn every_group_is_read() {
     assert_eq!(value("rwforc", 3, "x_force"), 6.0 * 1024.0);
 }
 
-/// The last force of a record that goes on is a difference over one interval.
+/// The last force of a record that continues is a difference over one interval.
 #[test]
 fn a_cut_record_says_that_its_last_force_will_change() {
     let bytes = written(3040, &[(0, 9, 9), (102, 3, 6)], 50);

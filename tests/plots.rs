@@ -1,4 +1,4 @@
-//! Pictures: no text leaves one or overlaps another, series can be told apart, the bytes are always the same.
+//! Pictures: no text leaves one or overlaps another, series can be distinguished, the bytes are always the same.
 
 use std::collections::BTreeMap;
 use std::fs;

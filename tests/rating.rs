@@ -328,7 +328,7 @@ fn degenerate_and_long_signals_are_rated() {
     assert!(of["warnings"][0].as_str().unwrap().contains("too many for ISO/TS 18571 and CORA"));
 }
 
-/// A file of a run that died is rated as far as it goes, and that is said.
+/// A file of a run that died is rated as far as it goes, and that is reported.
 #[test]
 fn damage_of_a_solver_file_is_a_warning() {
     let folder = tempfile::tempdir().unwrap();

@@ -53,7 +53,7 @@ documents! {
     feeding_importing_holds: "docs/feeding/importing.md";
 }
 
-/// Runs all commands of a document and holds it against what they print.
+/// Runs all commands of a document and compares it with what they print.
 fn holds(name: &str) {
     let path = root().join(name);
     let text = std::fs::read_to_string(&path).unwrap();

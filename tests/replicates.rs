@@ -48,9 +48,9 @@ fn twice(cases: &[Case]) -> Vec<Case> {
     cases.iter().flat_map(|c| [c.clone(), again(c)]).collect()
 }
 
-/// Of n runs, deviations from their mean in ratio to it, by hand: the force is the same at every
+/// Of n runs, deviations from their mean relative to it, by hand: the force is the same at every
 /// deflection, so its local level is its mean. That holds but for the last millimetre, where the
-/// stronger runs have turned back while their mean goes on.
+/// stronger runs have turned back while their mean continues.
 #[test]
 fn a_known_scatter_comes_out() {
     let speeds = [8.0, 16.0];
@@ -199,7 +199,7 @@ fn runs_of_the_same_bytes_change_no_prediction() {
     }
 }
 
-/// Parameters tell runs apart that would else be replicates, and one of each kind is not.
+/// Parameters distinguish runs that would else be replicates, and one of each kind is not.
 #[test]
 fn replicates_agree_in_parameters() {
     let mut cases = twice(&family(&[8.0, 12.0, 16.0]));

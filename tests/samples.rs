@@ -1,4 +1,4 @@
-//! Every value of the real LS-DYNA samples, held against an independent reading.
+//! Every value of the real LS-DYNA samples, compared with an independent reading.
 //!
 //! The program reads fixed columns; the reading here knows no columns: it finds numbers by
 //! their grammar, so that the two cannot share a mistake about layout.

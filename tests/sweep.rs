@@ -302,7 +302,7 @@ fn factors_and_each() {
          { what = \"force\", curve = \"inner\", values = [1, 2] },\n\
          { what = \"force\", curve = \"nose\", values = [1, 2] } ]\n",
     );
-    // An unloading stiffness that is asked for is not scaled, the curve's own is.
+    // An unloading stiffness that is requested is not scaled, the curve's own is.
     let text = folder.text("s.toml");
     folder.put(
         "s.toml",
@@ -685,7 +685,7 @@ fn another_sweeps_file_is_not_taken_up() {
     assert!(error.contains("the row of item 11 is missing or damaged"), "{error}");
 }
 
-/// What cannot be written is said; rows that are there stay for the next time.
+/// What cannot be written is reported; rows that are there stay for the next time.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_disks_and_missing_folders() {
@@ -715,7 +715,7 @@ fn a_second_writer_is_known() {
     assert_eq!(folder.names(), ["out.csv"]);
 }
 
-/// Ctrl-C: what is done stays, and it is said how to go on.
+/// Ctrl-C: what is done stays, and it is reported how to continue.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_behind_the_rows_that_are_done() {
@@ -784,7 +784,7 @@ fn only_all_shards_of_one_sweep_are_merged() {
     assert!(error.contains("finished.h5 is HDF5: merge the shards as .csv"), "{error}");
     let error = folder.fails(2, "sweep merge -o p1.csv p1.csv p2.csv p3.csv");
     assert!(error.contains("names the input itself"), "{error}");
-    // Rows that end early, named by the first that is missing; those of a run that goes on, too.
+    // Rows that end early, named by the first that is missing; those of a run that continues, too.
     let text = folder.text("p2.csv");
     let lines: Vec<&str> = text.lines().collect();
     folder.put("cut.csv", &(lines[..lines.len() - 1].join("\n") + "\n"));

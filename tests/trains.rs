@@ -62,7 +62,7 @@ fn shipped_scenarios_run() {
 }
 
 /// Interior interfaces get curves for their own speeds, far below the trains'; all get the
-/// trains' speed if that is asked for.
+/// trains' speed if that is requested.
 #[test]
 fn interfaces_have_their_own_speeds() {
     let demo = demo_folder();

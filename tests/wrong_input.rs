@@ -106,7 +106,7 @@ fn the_other_runs_go_on() {
     assert_eq!(list["groups"]["lead-car-wall"].as_array().unwrap().len(), 6);
 }
 
-/// A run that died: its complete states are used, and it is said.
+/// A run that died: its complete states are used, and it is reported.
 #[test]
 fn a_cut_run_is_used_as_far_as_it_goes() {
     let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");

@@ -14,7 +14,7 @@ use crate::surrogate::MODELS;
 use crate::surrogate::leave_one_out::{Means, Validation};
 use crate::unit::km_per_h;
 
-/// Mean errors that differ by less are a tie: three to five speeds say no more.
+/// Mean errors that differ by less are a tie: three to five speeds resolve no more.
 const TIE: f64 = 0.10;
 
 /// Where the queries of a model will lie.
@@ -108,7 +108,7 @@ pub struct Gap {
 }
 
 impl Gap {
-    /// The gaps with a known error first, the largest first; without errors the widest in ratio to
+    /// The gaps with a known error first, the largest first; without errors the widest relative to
     /// its speeds.
     fn rank(&self) -> (bool, f64) {
         let (low, high) = self.between_m_per_s;
@@ -119,7 +119,7 @@ impl Gap {
 /// The gaps between training speeds, those where a run would bring most first.
 ///
 /// A left-out speed is predicted over the gap that its absence leaves; the error expected
-/// in the middle of a gap is that of the speeds at its ends, in ratio of the gaps. Gaps at
+/// in the middle of a gap is that of the speeds at its ends, relative to the gaps. Gaps at
 /// the ends of the range have one such speed.
 pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
     let mut speeds: Vec<f64> = set.cases.iter().map(|c| c.speed_m_per_s).collect();

@@ -37,7 +37,7 @@ pub(crate) struct Comparison {
     pub reference_peak_force_n: f64,
     /// Maximum deflection of FE's record, in m.
     pub reference_max_crush_m: f64,
-    /// Time by the clock that FE took for this run, in s; null where its case file is missing.
+    /// Wall-clock time of FE for this run, in s; null where its case file is missing.
     pub fe_time_s: Option<f64>,
     /// The same of the runs that the curves were made from.
     pub training_time_s: Option<f64>,
@@ -187,7 +187,7 @@ fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> Error {
     )
 }
 
-/// The one case that FDRM and NSDM use: of the speed that was asked for, else the nearest to
+/// The one case that FDRM and NSDM use: of the speed that was requested, else the nearest to
 /// `left_out_m_per_s`.
 fn fixed_case<'a>(
     group: &str,

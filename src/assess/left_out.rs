@@ -38,7 +38,7 @@ pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
 
 /// A case that is left out, and what is left.
 pub(crate) struct LeftOutCase<'a> {
-    /// As the training set has it.
+    /// As in the training set.
     pub own: &'a TrainingCase,
     /// Its records: a run, or the mean of the runs that it stands for.
     pub case: &'a Case,
@@ -230,7 +230,7 @@ pub(super) struct Answer {
     pub max_crush_error: f64,
 }
 
-/// One model at one case by every rule that was asked, or why that has no answer.
+/// One model at one case by every requested rule, or why that is impossible.
 pub(super) type Answers = BTreeMap<MaxCrushRule, Result<Answer, String>>;
 
 /// A row of the table, and what bands are made of.

@@ -151,7 +151,7 @@ pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, Err
     method("ddtcm", made_from, left_out, &curve, driving, (fit_s, predict_s))
 }
 
-/// The model that leaving speeds out chooses among the others; the body's force drives.
+/// The model that leaving speeds out chooses among the others; the body force drives.
 pub(super) fn best(
     left_out: &LeftOutCase<'_>,
     group: &str,

@@ -51,7 +51,7 @@ struct Apart {
     body: Option<Squares>,
 }
 
-/// Squares of the residuals of one force in ratio to its local level.
+/// Squares of the residuals of one force relative to its local level.
 struct Squares {
     mean: f64,
     largest: f64,

@@ -63,7 +63,7 @@ fn names(cases: &[Case]) -> Vec<String> {
 
 /// Force over deflection of all runs of a group, loading and unloading.
 ///
-/// `force` is the recipe's force, or the body's beside it; runs without that force are named in a note.
+/// `force` is the recipe's force, or the body force; runs without that force are named in a note.
 pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     let mut series = Vec::new();
     let mut missing = Vec::new();
@@ -94,7 +94,7 @@ pub(crate) fn file_curve(title: &str, name: &str, deflection_m: &[f64], force_n:
     Chart::of(title, panel)
 }
 
-/// A predicted curve with its band, over the training curves beside its speed.
+/// A predicted curve with its band, over the training curves next to its speed.
 ///
 /// `neighbours` are a model's cases; the nearest below and above are drawn, or the two nearest outside of all.
 pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
@@ -134,7 +134,7 @@ fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
 /// The look of predictions.
 const PREDICTED: usize = 1;
 
-/// The predicted line, its band below it, and the body's force beside it, whose own band would
+/// The predicted line, its band below it, and the body force beside it, whose own band would
 /// cover that of the line: it is drawn with that force alone.
 fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
     let (d, f) = (&curve.deflection_m, &curve.force_n);
@@ -174,7 +174,7 @@ fn band_name(curve: &PredictedCurve) -> String {
     }
 }
 
-/// A curve that was predicted without the run beside it.
+/// A curve predicted without the run shown with it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LeftOutPrediction<'a> {
     /// The run that was left out.
@@ -185,7 +185,7 @@ pub(crate) struct LeftOutPrediction<'a> {
     pub motion: Option<(&'a [f64], &'a [f64])>,
 }
 
-/// A run that was left out beside its prediction: force over deflection, and the speed over time.
+/// A left-out run with its prediction: force over deflection, and the speed over time.
 pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
@@ -224,7 +224,7 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
 }
 
 /// Trains the model of `choice` on the runs at other speeds, predicts the curve at `speed_m_per_s`, lets its body force (or its
-/// only force) stop one mass, and draws both beside the run.
+/// only force) stop one mass, and draws both with the run.
 ///
 /// # Errors
 /// If there is no such run, or the others are too few.

@@ -1,4 +1,4 @@
-//! Histories of a solver's file over time, in its own units; raw, and filtered beside it.
+//! Histories of a solver file over time, in its own units; raw, and filtered as well.
 
 use crate::error::{Error, error};
 use crate::history::History;
@@ -11,7 +11,7 @@ use crate::unit::UnitSystem;
 pub struct HistoryOptions {
     /// The file's units; without them, numbers stand as in the file.
     pub units: Option<UnitSystem>,
-    /// Channel frequency class of SAE J211-1, such as 60, for filtered lines beside the raw ones.
+    /// Channel frequency class of SAE J211-1, such as 60, for additional filtered lines.
     pub filter_class: Option<u32>,
 }
 

@@ -244,7 +244,7 @@ fn time() -> Axis {
 }
 
 /// Methods that are parts of another; they stand in the table, and more lines than looks would be
-/// told apart by nothing.
+/// distinguished by nothing.
 const ON_THE_WAY: [&str; 2] = ["rate_only", "rate_live"];
 
 /// A panel for each vehicle, with FE's speed and that of every method, but for those that are parts

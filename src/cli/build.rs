@@ -28,7 +28,7 @@ energy of its impact: within 5 % of 1 is usual; more points to a wrong mass, spe
 pub(super) struct Args {
     /// Study manifest (TOML); study.toml if absent
     study: Option<PathBuf>,
-    /// Database to write or to update; curves.h5 beside the study if absent
+    /// Database to write or to update; curves.h5 next to the study if absent
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
@@ -59,7 +59,7 @@ struct Document {
     database: String,
     group: String,
     runs: Vec<RunReport>,
-    /// What is odd in a run beside the others of its group.
+    /// What is unusual in a run compared with its group.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     group_warnings: Vec<String>,
     removed: Vec<String>,

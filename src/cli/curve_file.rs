@@ -1,4 +1,4 @@
-//! What a measured or legacy curve's file does not say of itself, as several commands take it.
+//! Options for data missing from a measured or legacy curve's file, shared by several commands.
 
 use crate::formats::read::{ColumnNames, ReadOptions};
 use crate::import::Settings;
@@ -55,12 +55,12 @@ fn stiffness(text: &str) -> Result<f64, String> {
 }
 
 impl Reading {
-    /// Whether anything is said.
+    /// Whether any of the options is given.
     pub(super) fn is_asked(&self) -> bool {
         self.options() != ReadOptions::default()
     }
 
-    /// What is said here; the rest is as by default.
+    /// The given options, and defaults for the rest.
     pub(super) fn options(&self) -> ReadOptions {
         ReadOptions {
             format: self.from.clone(),
@@ -76,13 +76,13 @@ impl Reading {
 }
 
 impl CurveFile {
-    /// Whether anything is said.
+    /// Whether any of the options is given.
     pub(super) fn is_asked(&self) -> bool {
         let is_number = self.other_mass.is_some() || self.unloading.is_some();
         self.kind.is_some() || is_number || self.accept_energy || self.reading.is_asked()
     }
 
-    /// What is said here; the rest is as by default.
+    /// The given options, and defaults for the rest.
     pub(super) fn settings(&self) -> Settings {
         Settings {
             kind: self.kind,

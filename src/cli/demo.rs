@@ -48,7 +48,7 @@ const SEED: u64 = 0;
 /// FE's run of a whole train, for the comparison of methods.
 static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set");
 
-/// Scenarios, written beside the models that they name.
+/// Scenarios, written next to the models that they name.
 static SCENARIOS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/examples/trains");
 /// The one that the demo runs.
 const SCENARIO: &str = "scenario.toml";
@@ -261,7 +261,7 @@ impl Flow<'_> {
 }
 
 /// Writes the bundled files of a folder and all below it.
-/// Most bytes of a scenario that is held against the bundled one.
+/// Most bytes of a scenario that is compared with the bundled one.
 const MAX_SCENARIO: u64 = 1 << 20;
 
 /// A scenario of an earlier demo in `folder` that is not as it was written.

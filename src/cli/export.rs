@@ -183,8 +183,8 @@ impl Target {
         }
     }
 
-    /// The files of curves for `path`, of the force that was asked for or of the body's; of both where
-    /// the format holds both and none was asked for.
+    /// The files of curves for `path`, of the force that was requested or of the body's; of both where
+    /// the format holds both and none was requested.
     pub(super) fn export(
         &self,
         format: &Format,

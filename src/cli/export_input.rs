@@ -31,11 +31,11 @@ pub(super) enum Input {
 /// Which curves of it.
 pub(super) struct Chosen<'a> {
     pub speeds_m_per_s: &'a [f64],
-    /// What is asked of a model; its speed is not used.
+    /// The query to a model; its speed is not used.
     pub query: Query,
     pub group: Option<&'a str>,
     pub cases: &'a [String],
-    /// What is said of a measured or legacy curve, and the units of its file.
+    /// Options about a measured or legacy curve, and the units of its file.
     pub file: &'a CurveFile,
     pub input_units: Option<UnitSystem>,
 }
@@ -74,7 +74,7 @@ impl Input {
         }
     }
 
-    /// Refuses what is said of a curve's file where there is none.
+    /// Refuses options about a curve's file if the input is not one.
     pub(super) fn check_said(&self, chosen: &Chosen<'_>) -> Result<(), Failure> {
         let is_said = chosen.file.is_asked() || chosen.input_units.is_some();
         match (self, is_said) {
@@ -149,13 +149,13 @@ impl Chosen<'_> {
         }
     }
 
-    /// Whether anything is asked that only a model can answer.
+    /// Whether any option is given that only applies to a model.
     fn asks_a_model(&self) -> bool {
         let Query { mass_kg, rule, extrapolate, parameters, .. } = &self.query;
         mass_kg.is_some() || rule.is_some() || *extrapolate || !parameters.is_empty()
     }
 
-    /// Refuses what an export of a whole model has no use for; a table takes all that is asked of
+    /// Refuses options that an export of a whole model does not use; a table accepts all options of
     /// a model.
     pub(super) fn check_for_model(&self, is_table: bool) -> Result<(), Failure> {
         let of_database = self.group.is_some() || !self.cases.is_empty();

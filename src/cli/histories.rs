@@ -44,7 +44,7 @@ pub(super) struct Args {
     /// Where to write: .csv, .h5 or .hdf5 (default: CSV on standard output)
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck beside it]
+    /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck next to it]
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
     /// Replace an HDF5 file that is not a file of histories, such as a curve database
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         _ => None,
     };
     let beside = Beside { units: args.units, deck: deck.as_ref() };
-    // JSON on standard output beside a file needs the values themselves.
+    // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !options.json);
     let format = args.format.as_deref();
     let bar = Bar::new(options, "reading");

@@ -44,7 +44,7 @@ pub(super) struct Args {
 #[derive(clap::Args)]
 #[group(id = "known", multiple = true, conflicts_with = "scenario")]
 struct GivenArgs {
-    /// Units of the solver's files, such as mm-t-s
+    /// Units of the solver files, such as mm-t-s
     #[arg(long, value_parser = |text: &str| UnitSystem::parse(text))]
     units: Option<UnitSystem>,
     /// Kind of impact

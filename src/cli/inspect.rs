@@ -180,7 +180,7 @@ fn reports(inspected: &Inspected) -> Vec<Report<'_>> {
     .collect()
 }
 
-/// The deck beside a file, if an entity of the file lacks a title.
+/// The deck next to a file, if an entity of the file lacks a title.
 fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
     let lacks = |file: &SolverFile| file.entities.iter().any(|e| e.title.is_none());
     if !sections.iter().any(lacks) {

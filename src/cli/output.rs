@@ -1,6 +1,6 @@
 //! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
 //! an error. Everything printed goes through here, where control characters are taken out:
-//! a title in a solver's file may hold an escape sequence, which a terminal would obey.
+//! a title in a solver file may hold an escape sequence, which a terminal would obey.
 
 use std::borrow::Cow;
 use std::error::Error;
@@ -109,7 +109,7 @@ struct ControlFilter<W, F> {
     out: W,
     /// What stands for a control character of that code.
     instead: F,
-    /// Whether a `0xc2` waits for the byte behind it.
+    /// Whether a `0xc2` waits for the byte after it.
     held: bool,
 }
 
@@ -225,7 +225,7 @@ fn table_within(
 const GAP: &str = "  ";
 
 /// A table as a list: each row by its first cell, below it a line for each other one; what is
-/// longer than a line goes on in the next.
+/// longer than a line continues in the next.
 fn list(
     out: &mut dyn Write,
     width: usize,
@@ -311,7 +311,7 @@ pub(super) fn error_width() -> Option<usize> {
     err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))
 }
 
-/// What the user asks for, whatever the terminal has.
+/// The user's choice, whatever the terminal supports.
 fn stated() -> Option<usize> {
     std::env::var("COLUMNS").ok()?.parse().ok().filter(|width| *width > 0)
 }

@@ -62,10 +62,10 @@ struct Both {
     /// Column of the CSV files
     #[arg(long)]
     column: Option<String>,
-    /// Node, wall or interface of the solver's files; 3:surfa is one side
+    /// Node, wall or interface of the solver files; 3:surfa is one side
     #[arg(long)]
     id: Option<WantedId>,
-    /// Component of the solver's files, named as in binout, such as x_velocity
+    /// Component of the solver files, named as in binout, such as x_velocity
     #[arg(long)]
     component: Option<String>,
     /// Section of binouts, such as nodout or rwforc/forces
@@ -108,14 +108,14 @@ impl Address {
         let colons = rest.rmatch_indices(':').map(|(at, _)| at);
         let end =
             std::iter::once(rest.len()).chain(colons).find(|&at| Path::new(&rest[..at]).exists());
-        // Of no file: what does not stand there is said when it is read.
+        // No such file: what is missing is reported when it is read.
         let end = end.unwrap_or_else(|| rest.find(':').unwrap_or(rest.len()));
         let within = rest.get(end + 1..).map(String::from);
         Ok(Self { path: rest[..end].into(), within, scale, unit })
     }
 }
 
-/// The history of a solver's file that an address names.
+/// The history of a solver file that an address names.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct History<'a> {
     section: Option<&'a str>,
@@ -237,7 +237,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(if clean { Outcome::Clean } else { Outcome::Warned })
 }
 
-/// Refuses what chooses nothing: a column of a solver's file, a node of a table.
+/// Refuses what chooses nothing: a column of a solver file, a node of a table.
 fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
     let both = &args.both;
     let [a_is_table, b_is_table] = is_table;
@@ -261,7 +261,7 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
 /// Records that differ this much in length are probably in different units.
 const LENGTHS: f64 = 100.0;
 
-/// Units are not guessed: records of very different lengths must say theirs.
+/// Units are not guessed: for records of very different lengths they must be given.
 fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Result<(), Failure> {
     let length = |signal: &Signal| signal.range_s().1 - signal.range_s().0;
     let (long_a, long_b) = (length(of_a), length(of_b));

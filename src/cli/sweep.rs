@@ -192,7 +192,7 @@ fn write(
     report
 }
 
-/// Set by the first Ctrl-C (or SIGTERM), so that a run ends behind the chunk it is at; the
+/// Set by the first Ctrl-C (or SIGTERM), so that a run ends after the chunk it is at; the
 /// second one ends it at once, which loses that chunk only.
 fn stop_flag() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));

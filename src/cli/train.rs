@@ -83,7 +83,7 @@ fn model_names() -> PossibleValuesParser {
     PossibleValuesParser::new(iter::once(auto).chain(models))
 }
 
-/// Where a model will be asked.
+/// Where a model will be used.
 const PURPOSES: &[(&str, Purpose, &str)] = &[
     ("vehicle", Purpose::Vehicle, "One vehicle, between the speeds of the runs"),
     ("train", Purpose::Train, "Interfaces of a train, also beyond these speeds"),
@@ -144,7 +144,7 @@ impl Args {
         Ok(Choice::Kind(kind.with_forest(|own| self.forest(own))))
     }
 
-    /// A forest's own options with those that were asked for.
+    /// A forest's own options with those that were requested.
     fn forest(&self, own: ForestOptions) -> ForestOptions {
         let ForestOptions { table, .. } = ForestOptions::default();
         ForestOptions {

@@ -273,7 +273,7 @@ fn peak(peak: &PeakError) -> String {
     }
 }
 
-/// What the row of FE's own curve is called. That of the body's force is made from FE's speeds, so
+/// What the row of FE's own curve is called. That of the body force is made from FE's speeds, so
 /// it is not a floor for predictions.
 fn own_curve(force: &str) -> String {
     match force {
@@ -291,7 +291,7 @@ fn floor(floor: &Floor) -> Vec<String> {
     cells
 }
 
-/// The means over the inner speeds, the floors beside them, and the choice.
+/// The means over the inner speeds with the floors, and the choice.
 pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
@@ -353,7 +353,7 @@ fn scatter_rows(validation: &Validation, inner: bool) -> impl Iterator<Item = Ve
     })
 }
 
-/// The scatter beside the means, pooled over the speeds that have several runs.
+/// The scatter, pooled over the speeds that have several runs.
 fn mean_scatter(scatter: &Scatter) -> Vec<String> {
     let mut cells = vec![SCATTER.into(), percent(scatter.force_l1)];
     cells.extend(["-"; 6].map(String::from));

@@ -1,4 +1,4 @@
-//! Cases beside each other: what differs from the first of them.
+//! Cases side by side: what differs from the first of them.
 
 use crate::error::Error;
 use serde::Serialize;
@@ -8,10 +8,10 @@ use crate::dataset::grid;
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
 
-/// Cases beside each other.
+/// Cases side by side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Comparison {
-    /// The case that the others are held against.
+    /// The case that the others are compared with.
     pub reference: String,
     /// One entry per case, the reference first.
     pub cases: Vec<Difference>,
@@ -60,7 +60,7 @@ pub(crate) struct Difference {
 /// Steps of the common deflection at least.
 const STEPS: usize = 400;
 
-/// Holds cases against the first of them.
+/// Compares cases with the first of them.
 pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;

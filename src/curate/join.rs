@@ -30,7 +30,7 @@ pub(crate) enum OnConflict {
 pub(crate) struct Joined {
     /// Cases that were added under their own names.
     pub added: Vec<(PathBuf, CasePath)>,
-    /// Cases that are there already, under these names.
+    /// Cases that exist already, under these names.
     pub equal: Vec<(PathBuf, CasePath, CasePath)>,
     /// Cases that were added under these names.
     pub renamed: Vec<(PathBuf, CasePath, CasePath)>,
@@ -43,14 +43,14 @@ pub(crate) struct Joined {
 /// Where cases are copied to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Target {
-    /// Another database, which is made if it is not there; the cases' own if absent.
+    /// Another database, which is created if it does not exist; the cases' own if absent.
     pub database: Option<PathBuf>,
     /// Their group there; their own if absent.
     pub group: Option<String>,
 }
 
 /// Joins the databases at `inputs`, in their order, into the file at `output`, which is one of them
-/// and then comes first, or is not there yet. Equal curves of a group are taken once, with the tags and notes of both.
+/// and then comes first, or does not exist yet. Equal curves of a group are taken once, with the tags and notes of both.
 pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,

@@ -18,7 +18,7 @@ pub(crate) struct Labels {
     pub remove_tags: Vec<String>,
     /// Whether they lose all tags that they have.
     pub clear_tags: bool,
-    /// Notes that they get, behind those that they have.
+    /// Notes that they get, after those that they have.
     pub add_notes: Vec<String>,
     /// Notes that they lose.
     pub remove_notes: Vec<String>,

@@ -121,7 +121,7 @@ impl Selection {
         Ok(chosen)
     }
 
-    /// What is asked of a case, in words that follow "no case".
+    /// The selection, in words that follow "no case".
     fn asked(&self) -> String {
         let mut asked = Vec::new();
         if !self.cases.is_empty() {

@@ -15,7 +15,7 @@ pub struct BodyMotion {
     /// Closing speed in m/s over deflection: an envelope by its shape, not a force.
     pub closing_speed: Envelope,
     /// Speed of separation in m/s, the mean over up to 5 ms after the body force has first fallen to
-    /// zero behind the maximum deflection; `None` if the record ends before it does.
+    /// zero after the maximum deflection; `None` if the record ends before it does.
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     })
 }
 
-/// The force that moved the body as its speeds tell it, loading and unloading, not filtered.
+/// The force that drove the body, from its speeds, for loading and unloading, not filtered.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RecordedForce {
     /// Loading branch, in N.
@@ -84,7 +84,7 @@ pub(crate) struct RecordedForce {
     /// Unloading branch from the maximum deflection to where the force is first zero.
     pub unloading_deflection_m: Vec<f64>,
     pub unloading_force_n: Vec<f64>,
-    /// Stiffness in N/m of the straight line that gives back the energy of the separation.
+    /// Stiffness in N/m of the straight line that returns the energy of the separation.
     pub unloading_stiffness_n_per_m: Option<f64>,
 }
 

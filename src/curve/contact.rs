@@ -1,6 +1,6 @@
 //! Contact: when it begins in a record, and what of the record is not it.
 //!
-//! Contact begins with the spell of force that holds most of the impulse, where the force crosses its threshold between two
+//! Contact begins with the force pulse that holds most of the impulse, where the force crosses its threshold between two
 //! states. A record that begins in contact counts from its first state. The sign of a force is that of its impulse, which one
 //! wrong state does not turn. A body slows down two to four milliseconds after its nose has touched, so a body force takes the
 //! contact from a contact force that the recipe names (`contact`), or says that it cannot.

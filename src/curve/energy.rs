@@ -1,8 +1,8 @@
 //! Energy audit, and the refusal of runs whose energy or impulse cannot be.
 //!
 //! Refuses what no crash can be: work or impulse outside 0.67 to 1.5 of what mass and speed ask for, or a crush, speed or
-//! loading time of no vehicle. Units are told apart by trying the usual systems: energy, impulse, speed and the times must all
-//! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is held against the speed that it
+//! loading time of no vehicle. Units are distinguished by trying the usual systems: energy, impulse, speed and the times must all
+//! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is compared with the speed that it
 //! had reached.
 
 use super::loading::loading_end;
@@ -21,7 +21,7 @@ fn work_to_end(curve: &Curve) -> f64 {
     (1..=loading_end(curve)).map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1])).sum()
 }
 
-/// Energy or impulse outside these shares of what the impact asks for is an error of the input.
+/// Energy or impulse outside these ratios to the impact's is an error of the input.
 pub(crate) const POSSIBLE: (f64, f64) = (0.67, 1.5);
 /// Two quantities of a record that should be one differ by less than this share of their range
 /// at any time, or the record is not one.
@@ -32,7 +32,7 @@ pub(crate) const IMPULSE_TOLERANCE: f64 = 0.05;
 const FASTEST_M_PER_S: f64 = 340.0;
 const LONGEST_CRUSH_M: f64 = 100.0;
 const SHORTEST_LOADING_S: f64 = 0.5e-3;
-/// A crush, in m, and a time to it, in s, as they are usual in crashes: to tell units by.
+/// A crush, in m, and a time to it, in s, that are usual in crashes, to recognise units.
 const USUAL_CRUSH_M: (f64, f64) = (2e-3, 20.0);
 const USUAL_LOADING_S: (f64, f64) = (2e-3, 3.0);
 /// Two speeds, or a speed's square and an energy, that agree this well have one cause.
@@ -58,7 +58,7 @@ pub(crate) struct StatedConditions<'a> {
     pub others: &'a [(String, f64)],
 }
 
-/// What the record gives in ratio to what the impact asks for.
+/// Energy and impulse of the record relative to those of the impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyBalance {
     /// Work of the loading branch over the kinetic energy that it stopped.
@@ -112,7 +112,7 @@ enum Cause {
     OneBody(String),
     /// Histories that do not belong together.
     Histories(&'static str),
-    /// Nothing that its size tells, likewise.
+    /// Unknown from its size, likewise.
     Unknown(String),
 }
 
@@ -164,7 +164,7 @@ impl Cause {
 
 impl StatedConditions<'_> {
     /// Work and impulse against the impact's, over the loading branch. A record that ends
-    /// while loading is held against the speed that it has reached; without recorded speeds
+    /// while loading is compared with the speed that it has reached; without recorded speeds
     /// there is nothing to hold it against.
     pub(crate) fn balance(&self) -> EnergyBalance {
         let end = loading_end(self.curve);

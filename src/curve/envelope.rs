@@ -130,7 +130,7 @@ impl Envelope {
         self.work_j[self.work_j.len() - 1]
     }
 
-    /// The deflection at which the envelope has taken up `energy_j`; beyond its end the
+    /// The deflection at which the envelope has absorbed `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
     pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;

@@ -16,13 +16,13 @@ pub struct ForceCurve {
     pub beyond: Option<Envelope>,
     /// From the end of the loading branch.
     pub unloading: CurveUnloading,
-    /// Which force it is; `None` if its source does not say.
+    /// Which force it is; `None` if its source does not state it.
     pub kind: Option<ForceKind>,
     /// What its speed is measured against; `None` for a curve without a speed.
     pub speed_kind: Option<SpeedKind>,
     /// Speed that it belongs to.
     pub speed_m_per_s: Option<f64>,
-    /// Deflection up to which its source has data, in m, where the loading branch goes on behind it.
+    /// Deflection up to which its source has data, in m, where the loading branch continues after it.
     pub data_end_m: Option<f64>,
 }
 
@@ -35,7 +35,7 @@ pub enum CurveUnloading {
     Stiffness(f64),
     /// The recorded branch, from the maximum deflection to where the force is first zero.
     Recorded {
-        /// Of the straight line that gives back the same energy, in N/m.
+        /// Of the straight line that returns the same energy, in N/m.
         stiffness_n_per_m: f64,
         /// Falling.
         deflection_m: Vec<f64>,
@@ -44,13 +44,13 @@ pub enum CurveUnloading {
     },
 }
 
-/// Why a case has no curve of the force that was asked for.
+/// Why a case has no curve of the force that was requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum ForceCurveError {
     /// Its loading branch is not an envelope.
     #[error("{0}")]
     Envelope(#[from] Error),
-    /// Its body force cannot be told from its speeds.
+    /// Its body force cannot be computed from its speeds.
     #[error("its samples contain no loading branch")]
     NoMotion,
 }
@@ -178,7 +178,7 @@ impl CurveUnloading {
         stiffness_n_per_m.map_or(Self::Unknown, Self::Stiffness)
     }
 
-    /// Stiffness in N/m of the line that gives back the same energy, if it is known.
+    /// Stiffness in N/m of the line that returns the same energy, if it is known.
     pub fn stiffness_n_per_m(&self) -> Option<f64> {
         match self {
             Self::Unknown => None,

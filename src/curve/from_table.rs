@@ -1,9 +1,9 @@
 //! From a table of force over deflection to the curve of a case: with times as of an FE record,
-//! without them by the motion that the table itself asks for.
+//! without them by the motion that the table itself implies.
 //!
 //! **Without times** the maximum deflection of the table is taken as the maximum crush. A body
 //! that starts at the impact speed `v0` and is stopped there by the table's own force has
-//! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. Behind it the table's own
+//! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. After it the table's own
 //! unloading branch, or a line of the unloading stiffness, drives the body back; then both part.
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
@@ -81,7 +81,7 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
 /// Most states at the common interval: 15 s of 0.75 ms.
 const MOST_STATES: usize = 20_000;
 
-/// The motion that the table asks for.
+/// The motion that the table implies.
 fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     let interval_s = Sampling::default().interval_s;
     let motion = retrace(table, impact, interval_s)?;
@@ -180,7 +180,7 @@ fn recorded(
     Ok((curves, Quality { audit: quality.audit, notes, warnings }))
 }
 
-/// What is said of a record under an impact: notes and warnings.
+/// Notes and warnings on a record under an impact.
 fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
     if let Some(found) = other_speed(&curves.closing_speed_m_per_s, impact.speed.m_per_s) {
@@ -214,8 +214,8 @@ fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
 /// States in which the speed of a record's beginning is looked for.
 const FIRST_STATES: usize = 4;
 
-/// What is said of a stated stiffness, in N/m, beside the one that the record holds: a note, or a warning
-/// if it holds none.
+/// Note on a stated stiffness, in N/m, other than that of the record; a warning
+/// if the record has none.
 fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String> {
     match found {
         Some(found) => Ok(format!(

@@ -183,9 +183,9 @@ pub struct SourceFile {
     pub blake3: String,
     /// Name of the file's format, such as `nodout`.
     pub format: String,
-    /// Solver that wrote it, if the file tells.
+    /// Solver that wrote it, if the file states it.
     pub solver: Option<String>,
-    /// Version of that solver, if the file tells.
+    /// Version of that solver, if the file states it.
     pub version: Option<String>,
     /// Title of the run, if the file has one.
     pub title: Option<String>,
@@ -280,7 +280,7 @@ pub struct RecordedCurves {
 pub struct Quality {
     /// Work of the force against the kinetic energy.
     pub audit: EnergyAudit,
-    /// What the extraction did that the manifest does not say.
+    /// What the extraction did beyond the manifest.
     pub notes: Vec<String>,
     /// What the user should look at before trusting the case.
     pub warnings: Vec<String>,
@@ -295,9 +295,9 @@ pub struct Provenance {
     pub fingerprint: String,
     /// Files that it was made from.
     pub sources: Vec<SourceFile>,
-    /// Time by the clock that the solver took for the run, in s, if the run's folder has it.
+    /// Wall-clock time of the solver for the run, in s, if the run's folder has it.
     pub solver_wall_time_s: Option<f64>,
-    /// When it was built, in UTC as ISO 8601 has it (`2026-05-04T13:37:00Z`); `None` in databases
+    /// When it was built, in UTC (ISO 8601) (`2026-05-04T13:37:00Z`); `None` in databases
     /// before version 3.
     pub built_utc: Option<String>,
     /// What it was built from; `None` if from a file, and in databases before version 3.
@@ -334,7 +334,7 @@ impl Case {
         loading::loading_end(&self.curves.original)
     }
 
-    /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
+    /// Units of the solver files, as the recipe has them; `None` in databases of earlier
     /// versions.
     pub(crate) fn units(&self) -> Option<UnitSystem> {
         let recipe: serde_json::Value = serde_json::from_str(&self.provenance.recipe).ok()?;
@@ -353,7 +353,7 @@ impl Case {
         self.curves.original.deflection_m[self.loading_end()]
     }
 
-    /// Largest force of the original states, in N: contact or body force, as the recipe has it.
+    /// Largest force of the original states, in N: contact or body force, as in the recipe.
     pub fn peak_force_n(&self) -> f64 {
         self.curves.original.force_n.iter().copied().fold(0.0, f64::max)
     }
@@ -386,7 +386,7 @@ pub(crate) fn source_hash<'a>(
     run.remove("deck");
     let recipe = recipe.as_object_mut()?;
     recipe.remove("study");
-    // Found in the deck where the manifest has none; the files say the same.
+    // Found in the deck where the manifest has none; the files agree.
     recipe.remove("units");
     let mut hash = blake3::Hasher::new();
     hash.update(serde_json::to_string(recipe).ok()?.as_bytes());

@@ -13,7 +13,7 @@ pub struct Recipe {
     pub(crate) deflection: DeflectionSource,
     /// Where the force comes from.
     pub force: ForceSource,
-    /// Contact force that tells when contact begins, where the force is a body force: a body
+    /// Contact force that marks the start of contact, if the force is a body force: a body
     /// slows down some milliseconds after the first touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ForceSource>,

@@ -34,7 +34,7 @@ pub struct Impact {
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// The same of the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
-    /// Units that the table's values were read in, to tell what was mistaken.
+    /// Units in which the table's values were read, to find the cause of errors.
     pub units: UnitSystem,
     /// Take the table whatever its energy says.
     pub accept_energy: bool,
@@ -60,14 +60,14 @@ pub(super) struct Motion {
     pub warnings: Vec<String>,
 }
 
-/// Free motion behind the unloading, in s: the speed of the separation is a mean over 20 ms, and
-/// filters need some time behind it.
+/// Free motion after the unloading, in s: the speed of the separation is a mean over 20 ms, and
+/// filters need some time after it.
 const FREE_S: f64 = 0.040;
 /// States between two samples at the common interval.
 const FINER: f64 = 8.0;
 /// The longest of a slow motion's steps is this share of its time.
 const STEPS: f64 = 20_000.0;
-/// Most states beside the points of the table.
+/// Maximum number of states besides the points of the table.
 const MAX_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
@@ -166,7 +166,7 @@ impl MotionBuilder {
         self.motion.closing_m_per_s.push(v);
     }
 
-    /// Adds a state behind the last; an error if the body does not get there.
+    /// Adds a state after the last; an error if the body does not get there.
     fn push(&mut self, d: f64, f: f64, v: f64) -> Result<(), Error> {
         let last = self.motion.time_s.len() - 1;
         let way = (d - self.motion.deflection_m[last]).abs();
@@ -275,7 +275,7 @@ impl MotionBuilder {
             way.iter().map(|x| (top * (1.0 - x / end)).max(0.0)).collect::<Vec<f64>>()
         };
         let (mut force, mut moving) = (falls(f, ends), falls(moving, moving_ends));
-        // Behind both ends there is no force, whatever rounding leaves of it.
+        // After both ends there is no force, whatever rounding leaves of it.
         for values in [&mut force, &mut moving] {
             values.pop();
             values.push(0.0);

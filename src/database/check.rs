@@ -1,5 +1,5 @@
 //! Checking a database file: every dataset is read, and what is stored twice or follows from
-//! the curves is held against each other.
+//! the curves is compared with each other.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -62,7 +62,7 @@ pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
                     findings.body_force(&decoded, case, &found.case);
                     readable.push(found.case);
                 }
-                // Its datasets have said so already, with their indices.
+                // Already reported for its datasets, with their indices.
                 Err(_) if findings.has_damage() => {}
                 Err(error) => {
                     let own = format!("{}: {}/{name}", path.display(), group.name);
@@ -406,7 +406,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     }
 }
 
-/// What cases show beside the others of their group.
+/// What is unusual in cases compared with their group.
 fn beside_each_other(group: &str, cases: &[Case], list: &mut Vec<Finding>) {
     for (case, code, message) in siblings::remarks(cases) {
         Findings { group, case: &case, list }.add(code, None, None, message);

@@ -177,7 +177,7 @@ impl<'a> Content<'a> {
     }
 }
 
-/// Attributes that say what the curves of a case are of.
+/// Attributes that identify what the curves of a case describe.
 const RECORD_ATTRIBUTES: [&str; 6] =
     ["speed_m_per_s", "speed_kind", "mass_kg", "other_mass_kg", "parameters", "force_kind"];
 
@@ -343,7 +343,7 @@ impl<'a> Opened<'a> {
         result.map_err(|e| self.damaged(place, e))
     }
 
-    /// Groups that hold cases, with these. What other programs put beside them is not a group of ours.
+    /// Groups that hold cases, with these. What other programs put next to them is not a group of ours.
     pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, Error> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
@@ -395,7 +395,7 @@ impl<'a> Opened<'a> {
         let root = self.file.root();
         let name = match group {
             Some(name) => name.to_string(),
-            // The only group there is, if others have put none beside it.
+            // The only group there is, if others have put none next to it.
             None => <[String; 1]>::try_from(root.groups().ok()?).ok()?.into_iter().next()?,
         };
         // A name is not a path.
@@ -634,7 +634,7 @@ fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, 
         ));
     };
     left.set(rest);
-    // A reader that finds no memory ends the process; here it is only asked for.
+    // A reader without memory ends the process; here it is only reserved.
     let mut memory: Vec<u8> = Vec::new();
     if memory.try_reserve_exact(bytes.saturating_mul(2) as usize).is_err() {
         return Err(format!("{name}: {}", file::out_of_memory(bytes)));

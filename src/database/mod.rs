@@ -47,7 +47,7 @@ pub struct Database {
     groups: BTreeMap<String, Vec<Case>>,
     /// Cases whose content is not what their hashes are of, with these.
     altered: BTreeMap<CasePath, BTreeMap<String, String>>,
-    /// Where cases are that the file has elsewhere: what others put beside them goes along.
+    /// Where cases are that the file has elsewhere: what others put next to them goes along.
     moved: BTreeMap<CasePath, CasePath>,
 }
 
@@ -135,7 +135,7 @@ impl Database {
         self.altered.contains_key(&CasePath { group: group.into(), name: case.into() })
     }
 
-    /// The group that was asked for, or the only one there is, with its cases in order of speed.
+    /// The group that was requested, or the only one there is, with its cases in order of speed.
     ///
     /// # Errors
     /// It lists the groups there are;
@@ -193,7 +193,7 @@ impl Database {
     /// One case by group and name.
     ///
     /// # Errors
-    /// If one of them is not there, with the names there are.
+    /// If one of them is missing, with the names there are.
     pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, Error> {
         let cases = self.group(path, group)?;
         cases.iter().find(|c| c.id.name == name).ok_or_else(|| {
@@ -337,7 +337,7 @@ impl Database {
     }
 }
 
-/// Lets a case of an earlier version, which does not say what it was built from, remember its names
+/// Lets a case of an earlier version, which does not record what it was built from, keep its names
 /// before it gets others: a build of its study knows it by them.
 pub(crate) fn remember_origin(case: &mut Case) {
     if case.provenance.origin.is_none() && case.id.study != IMPORTED {

@@ -74,7 +74,7 @@ pub struct TrainingSet {
     pub force_kind: ForceKind,
     /// Masses of the first case.
     pub masses: Masses,
-    /// Units of the solver's files, if all cases come from one system.
+    /// Units of the solver files, if all cases come from one system.
     pub units: Option<UnitSystem>,
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
@@ -152,7 +152,7 @@ fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
     parameters
 }
 
-/// The columns that tell the cases apart: parameters that all share are left out.
+/// The columns that distinguish the cases: parameters that all share are left out.
 fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
     let of: Vec<(&str, BTreeMap<String, Parameter>)> =
         cases.iter().map(|c| (c.id.name.as_str(), parameters(c))).collect();
@@ -409,7 +409,7 @@ impl TrainingCase {
         })
     }
 
-    /// Time by the clock that the solver took for all of its runs, in s.
+    /// Wall-clock time of the solver for all of its runs, in s.
     pub(crate) fn solver_time_s(&self) -> Option<f64> {
         Some(self.case.provenance.solver_wall_time_s? * self.runs.len() as f64)
     }

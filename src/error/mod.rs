@@ -165,7 +165,7 @@ impl Error {
         self
     }
 
-    /// Shows a line of a file beside a text that says by itself what it is about.
+    /// Shows a line of a file with a self-contained text.
     pub(crate) fn showing(mut self, place: Option<Place>) -> Self {
         self.0.place = place;
         self.0.names_place = true;
@@ -231,7 +231,7 @@ impl StdError for Error {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorCode {
-    /// The arguments make no sense, or do not fit together or with the file.
+    /// The arguments are invalid, or fit neither together nor the file.
     Usage,
     /// A file cannot be opened, read or written.
     Io,
@@ -249,7 +249,7 @@ pub enum ErrorCode {
     Sweep,
     /// A file is not a curve database, is damaged, or has no such group or case.
     Database,
-    /// A solver's file cannot be read, or lacks what is asked of it.
+    /// A solver file cannot be read, or lacks what was selected.
     SolverFile,
     /// A curve's file cannot be read.
     CurveFile,

@@ -17,7 +17,7 @@ pub use write::write_at;
 pub(crate) use write::write_by_path;
 pub(crate) use write::write_whole;
 
-/// Whether content is read that is not what was written, by the fingerprint beside it. The command line
+/// Whether content is read that is not what was written, by the fingerprint next to it. The command line
 /// sets it once, as it would a level of logging; a library's caller is refused such content.
 static ACCEPTS_CHANGED: AtomicBool = AtomicBool::new(false);
 
@@ -114,7 +114,7 @@ pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
     io::Error::new(io::ErrorKind::OutOfMemory, message)
 }
 
-/// What was asked of a path, or `None` if nothing is there, or not what was asked for. A fault stays an error:
+/// The requested fact about a path, or `None` if nothing is there, or something else. A fault stays an error:
 /// who takes it for an absence starts a database anew, or reads half of a run.
 pub(crate) fn if_there<T>(asked: io::Result<T>) -> io::Result<Option<T>> {
     use io::ErrorKind::{InvalidFilename, NotADirectory, NotFound, PermissionDenied};

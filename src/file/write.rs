@@ -1,4 +1,4 @@
-//! Atomic writing: to a draft beside the target, which is then renamed over it.
+//! Atomic writing: to a draft next to the target, which is then renamed over it.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -16,7 +16,7 @@ pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
     error!(Io, "cannot write {}: {source}{unchanged}", path.display()).caused_by(source)
 }
 
-/// Writes `bytes` to `path` as a whole: to a temporary file beside it, then by renaming.
+/// Writes `bytes` to `path` as a whole: to a temporary file next to it, then by renaming.
 ///
 /// A device or a pipe cannot be renamed over and is written directly.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -81,7 +81,7 @@ pub(crate) fn write_by_path<E: From<Error>>(
     Ok(())
 }
 
-/// Writes the bytes to a draft beside their target; to a device at once.
+/// Writes the bytes to a draft next to their target; to a device at once.
 fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
     if fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let mut device = OpenOptions::new().write(true).open(path)?;
@@ -98,7 +98,7 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
 /// Longer names of targets are shortened to their hash: names of files have up to 255 bytes.
 const MAX_NAME_BYTES: usize = 200;
 
-/// A file under work beside its target. Its name is made of the target's, so that what a killed
+/// A file under work next to its target. Its name is made of the target's, so that what a killed
 /// process left is taken up and emptied by the next; it is locked, so that of two processes that
 /// write one target the second gets an error.
 struct Draft {

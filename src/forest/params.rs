@@ -72,7 +72,7 @@ pub enum ForestError {
         /// The threshold.
         threshold: f64,
     },
-    /// An out-of-bag error is asked for, but every tree sees all samples.
+    /// An out-of-bag error is requested, but every tree sees all samples.
     #[error("out-of-bag error needs bootstrap samples: set bootstrap(true)")]
     OutOfBagWithoutBootstrap,
     /// More features are to be tried at a split than there are.
@@ -121,7 +121,7 @@ pub enum ForestError {
         /// The value.
         value: f64,
     },
-    /// Quantiles are asked of a forest that has not kept the members of its leaves.
+    /// Quantiles are requested from a forest that has not kept the members of its leaves.
     #[error("the forest has not kept the samples of its leaves: fit it with quantiles(true)")]
     NoMembers,
     /// The level of the quantiles is not between 0 and 1.

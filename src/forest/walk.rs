@@ -44,7 +44,7 @@ impl<'a, F: Float> Rows<'a, F> {
     }
 }
 
-/// A node in as few bytes as a walk needs. The right child stands behind the left, and a leaf
+/// A node in as few bytes as a walk needs. The right child stands after the left, and a leaf
 /// is its own right child: nothing is below NaN, so a walk that arrives stays, without a branch.
 #[derive(Clone, Copy)]
 struct Node<F> {
@@ -241,7 +241,7 @@ impl<F: Float> Tree<F> {
         self.value.len() - 1
     }
 
-    /// Splits a leaf; its children are `left` and the node behind it.
+    /// Splits a leaf; its children are `left` and the node after it.
     pub(super) fn split(&mut self, node: usize, feature: usize, threshold: F, left: usize) {
         self.feature[node] = feature as i32;
         self.threshold[node] = threshold;

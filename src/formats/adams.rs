@@ -77,7 +77,7 @@ impl<'a> Spline<'a> {
         [('x', x), ('y', y)]
     }
 
-    /// `data_element create spline`: a line ends in `&` where the command goes on.
+    /// `data_element create spline`: a line ends in `&` where the command continues.
     fn view_command(&self, lines: &mut Lines) {
         self.comments(lines, "!");
         lines.add(format_args!(
@@ -96,7 +96,7 @@ impl<'a> Spline<'a> {
         lines.add(format_args!("  linear_extrapolate=yes"));
     }
 
-    /// `SPLINE/id`: a line begins with a comma where the statement goes on.
+    /// `SPLINE/id`: a line begins with a comma where the statement continues.
     fn solver_statement(&self, lines: &mut Lines) {
         self.comments(lines, "!");
         lines.add(format_args!("SPLINE/{}, LINEAR_EXTRAPOLATE", self.id));

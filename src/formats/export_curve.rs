@@ -1,4 +1,4 @@
-//! A curve made ready for another tool's file: one force, its unloading, its tail, what must be said of it.
+//! A curve prepared for another tool's file: one force, its unloading, its tail, its notes.
 
 use super::Options;
 use super::tail::{Tail, with_tail};
@@ -11,12 +11,12 @@ use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::Beyond;
 use crate::unit::{Shown, km_per_h};
 
-/// What an export is made of: a predicted curve or a recorded one, and where faster runs go on.
+/// What an export is made of: a predicted curve or a recorded one, and where faster runs continue.
 #[derive(Clone, Debug)]
 pub struct ExportInput {
     /// With both forces, where it has both.
     pub curve: PredictedCurve,
-    /// The forces beyond the maximum crush, where a model tells them.
+    /// The forces beyond the maximum crush, if the model knows them.
     pub beyond: Option<Beyond>,
 }
 
@@ -33,7 +33,7 @@ pub struct ExportCurve {
     pub band: Option<(Vec<f64>, Vec<f64>)>,
     /// Why a predicted curve has none.
     pub no_band: Option<&'static str>,
-    /// How the target goes on beyond the maximum crush.
+    /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
     /// Largest force before and after, in N, where a steep flank was made less steep.
@@ -211,7 +211,7 @@ impl ExportCurve {
     }
 
     /// The law of crumple's own runs: it unloads with its stiffness. Beyond the last point the force
-    /// goes on rising if it bottoms, else it is held.
+    /// continues rising if it bottoms, else it is held.
     pub fn law(&self) -> ForceLaw {
         let end = match self.tail {
             Tail::Bottom => EnvelopeEnd::Slope,
@@ -232,7 +232,7 @@ impl ExportCurve {
         (2.0 * stored_j / self.effective_mass_kg()).sqrt() / self.predicted.speed_m_per_s
     }
 
-    /// What the target's unloading gives beside ours, in one line.
+    /// The target's restitution compared with ours, in one line.
     pub(crate) fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
         let ours = self.own_restitution();
         let theirs = self.restitution(unloading);
@@ -246,7 +246,7 @@ impl ExportCurve {
         )
     }
 
-    /// What to say of a target that unloads with the steepest rise where that is more than the
+    /// Notes for a target that unloads with the steepest rise if that is more than the
     /// curve's own stiffness.
     pub fn steepest_notes(&self, target: &str, other: &str) -> Vec<String> {
         let (own, steepest) = (self.stiffness_n_per_m(), self.loading.max_slope());
@@ -391,7 +391,7 @@ pub(super) fn identifier(name: &str) -> String {
     if text.starts_with(|c: char| c.is_ascii_alphabetic()) { text } else { format!("curve_{text}") }
 }
 
-/// A name that is told apart from earlier ones of the same kind.
+/// A name that is distinguished from earlier ones of the same kind.
 fn numbered(name: String, ordinal: usize) -> String {
     if ordinal > 1 { format!("{name}-{ordinal}") } else { name }
 }

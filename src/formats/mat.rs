@@ -21,7 +21,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         // The first curve has the plain names, which the others number.
         let named = |name: &str| if k == 0 { name.into() } else { format!("{name}_{}", k + 1) };
         let reach = curve.loading.end_m();
-        // A guard point: tools that extrapolate go on without force before the contact.
+        // A guard point: tools that extrapolate continue without force before the contact.
         let guarded = |force_n: &[f64]| -> Vec<(f64, f64)> {
             let points = curve.deflection_m().iter().copied().zip(force_n.iter().copied());
             std::iter::once((-0.01 * reach, 0.0)).chain(points).collect()

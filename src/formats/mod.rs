@@ -47,8 +47,8 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// One line for `export --list`.
     pub description: &'static str,
-    /// What its curves do beyond the maximum crush if nothing else is asked for; `Tail::None` of
-    /// files whose curves cannot go on.
+    /// What its curves do beyond the maximum crush if nothing else is requested; `Tail::None` of
+    /// files whose curves cannot continue.
     pub tail: Tail,
     /// Whether it can be a complete input of one mass on the spring (`--deck`).
     pub deck: bool,
@@ -56,9 +56,9 @@ pub struct Format {
     pub materials: bool,
     /// Whether curves have numbers in it (`--curve-id`).
     pub ids: bool,
-    /// Whether a band stands beside its curves.
+    /// Whether it holds a band with its curves.
     pub band: bool,
-    /// Whether it holds a model at several speeds, so that it takes what is asked of a model.
+    /// Whether it holds a model at several speeds, so that it accepts the options of a model.
     pub(crate) over_speeds: bool,
     writer: Writer,
 }
@@ -254,7 +254,7 @@ pub struct Exported {
 }
 
 impl Exported {
-    /// One file and nothing to say.
+    /// One file without notes.
     pub(crate) fn file(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { files: vec![(name.into(), bytes)], ..Self::default() }
     }
@@ -304,7 +304,7 @@ impl Format {
         matches!(self.writer, Writer::Whole(_))
     }
 
-    /// Whether its curves can go on beyond the maximum crush.
+    /// Whether its curves can continue beyond the maximum crush.
     pub(crate) fn takes_tail(&self) -> bool {
         self.tail != Tail::None
     }
@@ -382,7 +382,7 @@ impl Format {
         Ok(exported)
     }
 
-    /// What has been done to the curves, and what is not written, behind the target's own notes.
+    /// What has been done to the curves, and what is not written, after the target's own notes.
     fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
         exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
         if self.band {

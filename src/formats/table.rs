@@ -1,6 +1,6 @@
 //! Table of a model: force over speed and deflection, for tools that interpolate in both; SI.
 //!
-//! Each speed's curve goes on beyond its maximum crush as a tail that is held, so that the table is a full rectangle.
+//! Each speed's curve continues beyond its maximum crush as a tail that is held, so that the table is a full rectangle.
 
 use super::export_curve::in_lines;
 use super::tail::Tail;
@@ -17,7 +17,7 @@ use crate::unit::km_per_h;
 const EDGES: [&str; 2] = ["force_low_N", "force_high_N"];
 /// Value of the HDF5 root's `format`.
 const FORMAT: &str = "crumple force table";
-/// Speeds of a table if none are asked for.
+/// Speeds of a table if none are requested.
 const SPEEDS: usize = 25;
 /// Intervals of the deflection. They grow with its square root: a crush of 10 mm at a low speed has as
 /// sharp a spike as one of 2 m, in the same row of columns.

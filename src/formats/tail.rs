@@ -3,7 +3,7 @@
 //! A train crushes an end further than the same vehicle alone does, and most tools end a table with an error, with a held
 //! force or with the last slope. The rule, in three steps:
 //!
-//! 1. Where faster runs tell how the force goes on (the curve comes from a model), it follows them, at the level with
+//! 1. If faster runs show how the force continues (the curve comes from a model), it follows them, at the level with
 //!    which the curve ends. Else the force goes within 5 % of the maximum crush to the mean over the curve's last tenth, if
 //!    that is more than its last force, and stays there.
 //! 2. At 1.5 times the maximum crush, or where the faster runs end, the structure is taken as fully crushed.
@@ -13,7 +13,7 @@
 use crate::curve::Envelope;
 use crate::error::Error;
 
-/// How a curve goes on beyond its maximum crush.
+/// How a curve continues beyond its maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tail {
     /// Not at all: the last point is the maximum crush.

@@ -242,7 +242,7 @@ const RAMP: f64 = 1e-3;
 mod tests {
     use super::*;
 
-    /// A sharp peak at 10 mm and folds behind it.
+    /// A sharp peak at 10 mm and folds after it.
     fn curve() -> Envelope {
         let d: Vec<f64> = (0..=400).map(|i| f64::from(i) * 2.5e-3).collect();
         let f = d

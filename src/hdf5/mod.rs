@@ -40,7 +40,7 @@ pub(crate) enum OpenError {
 }
 
 /// The first read of an open file that the operating system failed. The library leaves out the attributes that
-/// it cannot read, without a word: who has asked for some asks here whether they are all.
+/// it cannot read, silently: callers check here that they got all.
 #[derive(Clone, Default)]
 pub(crate) struct Fault(Arc<OnceLock<String>>);
 

@@ -1,4 +1,4 @@
-//! What is said beside a file and what the file says, put together.
+//! Metadata given by the user combined with those of the file.
 
 use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
@@ -16,8 +16,8 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// What is stated wins, and a warning says where the file differs. `group`: a case that is
-    /// there, whose kind of speed holds where nothing else says it.
+    /// Given values take precedence, and a warning says where the file differs. `group`: a case that is
+    /// there, whose kind of speed is the default.
     pub(super) fn of(
         item: &Item,
         settings: &Settings,
@@ -140,7 +140,7 @@ impl StatedAndFound<'_> {
         Ok(Masses { body_kg, other_kg })
     }
 
-    /// Says where the stated unloading stiffness is not the file's; which is used is decided elsewhere.
+    /// Reports a stated unloading stiffness that differs from the file's; the choice is made elsewhere.
     fn unloading(&mut self) -> Result<(), Error> {
         let stated = self.settings.unloading_stiffness_n_per_m;
         let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));

@@ -1,5 +1,5 @@
 //! The recipe that most runs agree on: kind, direction, force and nodes; runs that need another
-//! one are told apart, never merged.
+//! one are distinguished, never merged.
 
 use std::collections::BTreeMap;
 
@@ -77,7 +77,7 @@ type Key = (bool, &'static str, Option<(&'static str, i64)>);
 struct RunView<'a> {
     survey: &'a Survey,
     best: Option<Explanation>,
-    /// Whether it has a say: the record holds the crash up to its end, or no run's does.
+    /// Whether it counts: the record covers the crash up to its end, or no run's does.
     counts: bool,
 }
 
@@ -122,7 +122,7 @@ impl Agreed {
         Some(agreed)
     }
 
-    /// Chooses a node for each body, and tells the runs that do not have it.
+    /// Chooses a node for each body, and names the runs that do not have it.
     fn choose_nodes(
         &mut self,
         views: &[RunView<'_>],
@@ -328,7 +328,7 @@ fn judged<'a>(
         .collect()
 }
 
-/// What all runs say of a node.
+/// The verdicts of all runs on a node.
 struct NodeTally<'a> {
     node: &'a NodeCandidate,
     /// In which it can stand for the body.

@@ -175,7 +175,7 @@ fn force(measured: &Measured<'_>, given: &UserHints) -> Proposed<ForceSource> {
 }
 
 /// The filter, and for each run a state that has to be cut for it: a solver's last state often
-/// comes right behind the one before.
+/// comes right after the one before.
 fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
     let runs = measured.runs;
     let none = vec![None; runs.len()];
@@ -289,7 +289,7 @@ pub(super) fn entries_of_left_out(proposal: &mut Proposal, seen: Seen<'_>) {
     }
 }
 
-/// Masses of a pair whose velocities say that they differ by more are not one.
+/// Masses of a pair that differ by more, according to their velocities, are not equal.
 const UNEQUAL: f64 = 0.1;
 
 /// The runs by speed, then by name.
@@ -368,7 +368,7 @@ fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &UserHints) -> Propose
     Proposed::found(run.speed_m_per_s, evidence)
 }
 
-/// Whether the folders' names say twice the recorded speeds, of all runs whose name says one.
+/// Whether the folders' names state twice the recorded speeds, for all runs whose name contains one.
 fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
     let said: Vec<bool> = measured
         .runs
@@ -380,7 +380,7 @@ fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
     is_single && !said.is_empty() && said.into_iter().all(|is_twice| is_twice)
 }
 
-/// What a folder's name and the run's own deck say of its speed, where they say something else.
+/// Speeds in a folder's name and the run's own deck that contradict the record.
 fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
     let Recorded { run: of, record } = run.recorded;
     let first = record.closing(run.state.0);
@@ -467,7 +467,7 @@ fn masses(
     }
 }
 
-/// Where nothing weighs the bodies, what the velocities say of the other ones: nothing, if they are
+/// If nothing determines the masses, what the velocities show of the other body: nothing, if they are
 /// as heavy as the first ones.
 fn by_ratio(
     bodies: &[Proposed<f64>],

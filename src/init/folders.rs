@@ -113,7 +113,7 @@ impl Folders {
     }
 }
 
-/// The folder beside a missing one whose name is most like its name.
+/// The folder next to a missing one whose name is most like its name.
 fn is_there_instead(missing: &Path) -> Option<PathBuf> {
     let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
     let entries = parent.unwrap_or(Path::new(".")).read_dir().ok()?;
@@ -148,7 +148,7 @@ fn clean(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
 }
 
-/// Names of the runs: that of the folder, with as many of the folders above as tell them apart.
+/// Names of the runs: that of the folder, with as many of the folders above as distinguish them.
 pub(super) fn names(runs: &[PathBuf]) -> Vec<String> {
     let parts: Vec<Vec<String>> = runs
         .iter()
@@ -232,7 +232,7 @@ pub(crate) enum Reason {
     Empty,
     #[error("it holds no solver files")]
     NoSolverFiles,
-    /// A solver's file has another name than the solver gave it.
+    /// A solver file has another name than the solver gave it.
     #[error(
         "it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly"
     )]

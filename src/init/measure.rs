@@ -1,4 +1,4 @@
-//! What the chosen histories of a run say in SI: speed, crush, times, masses.
+//! Results of the chosen histories of a run in SI: speed, crush, times, masses.
 
 use super::UserHints;
 use super::agree::Agreed;
@@ -111,7 +111,7 @@ const SAME_MASS: f64 = 0.03;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct MassEstimates {
     pub by_momentum: Option<f64>,
-    /// Whether that was taken behind the contact.
+    /// Whether that was taken after the contact.
     pub in_free_flight: bool,
     pub by_energy: Option<f64>,
 }
@@ -203,7 +203,7 @@ fn rounded(kg: f64) -> f64 {
     format!("{kg:.3e}").parse().unwrap_or(kg)
 }
 
-/// A mass as a study has it.
+/// A mass as in a study.
 pub(super) fn text(kg: f64) -> String {
     if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
 }
@@ -247,7 +247,7 @@ pub(super) struct Times {
 const JITTER: f64 = 0.5;
 
 /// The usual interval of rising times: the mean of those near the median, since solvers write the
-/// first cycle behind each multiple. 0 for fewer than two times.
+/// first cycle after each multiple. 0 for fewer than two times.
 pub(super) fn interval(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -309,7 +309,7 @@ fn most(runs: &[Times]) -> usize {
 }
 
 /// The shortest decimal that is off by less than half an interval at the end of the record:
-/// solvers write the first cycle behind each multiple.
+/// solvers write the first cycle after each multiple.
 fn rounded_interval(interval_s: f64, longest_s: f64) -> f64 {
     let ms = interval_s * 1e3;
     let states = longest_s / interval_s;

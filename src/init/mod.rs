@@ -31,7 +31,7 @@ pub(crate) use proposal::{Proposed, ProposedRun};
 pub use propose::{Request, propose};
 pub(crate) use scenario::{ScenarioProposal, propose_scenario};
 
-/// Refuses a file that is there already.
+/// Refuses a file that exists already.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
@@ -49,7 +49,7 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
 /// What the caller already knows: it stands above what is found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserHints {
-    /// Units of the solver's files.
+    /// Units of the solver files.
     pub units: Option<UnitSystem>,
     /// Kind of impact.
     pub(crate) kind: Option<StudyKind>,

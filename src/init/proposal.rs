@@ -15,7 +15,7 @@ use crate::unit::UnitSystem;
 pub struct Proposal {
     /// Group of the curve database, and name of the study.
     pub(crate) group: Proposed<String>,
-    /// Units of the solver's files.
+    /// Units of the solver files.
     pub(crate) units: Proposed<UnitSystem>,
     /// Kind of impact.
     pub(crate) kind: Proposed<StudyKind>,
@@ -60,7 +60,7 @@ pub(crate) struct ProposedRun {
     /// Mass of the other body in kg, where it is another.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) other_mass_kg: Option<Proposed<f64>>,
-    /// Solver's time behind which the record is not used, in s.
+    /// Solver's time after which the record is not used, in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) truncate_s: Option<Proposed<f64>>,
     /// Maximum crush in m, if the units are known: doubled for half a model.

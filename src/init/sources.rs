@@ -262,7 +262,7 @@ pub(super) fn velocity(
     (time.len() > 1).then(|| derivative(&time, &picked(&displacement.values, states)))
 }
 
-/// Impulse of a force at other times, held before its first and behind its last.
+/// Impulse of a force at other times, held before its first and after its last.
 ///
 /// `None` if the force holds a value that is not a number, or has fewer than two states.
 pub(super) fn impulse(force: &History, times: &[f64]) -> Option<Vec<f64>> {

@@ -49,7 +49,7 @@ pub(super) struct Body {
     /// In the file's units, with its sign.
     pub first_velocity: f64,
     pub nodes: Vec<NodeCandidate>,
-    /// Change of its smoothest node's velocity over time: how the body moves where no force tells
+    /// Change of its smoothest node's velocity over time: how the body moves if no force shows
     /// which node stands for it.
     pub change: Vec<f64>,
 }
@@ -133,7 +133,7 @@ fn few_states(source: &Source, states: usize) -> Reason {
     Reason::FewStates { file: source.shown(), states, damage }
 }
 
-/// Damage behind a sentence.
+/// Damage after a sentence.
 pub(super) fn bracketed(damage: Option<&str>) -> String {
     damage.map_or(String::new(), |damage| format!(" ({damage})"))
 }

@@ -1,6 +1,6 @@
 //! The unit system of a run: what its deck states, or the one in which its impact is possible.
 //!
-//! Momentum and energy balance in every consistent system, so only magnitudes tell: an impact
+//! Momentum and energy balance in every consistent system, so only magnitudes help: an impact
 //! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
@@ -51,7 +51,7 @@ impl Range {
 }
 
 impl Magnitudes {
-    /// The quantities in SI, each with its range and how it is said.
+    /// The quantities in SI, each with its range and its text.
     fn in_si(&self, units: &UnitSystem) -> Vec<(f64, &'static Range, String)> {
         let speed = self.speed * units.speed();
         let crush = self.crush * units.length_m;
@@ -85,7 +85,7 @@ impl Magnitudes {
     }
 }
 
-/// The units of all runs, as far as they can be told.
+/// The units of all runs, as far as they can be determined.
 ///
 /// `stated`: what a deck says, with its place.
 pub(super) fn choose(

@@ -103,7 +103,7 @@ impl Proposal {
         }
     }
 
-    /// What holds for all runs is said once, above them.
+    /// What applies to all runs is stated once, above them.
     fn shared(&self, text: &mut Text) -> Vec<String> {
         let first = self.runs.first();
         let masses = first.map(|run| ("mass", run.mass_kg.to_string()));

@@ -96,7 +96,7 @@ fn refuse_rates(chain: &Chain) -> Result<(), Error> {
     ))
 }
 
-/// Of a step that was asked for and is too long. Nobody has asked for the default one.
+/// For a requested step that is too long; the default step is not reported.
 fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<String> {
     let RunSettings { step_s: asked_s, method, .. } = *settings;
     let (shortest_s, k) = chain.shortest_time_s();

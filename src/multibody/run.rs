@@ -1,4 +1,4 @@
-//! What a run is asked for and what it gives: method, times, histories, warnings, errors.
+//! Settings and results of a run: method, times, histories, warnings, errors.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

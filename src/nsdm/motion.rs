@@ -112,7 +112,7 @@ impl Table {
         Self(segments)
     }
 
-    /// Value at `u ≥ 0`. Neighbouring calls ask for neighbouring values, so the search goes on
+    /// Value at `u ≥ 0`. Neighbouring calls ask for neighbouring values, so the search continues
     /// from the segment of the last one.
     #[inline(always)]
     fn at(&self, u: f64, segment: &mut usize) -> f64 {
@@ -199,7 +199,7 @@ impl Laws {
     }
 }
 
-/// Segments of the last values asked for.
+/// Segments of the last values looked up.
 #[derive(Clone, Copy, Default, PartialEq)]
 struct Segments {
     spring: usize,

@@ -67,7 +67,7 @@ impl LawSpread {
 
 /// Spread of errors and of parameters over the seeds.
 ///
-/// Errors that agree beside laws that do not say that the parameters are not unique: spring
+/// Equal errors with different laws mean that the parameters are not unique: spring
 /// and damper stand in for each other, and what the law does at another speed is chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Identifiability {

@@ -2,7 +2,7 @@
 //!
 //! A [`Chart`] says what is shown. [`Chart::drawing`] places it: every line, and every text with the size that its
 //! font gives it. The two writers only spell that drawing, so both pictures show the same. The font is part of the
-//! program; no font of the system and no function of the platform has a say, and the bytes are the same everywhere.
+//! program; system fonts and platform functions are not used, so the bytes are the same everywhere.
 //!
 //! ```
 //! use crumple::plot::{Axis, Chart, Panel, Series};

@@ -87,7 +87,7 @@ impl Grade {
 ///
 /// A relative error over zeros counts as none if the prediction is zero there as well, else as
 /// the worst. Correlations that differ by less than 1e-12 count as equal, and the smaller shift
-/// is taken, as the standard has it for equal ones.
+/// is taken, as in the standard for equal ones.
 pub(crate) fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
     let n = reference.len();
     if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n) || prediction.len() != n {

@@ -1,6 +1,6 @@
 //! Rating: every measure of how far a prediction is from its reference.
 //!
-//! Two signals over time are filtered if asked, brought to common times at 10 kHz, and rated by
+//! Two signals over time are filtered on request, brought to common times at 10 kHz, and rated by
 //! all measures at once. Whatever the unit of the values, both have the same.
 //!
 //! The rate of 10 kHz is that of ISO/TS 18571, so that all measures see the same samples. The basic measures (`l1_ratio`,
@@ -385,7 +385,7 @@ mod tests {
         let zero = signal(vec![0.0; 200]);
         let cut = rate(&zero, &step, &window).unwrap();
         assert_eq!(cut.from_s, 0.052);
-        // The filter's overshoot behind the step is the largest value either way.
+        // The filter's overshoot after the step is the largest value either way.
         assert_eq!(cut.max_abs.value, rate(&zero, &step, &whole).unwrap().max_abs.value);
         assert!(cut.max_abs.value > 1.01);
     }

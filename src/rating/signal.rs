@@ -103,7 +103,7 @@ impl Signal {
         (self.time_s[0], self.time_s[self.time_s.len() - 1])
     }
 
-    /// The signal behind a CFC filter without phase shift, at its own times.
+    /// The signal after a CFC filter without phase shift, at its own times.
     pub(crate) fn filtered(&self, class: u32) -> Result<Self, Error> {
         let (first_s, last_s) = self.range_s();
         let filtered = cfc::filter(class, &self.time_s, &self.values).map_err(|source| {

@@ -213,7 +213,7 @@ impl Validated<'_> {
         }
     }
 
-    /// The curve at the asked speed, or in the middle of the widest gap.
+    /// The curve at the requested speed, or in the middle of the widest interval.
     fn add_prediction(
         &self,
         content: &mut Content,
@@ -362,7 +362,7 @@ fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
     gaps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|gap| gap.0 > 0.0).map(|gap| gap.1)
 }
 
-/// Characters of a hash that tell files apart at a glance; the whole stands where the pointer rests.
+/// Characters of a hash that distinguish files at a glance; the whole stands where the pointer rests.
 const HASH: usize = 12;
 
 /// The section of files that the curves come from.

@@ -1,4 +1,4 @@
-//! What the report says of a scenario: motion, crush and energy of its run, and FE's train beside it.
+//! What the report says of a scenario: motion, crush and energy of its run, and the comparison with FE's train.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::scenario::{self, Prepared};
 use crate::unit::km_per_h;
 
-/// Runs a scenario and adds its section; with FE's run as its reference also the methods beside it.
+/// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
 pub(super) fn add(
     content: &mut Content,
     path: &Path,

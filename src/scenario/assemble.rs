@@ -116,7 +116,7 @@ fn no_chain(
 const SAME_RUN: f64 = 0.05;
 
 /// Warns of a curve that is of another speed or mass than the impact it drives, as a model does that is
-/// asked out of its range.
+/// used outside its range.
 fn of_another_run(
     curve: &str,
     slot: &Connection<'_>,

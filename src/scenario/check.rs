@@ -20,7 +20,7 @@ use crate::unit::km_per_h;
 pub struct CheckedScenario<'a> {
     tables: Cow<'a, Scenario>,
     meeting_m_per_s: f64,
-    /// Its text, if it is as its file has it.
+    /// Its text, if it is as in its file.
     document: Option<Document>,
 }
 
@@ -68,7 +68,7 @@ impl CheckedScenario<'_> {
         self.meeting_m_per_s
     }
 
-    /// Its text, if it is as its file has it.
+    /// Its text, if it is as in its file.
     pub(super) fn document(&self) -> Option<&Document> {
         self.document.as_ref()
     }

@@ -28,7 +28,7 @@ pub(super) struct Crush {
     pub rate: RateFactor,
     /// Of an end; between vehicles of one mass the curve contains it.
     pub stopping: Option<Stopping>,
-    /// Speed that the model was asked for, in m/s of its kind.
+    /// Speed at which the model was evaluated, in m/s of its kind.
     pub speed_m_per_s: f64,
     pub warnings: Vec<String>,
 }

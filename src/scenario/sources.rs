@@ -98,7 +98,7 @@ impl Sources {
 }
 
 impl CurveSource {
-    /// Reads what the table of curve `name` in the scenario at `path` asks for.
+    /// Reads the source named in the table of curve `name` in the scenario at `path`.
     fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let of_curve = |error: Error| error.of(format_args!("curve \"{name}\""));

@@ -138,10 +138,10 @@ fn texts(warnings: &[Warning]) -> Vec<String> {
 /// Said of a file without `# force_kind`.
 const UNKNOWN_FORCE: &str = "its file does not state which force it holds: taken as the body force; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
 
-/// Said of a contact force that drives bodies of one mass without being asked for.
+/// Warning for a contact force that drives bodies of one mass without being requested.
 const ONLY_CONTACT: &str = "it has a contact force only, which includes mass that the crush zone stops early and is wrong for a vehicle of one mass; use a body force, or split the vehicles (front, rear)";
 
-/// The force that drives the interface: what was asked for, or what the vehicles need; `None` for
+/// The force that drives the interface: what was requested, or what the vehicles need; `None` for
 /// the recipe's own. One mass per vehicle moves by the body force; where the crush zone has a mass
 /// of its own, the contact force drives it, and a body force would count that mass twice.
 fn which_force(
@@ -166,7 +166,7 @@ fn which_force(
 }
 
 impl Spring {
-    /// The force law that the curve's table asks for, with all warnings.
+    /// The force law that the curve's table specifies, with all warnings.
     pub(crate) fn law_with_warnings(
         mut self,
         table: &Table,

@@ -90,7 +90,7 @@ pub(crate) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Of the matrix of `n` rows with these entries; only those up to the diagonal are asked for.
+    /// Of the matrix of `n` rows with these entries; only those up to the diagonal are requested.
     pub(crate) fn of(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let mut l = vec![vec![0.0; n]; n];
         for r in 0..n {

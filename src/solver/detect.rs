@@ -1,4 +1,4 @@
-//! The kinds of files that are read, and which one a file is: told by its content, and by its name where that is not enough.
+//! The kinds of files that are read, and which one a file is: recognised by its content, and by its name where that is not enough.
 
 use std::io::Read;
 use std::path::Path;
@@ -84,7 +84,7 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
 
 const NOT_RECOGNISED: &str = "no solver output is recognised in it";
 
-/// The format that the content tells, and whether it has the header of LS-DYNA's text files. Where lines of several
+/// The format found in the content, and whether it has the header of LS-DYNA's text files. Where lines of several
 /// kinds stand in a file, those of the kind that it is `named` by count.
 fn look_at(
     path: &Path,
@@ -162,7 +162,7 @@ pub(super) fn check_format(
             format.name,
             found.name
         )),
-        // A file that ends after its header tells no format, nor does one that has just begun.
+        // A file that ends after its header has no recognisable format; neither has one that was just started.
         (None, false) if source.size().is_ok_and(|size| size > 0) => {
             Err(unknown_format(path, NOT_RECOGNISED))
         }

@@ -1,7 +1,7 @@
-//! Selections held against what a file has.
+//! Selections compared with what a file has.
 //!
 //! Errors are about a key that callers know to answer: `format` if no reader knows the file, `deck` for a
-//! keyword deck, `ids[k]` and `component` for what was selected and is not there.
+//! keyword deck, `ids[k]` and `component` for what was selected and is missing.
 
 use std::path::Path;
 

@@ -92,7 +92,7 @@ pub(super) fn is_continuation(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().contains('%'))
 }
 
-/// Continuations looked for behind one that is missing.
+/// Continuations looked for after one that is missing.
 const MAX_MISSING_FILES: usize = 20;
 
 /// The first continuation that is missing although others are there, of any of the files, and what is therefore not

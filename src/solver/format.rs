@@ -21,7 +21,7 @@ type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<Solve
 enum Reader {
     /// Lines of text. A signature is a line below the header that shows the kind.
     Text { signature: fn(&[u8]) -> bool, read: ReadText },
-    /// Bytes, told by the first of them; over one or several files; sections inside.
+    /// Bytes, recognised by the first of them; over one or several files; sections inside.
     Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Plain reading is the default, because the file of a run that is still going may grow or
 //! shrink at any time: a plain read then ends early, while the access to a map beyond the
-//! end of its file kills the process. What is written behind the opening is not there for a
+//! end of its file kills the process. What is written after the opening is missing for a
 //! reader: its end would move while it reads, and half a line would be followed by another.
 
 use std::fs::File;
@@ -93,7 +93,7 @@ struct Mapped(memmap2::Mmap);
 impl Mapped {
     #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
     fn new(file: &File) -> io::Result<Self> {
-        // SAFETY: the user asked for a map and so promised that nothing writes to the file.
+        // SAFETY: the user requested a map and so promised that nothing writes to the file.
         unsafe { memmap2::Mmap::map(file) }.map(Self)
     }
 }

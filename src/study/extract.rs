@@ -105,7 +105,7 @@ impl LocatedRun<'_> {
         })
     }
 
-    /// That the kinetic energy at the start, in a glstat beside the run, asks for another mass: a
+    /// That the kinetic energy at the start, in a glstat next to the run, asks for another mass: a
     /// body force is in balance with every mass.
     fn mass_by_energy(
         &self,
@@ -336,7 +336,7 @@ fn is_same(read: &SolverFile, twin: &SolverFile) -> bool {
 pub(crate) fn is_alike(a: &[f64], b: &[f64]) -> bool {
     let finite = a.iter().filter(|v| v.is_finite());
     let largest = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
-    // A number that is not there must not be there in the other either.
+    // A number that is missing must not be there in the other either.
     let differ =
         |a: f64, b: f64| (a - b).abs() > SAME_VALUE * largest || a.is_finite() != b.is_finite();
     a.len() == b.len() && !a.iter().zip(b).any(|(a, b)| differ(*a, *b))

@@ -29,7 +29,7 @@ pub struct Manifest {
 pub(crate) struct StudyHeader {
     /// Name of the study.
     pub name: String,
-    /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
+    /// Units of the solver files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
     /// if absent.
     #[schemars(with = "Option<String>")]
     pub units: Option<UnitSystem>,
@@ -58,7 +58,7 @@ pub(crate) enum StudyKind {
 }
 
 impl StudyKind {
-    /// As a manifest has it: `wall` or `pair`.
+    /// As in a manifest: `wall` or `pair`.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Wall => "wall",
@@ -71,7 +71,7 @@ impl StudyKind {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunEntry {
-    /// Folder with the solver's files, relative to the manifest.
+    /// Folder with the solver files, relative to the manifest.
     pub path: String,
     /// Name of the case; the path if absent.
     pub name: Option<String>,
@@ -93,7 +93,7 @@ pub(crate) struct RunEntry {
     /// Deflection at contact: above 0 for a record that begins crushed, below 0 for slack that
     /// is not crush.
     pub offset: Option<SignedLengthText>,
-    /// Solver's time behind which the record is not used.
+    /// Solver's time after which the record is not used.
     pub truncate: Option<InstantText>,
     /// 1 or -1: the factor that makes the file's force positive in compression; found from its
     /// impulse if absent.

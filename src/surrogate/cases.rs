@@ -32,7 +32,7 @@ pub struct ModelCase {
     /// Speed of separation after the body force has first fallen to zero.
     #[serde(default)]
     pub rebound_speed_m_per_s: Option<f64>,
-    /// What its build said of it.
+    /// Warnings of its build.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// Empty in files of version 1.
@@ -107,7 +107,7 @@ impl ModelCase {
 pub(super) struct Curves {
     pub declared: Vec<CaseCurve>,
     pub body: Vec<CaseCurve>,
-    /// Of the curves of the declared force and of the body's, once it was asked for.
+    /// Of the curves of the declared force and of the body's, once it was requested.
     pub kinks: [Cached<SlopeJump>; 2],
 }
 

@@ -38,7 +38,7 @@ pub struct CrushLaw {
     /// γ in (s/m)^½, over the impact speed.
     #[serde(rename = "impact_sensitivity_sqrt_s_per_m", default)]
     pub of_impact: f64,
-    /// The mass that is stopped, with what the runs' momentum says beside it.
+    /// The stopped mass, with the deviation of the runs' momentum.
     #[serde(flatten)]
     pub stopped: StoppedMass,
     #[serde(skip)]

@@ -27,7 +27,7 @@ pub struct ModelEntry {
     pub sees_features: bool,
     /// Whether its force follows the closing speed at each deflection.
     pub follows_closing: bool,
-    /// Whether it needs runs that tell a crush law with stopped mass.
+    /// Whether it needs runs that determine a crush law with stopped mass.
     pub needs_crush_law: bool,
     /// Fewest training curves that it answers from.
     pub least_curves: usize,
@@ -53,7 +53,7 @@ pub(super) struct FitInput<'a> {
     pub curves: &'a [CaseCurve],
     pub force: ForceKind,
     pub forest: Option<&'a ForestOptions>,
-    /// Of the set, if the model needs one and the runs tell one.
+    /// Of the set, if the model needs one and the runs determine one.
     pub crush_law: Option<&'a CrushLaw>,
 }
 

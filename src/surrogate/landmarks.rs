@@ -192,7 +192,7 @@ impl Landmarks {
     }
 }
 
-/// A monotone piecewise linear map of deflections that keeps 0 and goes on with slope 1
+/// A monotone piecewise linear map of deflections that keeps 0 and continues with slope 1
 /// beyond its last landmark.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Warp {

@@ -35,7 +35,7 @@ pub struct LeftOut {
     /// Multi-body run driven by the model's body force; by the declared one if the two are
     /// the same.
     pub velocity_l1: f64,
-    /// Accelerations filtered with CFC 60, as SAE J211 has it for the comparison of vehicles.
+    /// Accelerations filtered with CFC 60, as in SAE J211 for the comparison of vehicles.
     pub acceleration_l1: f64,
     /// Accelerations as central differences over two sampling intervals, not filtered.
     pub acceleration_unfiltered_l1: f64,
@@ -66,7 +66,7 @@ pub struct PeakError {
 }
 
 /// FE's own curve in the same multi-body model. That of a contact force is the floor for its
-/// predictions; that of the body's force is made from FE's own speeds, and checks that curve, force
+/// predictions; that of the body force is made from FE's own speeds, and checks that curve, force
 /// law and run are consistent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Floor {
@@ -125,7 +125,7 @@ pub struct Scatter {
     pub force_l1: f64,
     /// The same of the closing speed.
     pub velocity_l1: f64,
-    /// Root mean square of the declared force's residuals in ratio to its local level, as of bands.
+    /// Root mean square of the declared force's residuals relative to its local level, as of bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -150,7 +150,7 @@ impl Scatter {
 /// The scatter of the body force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BodyScatter {
-    /// Root mean square of its residuals in ratio to its local level, as of bands.
+    /// Root mean square of its residuals relative to its local level, as of bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,

@@ -23,9 +23,9 @@ pub enum MaxCrushRule {
     /// Monotone cubic through (0, 0) and the training cases.
     #[default]
     Monotone,
-    /// Where the predicted curve has taken up the kinetic energy.
+    /// Where the predicted curve has absorbed the kinetic energy.
     Energy,
-    /// Where the body's force has stopped the body; the same as `energy` if the predicted
+    /// Where the body force has stopped the body; the same as `energy` if the predicted
     /// curve is that force. A contact curve takes up the energy too early, because mass in the
     /// crush zone is stopped before the body.
     Motion,
@@ -53,7 +53,7 @@ pub struct MaxCrush {
     pub spline_m: Option<f64>,
     /// By a cubic that never falls with the speed.
     pub monotone_m: Option<f64>,
-    /// Where the curve has taken up the impact's energy.
+    /// Where the curve has absorbed the impact's energy.
     pub energy_m: Option<f64>,
     /// Absent in files of earlier versions.
     #[serde(default)]
@@ -162,7 +162,7 @@ pub(crate) fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
     )
 }
 
-/// The deflection at which `curve` has taken up `kinetic_j`; beyond its end the force
+/// The deflection at which `curve` has absorbed `kinetic_j`; beyond its end the force
 /// holds its last value.
 pub(crate) fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)

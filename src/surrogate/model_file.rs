@@ -28,7 +28,7 @@ pub(super) const VERSION: u32 = 4;
 /// Most bytes of a model file: a forest of 500 trees has some ten million.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// What tells a model file from others.
+/// What identifies a model file.
 #[derive(Deserialize)]
 struct Head {
     format: String,

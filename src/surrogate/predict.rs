@@ -1,4 +1,4 @@
-//! Prediction in stages: what is asked → the body's motion → the declared force and the maximal
+//! Prediction in stages: query → motion of the body → the declared force and the maximal
 //! crush by every rule → the curve to one of them, with its audit and warnings.
 //!
 //! Order of work: body force → motion u(d) → maximum crush → declared force at these speeds → band → audit. The motion
@@ -13,7 +13,7 @@
 //! to be the steep one (else a deflection creates energy) and would lose most of the rebound. A predicted curve has one
 //! stiffness per force, from its maximum crush, which gives the measured speed of separation (`rebound`). The body force
 //! of the bundled runs rises less steeply than that, so tools with one constant get the rebound and create no energy.
-//! Exports take the body force by default and state its steepest rise beside it.
+//! Exports take the body force by default and also state its steepest rise.
 
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
@@ -81,7 +81,7 @@ pub struct Beyond {
     pub body: Envelope,
 }
 
-/// [`predict`], and how its forces go on beyond the maximum crush.
+/// [`predict`], and how its forces continue beyond the maximum crush.
 ///
 /// # Errors
 /// As [`predict`].
@@ -92,7 +92,7 @@ pub fn predict_beyond(model: &Model, query: &Query) -> Result<(PredictedCurve, B
     Ok((curve, Beyond { declared, body: motion.body }))
 }
 
-/// The motion that the body's force gives, beyond any maximum crush.
+/// The motion that the body force gives, beyond any maximum crush.
 struct Motion<'a> {
     asked: ResolvedQuery<'a>,
     query: &'a Query,
@@ -181,7 +181,7 @@ impl<'a> Prediction<'a> {
         Ok(Self { motion, declared, crush })
     }
 
-    /// The rule that the query asks for, or the model's own.
+    /// The rule that the query names, or the model's own.
     pub(crate) fn rule(&self) -> MaxCrushRule {
         self.motion.rule()
     }
@@ -202,7 +202,7 @@ impl<'a> Prediction<'a> {
         Ok(self.report(rule, Forces { declared: declared.envelope, body }, warnings))
     }
 
-    /// The force over these deflections, scaled to the impact's energy if that is asked for.
+    /// The force over these deflections, scaled to the impact's energy if that is requested.
     fn corrected(&self, deflection_m: &[f64], force_n: Vec<f64>) -> Result<Corrected, Error> {
         let level = envelope(deflection_m.to_vec(), force_n)?;
         if !self.motion.query.energy_correct {
@@ -222,7 +222,7 @@ impl<'a> Prediction<'a> {
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 
-    /// The band around one force; what was said of the other force is not said again.
+    /// The band around one force; what was reported for the other force is not repeated.
     fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
         let asked = &self.motion.asked;
         let band = asked.model.band(&asked.at(), force).unwrap_or_else(|warning| {

@@ -39,7 +39,7 @@ pub struct PredictedCurve {
     #[serde(rename = "body_force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_high_n: Option<Vec<f64>>,
     /// Forces between which the members of a forest's leaves lie, if the model keeps them. They
-    /// tell how the training points scatter, not how far FE lies off.
+    /// show how the training points scatter, not the distance from FE.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forest_quantiles: Option<ForestQuantiles>,
     /// Unloading stiffness that belongs to `force_N`, from its maximum crush: that of the
@@ -379,7 +379,7 @@ impl PredictedCurve {
     }
 }
 
-/// The last point may differ by this share from the maximum crush beside it.
+/// The last point may differ by this share from the stated maximum crush.
 const SAME_END: f64 = 1e-6;
 
 /// An envelope of the forces called `name`, none of which pulls.

@@ -1,4 +1,4 @@
-//! Queries: what is asked of a model, and what follows from that alone.
+//! Queries to a model, and what follows from the query alone.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +18,10 @@ use crate::unit::Speed;
 const SAME_MASS: f64 = 1e-3;
 /// Share of a curve over which the force before its maximum crush is averaged.
 const LAST_SHARE_OF_CRUSH: f64 = 0.05;
-/// Power of that force with which the speed of separation goes: the energy given back with its root.
+/// Power of that force with which the speed of separation goes: the energy returned with its root.
 const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 
-/// What is asked of a model.
+/// A query to a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
     /// Speed before contact in m/s, of the model's kind.
@@ -158,7 +158,7 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
-    /// The rebound from the end of the body's force over its deflection.
+    /// The rebound from the end of the body force over its deflection.
     pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
@@ -177,7 +177,7 @@ impl<'a> ResolvedQuery<'a> {
         max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
     }
 
-    /// What must be said of unloading, mass, and of an energy over the kinetic energy.
+    /// Warnings on unloading, mass, and energy over kinetic energy.
     pub(crate) fn warnings(&self, unloading: Option<f64>, energy: f64) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if unloading.is_none() {
@@ -196,9 +196,9 @@ impl<'a> ResolvedQuery<'a> {
 }
 
 /// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
-/// least squares of the runs' ratios to it. A structure behind one fold gives back the same energy whatever
-/// the force of that fold, the fold itself in proportion to it; the runs cannot tell how much is whose, and
-/// the root lies between. What a run has beside the line fades with the square of the nearness in speed.
+/// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
+/// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
+/// the root lies between. The residual of a run fades with the square of the proximity in speed.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };

@@ -5,7 +5,7 @@
 //!
 //! Why β√ḋ: strain rate and the inertia of folds both raise the force, less than in proportion to the speed. The root
 //! lies between the power 1/4 of Cowper and Symonds and 1. Why half of the β that fits best: two runs that overlap also
-//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot tell these causes
+//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot separate these causes
 //! apart.
 //!
 //! Tried in prototypes and dropped, because none was better on the bundled runs: a Gaussian process over {d, v} and over
@@ -103,7 +103,7 @@ impl Rate {
     /// The same deflection is passed at two speeds there, so β can be seen; but two runs
     /// also differ in how they fold, and by what is stopped at the nose at impact speed,
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
-    /// curves cannot tell the two causes apart.
+    /// curves cannot distinguish the two causes.
     pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
         Self::of(SHARE * Self::best_sensitivity(cases), None)
     }
@@ -244,7 +244,7 @@ impl Rate {
         }
     }
 
-    /// The levels, kept for the first curves that are asked for.
+    /// The levels, kept for the first curves that are requested.
     fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let kept = self
@@ -331,7 +331,7 @@ impl Overlap {
     }
 }
 
-/// Mean difference of neighbouring quotients over their overlaps, in ratio to their level.
+/// Mean difference of neighbouring quotients over their overlaps, relative to their level.
 fn disagreement(overlaps: &[Overlap], sensitivity: f64) -> f64 {
     let mut sum = 0.0;
     for Overlap { end_m, points } in overlaps {
@@ -342,7 +342,7 @@ fn disagreement(overlaps: &[Overlap], sensitivity: f64) -> f64 {
             level += 0.5 * (a.abs() + b.abs());
         }
         if level > 0.0 {
-            // Long overlaps say more than short ones.
+            // Long overlaps count more than short ones.
             sum += end_m * difference / level;
         }
     }

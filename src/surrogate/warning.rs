@@ -37,13 +37,13 @@ pub enum WarningCode {
     FarFromTraining,
     /// The collapse changes its mode between the neighbouring training speeds.
     ModeSwitch,
-    /// Too few curves to say how good the model is.
+    /// Too few curves to assess the model.
     TooFewCurves,
     /// The force was scaled so that the curve absorbs the impact's energy.
     EnergyCorrected,
-    /// Nothing that was left out tells how far FE may lie from this curve.
+    /// Nothing that was left out shows how far FE may be from this curve.
     NoBand,
-    /// What the build said of a training run, or of the recorded one.
+    /// A warning of the build of a training run, or of the recorded one.
     CaseWarning,
 }
 
@@ -193,7 +193,7 @@ impl Warning {
         }
     }
 
-    /// What is said of a recorded case: that it ended while loading, and what its build warned of.
+    /// Warnings of a recorded case: that it ended while loading, and those of its build.
     pub(crate) fn of_case(name: &str, truncated: bool, warnings: &[String]) -> Vec<Self> {
         let own = warnings.iter().filter(|w| !truncated || !w.starts_with("truncated:"));
         let own = own.map(|warning| Self {

@@ -18,7 +18,7 @@ const LISTED: usize = 10;
 /// without shards: CSV, or HDF5 by the extensions `.h5` and `.hdf5`.
 ///
 /// # Errors
-/// It names what is missing, twice or foreign, the first row that is not there, or another writer. The
+/// It names what is missing, twice or foreign, the first row that is missing, or another writer. The
 /// output is then unchanged.
 pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, Error> {
     let _lock = WriterLock::take(output)?;

@@ -3,7 +3,7 @@
 //! Item `k` has the same row whatever the threads, the pieces or the share of the work
 //! (`shard`) it is run in. Rows stand in order of items and are written as they come, so
 //! nothing grows with their number. The file under work is its own journal: a run that was
-//! stopped goes on after its last whole row.
+//! stopped continues after its last whole row.
 //!
 //! Item k is a function of plan and k alone: grids by division, draws by a stream keyed by seed, variable and item, the strata
 //! of a Latin hypercube by a permutation that is computed (a Feistel network) and never held. So threads, pieces and shards
@@ -12,7 +12,7 @@
 //!
 //! Rows are written in order, as CSV, to `OUT.part`; this file is the journal. Its head holds a hash of the plan, the scenario,
 //! the files it names and the program's version. A run that finds it keeps every whole row that is the next one, removes what
-//! follows (a torn line, blocks of zeros) and goes on; at the end the file is renamed. A journal beside the result could contradict
+//! follows (a torn line, blocks of zeros) and continues; at the end the file is renamed. A journal beside the result could contradict
 //! it. HDF5 is made of the complete CSV, which is read twice: the sizes of datasets and the widths of texts are then known, and
 //! nothing is held.
 //!

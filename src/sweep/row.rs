@@ -297,7 +297,7 @@ pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Re
     io::Read::take(reader, MAX_LINE_BYTES).read_until(b'\n', line)
 }
 
-/// Hands on every row behind the head.
+/// Hands on every row after the head.
 fn each_line(
     path: &Path,
     reader: &mut impl BufRead,

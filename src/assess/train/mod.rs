@@ -28,7 +28,7 @@ pub struct TrainComparison {
     pub time_s: Vec<f64>,
     /// FE's speeds in m/s.
     pub fe: BTreeMap<String, Vec<f64>>,
-    /// Time by the clock that FE took for the train, in s, if the run's folder tells.
+    /// Wall-clock time of FE for the train, in s, if the run's folder has it.
     pub fe_time_s: Option<f64>,
     /// What of the reference does not fit the scenario.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -43,7 +43,7 @@ pub struct TrainRow {
     /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
     /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
     /// each interface's own), `rate_live` (the force follows the run's closing speeds), `split_ends`
-    /// (each vehicle with two ends of the models). The last two only where every group tells its
+    /// (each vehicle with two ends of the models). The last two only if every group has a
     /// crush law.
     pub method: String,
     /// What drives its interfaces: `body force`, `recipe's force`, `spring and damper`, `crush
@@ -176,7 +176,7 @@ fn compared(
     })
 }
 
-/// Another order of the nodes, or another time of the contact, that fits so much better is said.
+/// Another order of the nodes, or another time of the contact, that fits so much better is reported.
 const SWAPPED: f64 = 0.5;
 const SHIFTED: f64 = 0.6;
 /// Times by which FE's record is shifted to see whether it fits better, in s.
@@ -236,7 +236,7 @@ pub(crate) struct FeTrain {
     pub time_s: Vec<f64>,
     /// Vehicle, as the scenario names it, and its speed in m/s at each time.
     pub velocities: Vec<(String, Vec<f64>)>,
-    /// Time by the clock that FE took, in s.
+    /// Wall-clock time of FE, in s.
     pub wall_time_s: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! One method in a train: its run, held against FE's.
+//! One method in a train: its run, compared with FE's.
 
 use std::collections::BTreeMap;
 use std::path::Path;

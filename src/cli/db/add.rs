@@ -17,13 +17,13 @@ use super::row::CaseRow;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 use output::ListedFormat;
 
-/// Files, the group they join, and what they do not say of themselves.
+/// Files, the group they join, and data missing from them.
 #[derive(clap::Args)]
 pub(super) struct Args {
     /// Curve database; created if it does not exist
     #[arg(required_unless_present = "list")]
     database: Option<PathBuf>,
-    /// Curves: tables (CSV and the like), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
+    /// Curves: tables (CSV and similar), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
     #[arg(required_unless_present = "list")]
     files: Vec<PathBuf>,
     /// List the formats that are read

@@ -1,4 +1,4 @@
-//! `crumple db tag` and `note`: what users say of cases.
+//! `crumple db tag` and `note`: users' tags and notes on cases.
 
 use std::path::{Path, PathBuf};
 
@@ -71,7 +71,7 @@ struct Document {
     cases: Vec<Labelled>,
 }
 
-/// A case with what users say of it now.
+/// A case with its current tags and notes.
 #[derive(Serialize)]
 struct Labelled {
     group: String,

@@ -1,4 +1,4 @@
-//! `crumple db show`: cases with their curves, or beside each other.
+//! `crumple db show`: cases with their curves, or side by side.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};

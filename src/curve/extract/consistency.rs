@@ -1,4 +1,4 @@
-//! What the histories of one record say of each other along time: impulse against momentum, displacement against velocity,
+//! Consistency of the histories of one record along time: impulse against momentum, displacement against velocity,
 //! force against motion, the output interval against the curve.
 
 use super::error::ExtractError;
@@ -29,7 +29,7 @@ const STATES: usize = 100;
 const SAMPLED_OFF: f64 = 0.02;
 /// Where two histories of one record cannot be one run's.
 const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or shifted times";
-/// A peak is a spike above these multiples of the states beside it and of all others.
+/// A peak is a spike above these multiples of its neighbours and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Free flight in fewer states says nothing of gravity.
 const FLIGHT: usize = 5;
@@ -98,7 +98,7 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     Ok(remarks)
 }
 
-/// A peak that is a single state, far above those beside it and above all others: damage, or an output
+/// A peak that is a single state, far above its neighbours and all others: damage, or an output
 /// interval that is too long.
 pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
     let peak = (0..force_n.len()).max_by(|&a, &b| force_n[a].total_cmp(&force_n[b]))?;
@@ -164,7 +164,7 @@ impl<'a> Motion<'a> {
     }
 
     /// The impulse of the force against the lost momentum, at every state of the contact, and of
-    /// each spell of force after it.
+    /// each force pulse after it.
     pub(super) fn momentum(&self) -> Result<Notes, ImpossibleRun> {
         let mut remarks = Notes::default();
         let (time_s, force_n) = (self.contact.curve.time_s(), self.contact.curve.force_n());
@@ -213,7 +213,7 @@ impl<'a> Motion<'a> {
         Ok(remarks)
     }
 
-    /// The mass that the contact force beside a body force asks for: mass times acceleration is in
+    /// The mass that the contact force implies for a body force: mass times acceleration is in
     /// balance with every mass.
     pub(super) fn mass(&self, record: &Record) -> Result<Notes, ImpossibleRun> {
         let mut remarks = Notes::default();

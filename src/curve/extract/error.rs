@@ -80,7 +80,7 @@ pub enum ExtractError {
     /// No crash can have such a curve.
     #[error("{0}")]
     ImpossibleRun(#[from] energy::ImpossibleRun),
-    /// The body moves as it was told to, whatever the force.
+    /// The motion of the body is prescribed, whatever the force.
     #[error(
         "{0}. No impact of this mass and speed has such a curve; crumple histories writes its force and displacement"
     )]
@@ -88,12 +88,12 @@ pub enum ExtractError {
     /// The deflection does not grow after contact.
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
-    /// Neither manifest nor file tell the speed.
+    /// Neither manifest nor file contains the speed.
     #[error(
         "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
     )]
     NoSpeed {
-        /// Component that would have told it.
+        /// Component that would have given it.
         component: String,
     },
     /// The body does not move in the first state.

@@ -7,7 +7,7 @@ use crate::unit::{SpeedKind, UnitSystem};
 
 /// The histories of one run, in the solver's units.
 pub struct Measured<'a> {
-    /// Those of the solver's files.
+    /// Those of the solver files.
     pub units: UnitSystem,
     /// Of the recipe's node.
     pub displacement: &'a History,
@@ -19,7 +19,7 @@ pub struct Measured<'a> {
     pub minus_velocity: Option<&'a History>,
     /// The force of the curve.
     pub force: MeasuredForce<'a>,
-    /// Contact force that tells when contact begins, where the force is a body force.
+    /// Contact force that marks the start of contact for a body force.
     pub contact: Option<&'a History>,
 }
 
@@ -73,11 +73,11 @@ pub struct Stated {
     pub contact: Option<StatedContact>,
     /// Deflection at contact.
     pub offset_m: f64,
-    /// Solver's time behind which the record is not used.
+    /// Solver's time after which the record is not used.
     pub truncate_s: Option<f64>,
     /// 1 or −1: factor that makes the file's force positive in compression.
     pub force_sign: Option<f64>,
-    /// Take the run whatever its energy and impulse say.
+    /// Accept the run whatever its energy and impulse.
     pub accept_energy: bool,
 }
 

@@ -144,7 +144,7 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     Ok(remarks)
 }
 
-/// What energy, impulse and the loading branch say of a curve.
+/// Notes on energy, impulse and the loading branch of a curve.
 fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
     let mut remarks = Notes::default();
     // Of a run that ended while loading: of what it had stopped by then.

@@ -30,7 +30,7 @@ pub(crate) struct Record {
     /// Name of the velocity that the files do not have: the rate is then a derivative.
     pub missing_velocity: Option<String>,
     pub force_kind: ForceKind,
-    /// Contact force that shows when contact begins, beside a body force.
+    /// Contact force that marks the start of contact for a body force.
     pub contact: Option<Signal>,
     /// Of the files, to name what was mistaken.
     pub units: UnitSystem,
@@ -153,7 +153,7 @@ impl Record {
         Ok((record, remarks))
     }
 
-    /// Removes the states behind the manifest's end of the record; says how many.
+    /// Removes the states after the manifest's end of the record; says how many.
     fn truncate(&mut self, until_s: f64) -> Result<String, ExtractError> {
         let kept = self.time_s.iter().take_while(|&&t| t <= until_s).count();
         if kept < 2 {
@@ -359,7 +359,7 @@ pub(super) fn sample(
             times.len(),
             sampling.states
         );
-        // A record that was cut on purpose is as short as was asked for, and one that begins with
+        // A record that was cut on purpose is as short as was requested, and one that begins with
         // some states of flight ends as much earlier.
         let missing = sampling.states - times.len();
         match setup.stated.truncate_s {

@@ -6,7 +6,7 @@ use super::record::Record;
 use super::remarks::Notes;
 use crate::unit::{Speed, km_per_h};
 
-/// Two speeds of one impact may differ by this share before it is said.
+/// Two speeds of one impact may differ by this share before it is reported.
 const SAME_SPEED: f64 = 0.01;
 
 /// Who says the impact speed.
@@ -27,7 +27,7 @@ pub(super) struct ImpactSpeed {
 
 impl ImpactSpeed {
     /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
-    /// are said. `before`: the last state that contact has not changed.
+    /// are reported. `before`: the last state that contact has not changed.
     pub(crate) fn of(
         setup: &Setup<'_>,
         record: &Record,

@@ -32,7 +32,7 @@ enum StartBy {
     FirstState { missing_m: f64 },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64 },
-    /// The body's slowing down, which is later: said where it is found.
+    /// The deceleration of the body, which starts later: reported where it is found.
     Body,
 }
 

@@ -165,7 +165,7 @@ fn units(with_time: bool) -> String {
     format!("  <UnitDefinitions>\n{}  </UnitDefinitions>\n", each.collect::<String>())
 }
 
-/// Causality and the rest of what a role asks for, and the start value.
+/// Causality and the other attributes of a role, and the start value.
 fn role(role: &Role) -> (&'static str, Option<&'static str>) {
     match role {
         Role::Input => (r#"causality="input" variability="continuous""#, Some("0")),

@@ -101,7 +101,7 @@ impl Table {
         envelope.chain(self.shape.iter().map(|column| (column, SHAPE)))
     }
 
-    /// As `crumple_table_sum` in c/sum.c: tells a damaged table.
+    /// As `crumple_table_sum` in c/sum.c: detects a damaged table.
     fn sum(&self) -> u64 {
         let mix = |sum: u64, word: u64| {
             let sum = (sum ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);

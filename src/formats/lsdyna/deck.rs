@@ -4,7 +4,7 @@ use super::super::text::{Lines, nine_digits, title};
 use super::super::{ExportCurve, NUMBER_OF_STATES, run_time_s};
 use super::{InUnits, Material, TITLE_WIDTH};
 
-/// Everything beside curves and material. The moving body is node 2 at +x and moves towards −x.
+/// Everything besides curves and material. The moving body is node 2 at +x and moves towards −x.
 pub(crate) fn write(
     lines: &mut Lines,
     curve: &ExportCurve,

@@ -41,7 +41,7 @@ pub(super) fn check_points(points: usize) -> Result<(), Error> {
 /// Curves and columns that a message lists.
 pub(super) const LISTED: usize = 20;
 
-/// Which of a file's curves was asked for by its name, else the only one; each with its name and title.
+/// Which of a file's curves was requested by its name, else the only one; each with its name and title.
 pub(super) fn choose(
     curves: impl Iterator<Item = (String, String)> + Clone,
     asked: Option<&str>,
@@ -101,7 +101,7 @@ pub(super) struct Columns {
     pub title: Option<String>,
     pub units: Option<UnitSystem>,
     pub notes: Vec<String>,
-    /// Files that were read beside the one that was given.
+    /// Files that were read besides the given one.
     pub files: Vec<ReadFile>,
 }
 
@@ -151,7 +151,7 @@ impl Columns {
         }
     }
 
-    /// The curve of these columns. A record over time keeps its signs, which its motion tells.
+    /// The curve of these columns. A record over time keeps its signs, which follow from its motion.
     pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
@@ -321,7 +321,7 @@ impl Points {
     }
 
     /// Removes what tools that extrapolate are given: points below zero deflection, and the last
-    /// force once more, as far behind the end as the first lies before the beginning.
+    /// force once more, as far beyond the end as the first lies before the start.
     fn remove_guards(&mut self, notes: &mut Vec<String>) {
         let before = self.list.len();
         let first = self.list.first().map_or(0.0, |p| p.d);
@@ -375,9 +375,9 @@ impl Points {
         }
     }
 
-    /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still goes on.
+    /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still continues.
     /// Up to the maximum deflection the later ones go forward; where the force has its peak at the maximum
-    /// deflection, those behind the peak are unloading and go back, as all behind it do.
+    /// deflection, those after the peak are unloading and go back, as all after it do.
     fn set_steps_apart(&mut self, notes: &mut Vec<String>) {
         let largest_m = self.list.iter().map(|p| p.d).fold(0.0, f64::max);
         let end = self.list.iter().position(|p| p.d == largest_m).unwrap_or(0);
@@ -390,7 +390,7 @@ impl Points {
             let mut step = outline(&self.list[first..first + count]);
             if step.len() > 1 {
                 steps.push((d, step[0].clone(), step[step.len() - 1].f));
-                // Behind the last point there is room, but none below zero.
+                // After the last point there is room, but none below zero.
                 let behind = if first > end { d } else { largest_m };
                 let room = next.map_or(behind, |next| (next.d - d).abs());
                 let hair = (STEP_WIDTH_SHARE * largest_m).min(0.5 * room) / (step.len() - 1) as f64;
@@ -410,7 +410,7 @@ impl Points {
         notes.extend(steps_note(&steps));
     }
 
-    /// Up to the maximum deflection it must increase, behind it decrease.
+    /// Up to the maximum deflection it must increase, after it decrease.
     fn check_order(&self) -> Result<(), Error> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
         let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
@@ -570,7 +570,7 @@ mod tests {
         t(&behind, &[&plain_unloading()[..], &set].concat(), "from 1 to 0 N at 2 m");
     }
 
-    /// A loading branch and the first point behind it.
+    /// A loading branch and the first point after it.
     fn plain_unloading() -> [(f64, f64); 5] {
         [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (3.0, 2.0)]
     }

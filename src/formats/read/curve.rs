@@ -1,4 +1,4 @@
-//! A curve as its file has it, in SI, with what the file says of it.
+//! A curve as in its file, in SI, with what the file says of it.
 
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloa
 use crate::unit::{SpeedKind, UnitSystem};
 use std::fmt;
 
-/// A curve read from a file: the loading branch, behind it the unloading branch if the file has
+/// A curve read from a file: the loading branch, after it the unloading branch if the file has
 /// one; or a record over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadCurve {
@@ -121,7 +121,7 @@ pub struct Metadata {
     pub mass_kg: Option<f64>,
     /// Mass of the other body in kg.
     pub other_mass_kg: Option<f64>,
-    /// Maximum crush in m; points behind it are what other tools need beyond it.
+    /// Maximum crush in m; points after it are what other tools need beyond it.
     pub max_deflection_m: Option<f64>,
 }
 

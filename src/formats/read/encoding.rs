@@ -8,7 +8,7 @@ pub(super) struct Decoded<'a> {
     pub note: Option<&'static str>,
 }
 
-/// Bytes by which UTF-16 without a mark is told.
+/// Bytes by which UTF-16 without a mark is recognised.
 const BEGINNING: usize = 64;
 
 /// The text that the bytes are; bytes of no text become one, too.

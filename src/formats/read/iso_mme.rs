@@ -400,7 +400,7 @@ impl Header {
     }
 }
 
-/// The channels of the codes that were asked for, or the only ones.
+/// The channels of the codes that were requested, or the only ones.
 fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel), Error> {
     let codes = |quantity: Quantity, from: &[Channel]| {
         let of = from.iter().filter(|c| c.quantity == quantity);

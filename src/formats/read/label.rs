@@ -72,7 +72,7 @@ fn is_one(word: &str, of: &str) -> bool {
 }
 
 impl Quantity {
-    /// In the order in which an axis is asked for them.
+    /// In the order in which they are matched with an axis.
     pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
     fn terms(self) -> &'static Terms {
@@ -146,7 +146,7 @@ impl Quantity {
             let is_its = is_one(&dimension.trim().to_ascii_lowercase(), self.terms().stated);
             return size.filter(|size| is_its && *size > 0.0);
         }
-        // Micro is a letter of its own in texts that are no ASCII.
+        // Micro is a letter of its own in texts that are not ASCII.
         self.terms().dimension.size_of(&unit.replace(['µ', 'μ'], "u"))
     }
 
@@ -260,7 +260,7 @@ fn in_brackets(text: &str) -> Option<(&str, &str)> {
     Some((&text[..at], text[at + 1..text.len() - 1].trim()))
 }
 
-/// The name of a column and its unit: in brackets, or behind a slash, comma, blank or underscore.
+/// The name of a column and its unit: in brackets, or after a slash, comma, blank or underscore.
 fn name_and_unit(text: &str) -> (&str, Option<&str>) {
     let text = text.trim().trim_matches('"').trim();
     if let Some((name, unit)) = in_brackets(text) {

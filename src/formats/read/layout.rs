@@ -59,7 +59,7 @@ impl Named {
     }
 }
 
-/// The columns of a table, in the units that were given where they do not say their own; notes say which. Also
+/// The columns of a table, in the given units if they state none; notes say which. Also
 /// whether a column took its unit from those.
 pub(super) fn layout(
     table: &Table<'_>,
@@ -76,7 +76,7 @@ pub(super) fn layout(
     let numbered = || (1..=table.columns).map(|k| (table.line(), format!("column {k}")));
     let names = if is_bare { numbered().collect() } else { table.names.clone() };
     let wanted = [Quantity::Deflection, Quantity::Force];
-    // What the label of an axis does not say is the deflection, then the force.
+    // Axes without labels are the deflection, then the force.
     let usual = |field: usize, name: &str| {
         let quantity = *wanted.get(field)?;
         Some(if is_bare { Label { quantity, unit: None } } else { Label::of_named(quantity, name) })

@@ -44,7 +44,7 @@ enum Next {
     Point,
 }
 
-/// The curves of a deck, and what its comments say.
+/// The curves of a deck, and the metadata of its comments.
 #[derive(Default)]
 struct Deck {
     curves: Vec<DeckCurve>,

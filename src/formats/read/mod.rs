@@ -3,10 +3,10 @@
 //!
 //! **Units** are those of the column's header (`d_mm`, `Force [kN]`), of a comment
 //! (`units: mm-t-s`), or those that are given ([`ReadOptions::units`]); without any, a file is
-//! refused. **Comments** `key: value` that our own exports write tell force kind, speed, speed
+//! refused. **Comments** `key: value` that our own exports write give force kind, speed, speed
 //! kind, mass and unloading stiffness. **Signs**: compression becomes positive. **Points** that
 //! repeat the one before, and guard points (below zero deflection with no force; the last force
-//! repeated as far behind the end) are removed. Each of these leaves a note.
+//! repeated equally far beyond the end) are removed. Each of these leaves a note.
 
 mod columns;
 pub(crate) mod curve;
@@ -133,18 +133,18 @@ pub const READERS: &[Reader] = &[
     },
 ];
 
-/// What the user says beside the file.
+/// What the user gives besides the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
-    /// Name of a reader, where the content shall not tell.
+    /// Name of a reader, to override recognition by content.
     pub format: Option<String>,
-    /// Units of values that do not say their own.
+    /// Units of values that state none.
     pub units: Option<UnitSystem>,
     /// Number or name of the curve in a file that holds several.
     pub curve: Option<String>,
     /// The force, where the file has both.
     pub force: Option<ForceKind>,
-    /// The columns of a table, where its header does not tell.
+    /// The columns of a table whose header does not name them.
     pub columns: ColumnNames,
 }
 
@@ -299,7 +299,7 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
     Ok((found, reader))
 }
 
-/// A curve that can drive an interface, as its file has it.
+/// A curve that can drive an interface, as in its file.
 pub(crate) enum DrivingFile {
     Predicted(Box<PredictedCurve>),
     /// With what was changed to make it drive.

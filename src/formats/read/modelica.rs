@@ -66,7 +66,7 @@ struct Table {
     columns: usize,
     /// SI values of the units in its comment: of deflection and force.
     sizes: Option<(f64, f64)>,
-    /// What the comments in front of it say.
+    /// Metadata of the comments before it.
     facts: Metadata,
     values: Vec<f64>,
     /// Line of each row's first value.
@@ -149,7 +149,7 @@ impl File {
         ))
     }
 
-    /// The table that was asked for, else ours, else the only one that can be a curve.
+    /// The table that was requested, else ours, else the only one that can be a curve.
     fn choose(&self, asked: Option<&str>) -> Result<&Table, Error> {
         let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
         if fitting.is_empty() {

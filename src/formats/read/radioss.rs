@@ -1,6 +1,6 @@
 //! Curve of a Radioss deck: a function `/FUNCT/id`.
 //!
-//! Behind the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. A
+//! After the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. A
 //! `/MOVE_FUNCT/id` scales and then shifts the function of that number. Lines that begin with `#` or `$` are
 //! comments. Units are those of a comment (`units: mm-t-s`) or of `/BEGIN`, where
 //! the fourth line has mass, length and time, by name or by their size in SI.
@@ -90,7 +90,7 @@ enum Next {
     Move(u8),
 }
 
-/// The functions of a deck, and what its comments say.
+/// The functions of a deck, and the metadata of its comments.
 #[derive(Default)]
 struct Deck {
     functions: Vec<Function>,
@@ -136,7 +136,7 @@ impl Deck {
         }
     }
 
-    /// Takes a line that is neither comment nor keyword; gives what the one behind it is.
+    /// Takes a line that is neither comment nor keyword; gives what the one after it is.
     fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, Error> {
         match (next, self.functions.last_mut(), self.moves.last_mut()) {
             (Next::Begin(0), None, _) => {

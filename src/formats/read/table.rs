@@ -1,6 +1,6 @@
 //! Tables of numbers in a text: titles, a header, a row of units, rows; or curves of two columns, one after the other.
 //!
-//! The header is the first line that names what is looked for and behind which a row of as many numbers follows, with or
+//! The header is the first line that names what is looked for and after which a row of as many numbers follows, with or
 //! without a row of units between; else the first line above such a row. Columns are separated by tabs, semicolons,
 //! commas or blanks, whichever gives the header and the row below it the same number of fields. Lines that begin with
 //! `#` or `$` are comments.
@@ -19,7 +19,7 @@ use crate::error::{Error, error};
 const MOST_TITLES: usize = 100;
 /// Columns of a table, at most: guards time.
 const MOST_COLUMNS: usize = 1_000;
-/// Characters of a unit, at most: to tell a row of units from a header.
+/// Maximum characters of a unit, to distinguish a row of units from a header.
 const UNIT: usize = 6;
 /// Lines in front of a curve of two columns: more are another kind of file.
 const HEADS: usize = 20;
@@ -203,7 +203,7 @@ impl<'a> Table<'a> {
         // A header above numbers wins wherever it stands; else the first line that fits at all.
         let best = candidates.min_by_key(|(fit, k, ..)| (*fit != Fit::Header, *k, *fit));
         let (fit, k, separator, names) = best.unwrap_or_else(|| {
-            // Nothing fits: what is wrong with the first line is said of it.
+            // Nothing fits: report what is wrong with the first line.
             let line = first.first().map_or("", |(_, line)| line);
             let of = |c| Separator::OF_TABLES[..3].iter().copied().find(|s| s.separates(c));
             let separator = line.chars().find_map(of).unwrap_or(Separator::Comma);
@@ -238,7 +238,7 @@ impl<'a> Table<'a> {
         let mut tables: Vec<Self> = Vec::new();
         let (mut heads, mut shared): (Vec<(u64, String)>, Vec<_>) = Default::default();
         let (mut comment, mut declared, mut curves) = (None, None, 1);
-        // Whether rows of the last table go on.
+        // Whether rows of the last table continue.
         let mut is_open = false;
         let end = |tables: &mut Vec<Self>, is_open: &mut bool, line: &str| {
             if let Some(last) = tables.last_mut().filter(|_| *is_open) {
@@ -365,7 +365,7 @@ impl<'a> Table<'a> {
             }
             let is_less = found < self.columns && self.separator == Separator::Blanks;
             if found > self.columns || is_less {
-                // A number that is missing is said by who takes it.
+                // A missing number is reported by its user.
                 if is_less {
                     take(&row)?;
                 }
@@ -499,7 +499,7 @@ pub(super) fn check_last(heads: &[(u64, String)]) -> Result<(), Error> {
     }
 }
 
-/// The names of the two axes of a curve, as far as the lines above its first row say them.
+/// The names of the two axes of a curve, as far as the lines above its first row name them.
 fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>, row: &str) -> Vec<(u64, String)> {
     if let [_, x, y, _] = heads {
         return vec![x.clone(), y.clone()];
@@ -523,7 +523,7 @@ fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>, row: &str) -> V
     axes
 }
 
-/// A text that names several columns, apart: behind a bracket or a unit.
+/// A text that names several columns, apart: after a bracket or a unit.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = vec![String::new()];
     for word in Separator::Any.fields(text).0 {

@@ -65,7 +65,7 @@ pub(super) fn read_pairs(input: &Input<'_>) -> Result<Columns, Error> {
     columns(input, table, &table.name, Vec::new())
 }
 
-/// Which curve was asked for by its name or number, else the only one.
+/// Which curve was requested by its name or number, else the only one.
 fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     let by_name = |asked: &&str| tables.iter().any(|table| table.name.trim() == asked.trim());
     if asked.filter(by_name).is_some() {
@@ -238,7 +238,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
     Ok(history)
 }
 
-/// The column that was asked for, of those that hold values.
+/// The column that was requested, of those that hold values.
 fn column(
     names: &[String],
     mut values: impl Iterator<Item = usize> + Clone,

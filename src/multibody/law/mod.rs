@@ -56,7 +56,7 @@ pub enum EnvelopeEnd {
 /// `dissipated = max over s ≤ δ of work(s) − storable(k)(s)`, not below 0.
 ///
 /// `F` is the envelope's force at δ and `work` its integral up to there; `c = ½` for a straight
-/// line, whose stiffness is `F²/(2 stored)`, and less for a shape that gives back less. The bound
+/// line, whose stiffness is `F²/(2 stored)`, and less for a shape that returns less. The bound
 /// `cδF` keeps the branch from reaching zero deflection with a force left, whose energy would be
 /// lost. With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
 #[derive(Clone, Debug, PartialEq)]
@@ -313,7 +313,7 @@ mod tests {
         assert_eq!((stored, same), (0.0, dissipated));
     }
 
-    /// Softer than the spike's flank: the rebound at the end follows the stiffness asked
+    /// Softer than the rise of the spike: the rebound at the end follows the requested stiffness
     /// for, and on the way there no step of the deflection gives energy back.
     #[test]
     fn soft_unloading_never_creates_energy() {

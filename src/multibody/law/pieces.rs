@@ -19,7 +19,7 @@ pub(in super::super) struct Branch {
     pub top_n: f64,
     pub stored_j: f64,
     pub dissipated_j: f64,
-    /// Deflection given back until the force is zero.
+    /// Deflection returned until the force is zero.
     pub length_m: f64,
     /// Integral of the work over the deflection up to the top.
     pub sum_jm: f64,

@@ -90,7 +90,7 @@ impl Memory {
 }
 
 /// Shape of an unloading branch: share of the force at the top over the share of the
-/// branch's length that has been given back.
+/// branch's length that has been returned.
 ///
 /// Invariant: shares of the length rise from 0 to 1, those of the force are at least 0, begin
 /// at 1 and end at 0.
@@ -99,7 +99,7 @@ pub struct UnloadingShape {
     pub(super) length: Vec<f64>,
     pub(super) force: Vec<f64>,
     /// `∫` of the force from each point to the end; the first is the share of force × length that
-    /// is given back.
+    /// is returned.
     pub(super) rest: Vec<f64>,
     /// `∫` of `rest` from the first point to each.
     pub(super) rest_so_far: Vec<f64>,
@@ -157,7 +157,7 @@ impl UnloadingShape {
         Some(Self::new(length, points.iter().map(|p| p.1).collect()))
     }
 
-    /// Share of force × length that is given back: ½ for the line.
+    /// Share of force × length that is returned: ½ for the line.
     pub(super) fn share(&self) -> f64 {
         self.rest[0]
     }

@@ -1,4 +1,4 @@
-//! One value per line behind a label with dots, as `deforc` and `jntforc` print them.
+//! One value per line after a label with dots, as `deforc` and `jntforc` print them.
 //!
 //! Never seen with data; read as the source of LSTC's converter `l2a` writes them.
 

@@ -44,7 +44,7 @@ const MAX_BLOCKS: usize = 200;
 pub(crate) struct Layout {
     /// Digits of the time.
     pub time_digits: i32,
-    /// Begins a state; the time stands behind `t=`.
+    /// Begins a state; the time stands after `t=`.
     pub state: &'static [u8],
     /// Name of the block that a heading begins, such as a group; `None` for other lines.
     pub block: fn(&[u8]) -> Option<String>,
@@ -57,7 +57,7 @@ pub(crate) struct NodeForces {
     blocks: Vec<Block>,
     current: Option<usize>,
     body: Option<i64>,
-    /// Behind a heading: a row that the state already has is the first of the next one.
+    /// After a heading: a row that the state already has is the first of the next one.
     begins: bool,
     widths: Widths,
 }

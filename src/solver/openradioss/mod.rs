@@ -8,7 +8,7 @@
 //! ends), means over two output intervals.
 //!
 //! All states of a T01 have one length, so a damaged state is passed over and the next one is found. The file has no
-//! check sums. A restart goes on in `T02`, with the impulses of `T01`: both are one record.
+//! check sums. A restart continues in `T02`, with the impulses of `T01`: both are one record.
 
 mod header;
 mod states;

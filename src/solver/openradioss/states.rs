@@ -165,8 +165,8 @@ impl StateReader {
         self.lengths.iter().map(|&n| n as u64 + 2 * FRAME).sum()
     }
 
-    /// Reads states until the end. One that is damaged is left out and said; as all have the
-    /// same length, the next one is found behind it.
+    /// Reads states until the end. One that is damaged is left out and reported; as all have the
+    /// same length, the next one is found after it.
     pub(crate) fn read(&mut self, header: &Header, records: &mut Records<'_>) -> io::Result<()> {
         let mut start = records.position();
         let mut number = 0;
@@ -293,7 +293,7 @@ impl StateReader {
         }
     }
 
-    /// Leaves out what a restart wrote again; forces cannot be told across it.
+    /// Leaves out what a restart wrote again; forces are unknown across it.
     fn resolve_restarts(&mut self) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
         let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");

@@ -1,4 +1,4 @@
-//! Ends states: a whole one is kept, one that lacks something is left out and said.
+//! Ends states: a complete one is kept, an incomplete one is left out and reported.
 
 use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, StateReader};
 use crate::solver::problem::ProblemCode;

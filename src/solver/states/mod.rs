@@ -190,7 +190,7 @@ impl<'a> StateReader<'a> {
     }
 
     /// Notes a line that cannot be read; the state it belongs to is not whole.
-    /// Behind the last row of a whole state, that is the next state.
+    /// After the last row of a whole state, that is the next state.
     pub(crate) fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
         self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
         if let Some(pending) = &self.pending

@@ -9,7 +9,7 @@ use crate::history::EntityId;
 pub(crate) struct Pick {
     /// `None` for an entity that the state lacks.
     pub positions: Vec<Option<usize>>,
-    /// From the first to behind the last of them.
+    /// From the first to after the last of them.
     pub span: Range<usize>,
     /// Whether they are neighbours in their order.
     pub is_run: bool,

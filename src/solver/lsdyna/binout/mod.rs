@@ -15,7 +15,7 @@
 //!
 //! A binout is walked record by record without its symbol tables, because a run that died has not written them. The
 //! walk only notes where records are, from 64 bytes each; then the wanted values are read. The ids of a section hold
-//! for the states written behind them, until others are written. The file has no check sums: flipped bits within a
+//! for the states written after them, until others are written. The file has no check sums: flipped bits within a
 //! value cannot be seen.
 
 mod bytes;

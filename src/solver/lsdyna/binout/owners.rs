@@ -11,7 +11,7 @@ use super::states::StateReader;
 use crate::history::EntityId;
 use crate::solver::problem::{Problem, ProblemCode};
 
-/// Values of one entity for several integration points that are told apart.
+/// Values of one entity for several integration points that are distinguished.
 const MAX_POINTS: usize = 128;
 /// Rows that one entity has in a state; a node is in so many sets of constraints at most.
 pub(super) const MAX_ROWS: usize = 20;
@@ -152,7 +152,7 @@ impl EntityList {
     }
 }
 
-/// Sums over all entities of a section (bndout, spcforc), whose number of values tells
+/// Sums over all entities of a section (bndout, spcforc), whose number of values shows
 /// nothing where there is one entity.
 fn is_total(name: &str) -> bool {
     name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")

@@ -156,7 +156,7 @@ impl<'a> SectionReader<'a> {
     ) -> io::Result<Vec<History>> {
         let (states, selection, bytes) = (&self.states, self.selection, self.bytes);
         let name = &self.section.name;
-        // Zeros of quantities that may vanish are told by the entity's other components.
+        // Zeros of quantities that may vanish are recognised by the entity's other components.
         let together = zeros::may_vanish(name);
         let read: Vec<(Vec<History>, Vec<Problem>)> = wanted
             .into_par_iter()

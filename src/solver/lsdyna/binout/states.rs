@@ -143,7 +143,7 @@ impl Timed {
     }
 
     /// Leaves out states that were written before a list of ids changed: their rows cannot be
-    /// told by one id.
+    /// recognised by one id.
     fn leave_out_before(&mut self, change: (usize, u64), section: &Section) -> Option<Problem> {
         let times = section.component("time");
         let is_behind = |state: usize| {
@@ -195,7 +195,7 @@ fn ids_of_states(component: &Component, whole: &[usize], bytes: Bytes<'_>) -> io
 }
 
 /// The ids in force when each state was written, if they changed; sections whose rows
-/// are told by more than an id are not asked.
+/// need more than an id are not checked.
 fn ids_by_order(
     section: &Section,
     whole: &[usize],

@@ -30,7 +30,7 @@ impl Context {
         }
     }
 
-    /// PRMR1 EXPRESSION1, which goes on below where the name is blank. Only one that is
+    /// PRMR1 EXPRESSION1, which continues below where the name is blank. Only one that is
     /// a plain number has a value here.
     pub(super) fn expression(&mut self, card: &Card<'_>) {
         let (field, expression) = card.id_and_text();

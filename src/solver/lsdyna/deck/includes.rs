@@ -40,7 +40,7 @@ impl<'a, 'o> Includes<'a, 'o> {
         Self { open, folders: Vec::new() }
     }
 
-    /// One name per card; " +" at the end of a card says that the name goes on below. `Some`
+    /// One name per card; " +" at the end of a card says that the name continues below. `Some`
     /// for a file that is to be read before the next card.
     pub(crate) fn file_name(
         &mut self,

@@ -28,8 +28,8 @@ pub(crate) use parameters::Value;
 
 /// Reads a deck.
 ///
-/// `open` gives the bytes of an included file by its name, or `None` when it is not there.
-/// It is asked for the name as written, then for that name in each folder of
+/// `open` gives the bytes of an included file by its name, or `None` when it is missing.
+/// It is called with the name as written, then with that name in each folder of
 /// `*INCLUDE_PATH`. Includes end 16 deep and at the 1000th.
 ///
 /// # Errors

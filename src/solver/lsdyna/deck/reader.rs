@@ -50,7 +50,7 @@ pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<
 /// A file of the deck that is being read.
 struct OpenFile<'a> {
     lines: Lines<SizeLimited<'a>>,
-    /// Format of its cards where their keyword asks for none.
+    /// Default format of its cards.
     format: Format,
     block: Option<Block>,
     /// Its name, and where in the file below on the stack it is included; `None` for the deck

@@ -37,14 +37,14 @@ pub struct Blocks {
 
 /// One component of some entities: neighbouring values of a state.
 pub struct Column {
-    /// Name of the component, as binout has it: `x_displacement`.
+    /// Name of the component, as in binout: `x_displacement`.
     pub component: String,
     /// The nodes whose values these are, in their order.
     pub entities: Vec<EntityId>,
 }
 
 impl Blocks {
-    /// `None` if the file is damaged, has too few states to tell their layout, or too few
+    /// `None` if the file is damaged, has too few states to show their layout, or too few
     /// values to be worth it: then the line reader gives what there is.
     pub(crate) fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
         let mut frame = AsciiReader::new(&super::FORMAT, &*source, selection);
