@@ -1,4 +1,4 @@
-//! The time by the clock, for what says when it was made.
+//! The current date, for files that record when they were made.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 

@@ -1,4 +1,4 @@
-//! One best guess for a name that is not known: the nearest of those that are.
+//! One best guess for an unknown name: the most similar known one.
 
 /// Least Jaro–Winkler similarity of a guess; below it a guess would mislead.
 const LEAST: f64 = 0.8;

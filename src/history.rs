@@ -1,4 +1,4 @@
-//! Histories: what a solver wrote down over time, in the solver's own units.
+//! Histories: values that a solver wrote over time, in the solver's own units.
 
 use std::fmt;
 use std::sync::Arc;

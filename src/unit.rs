@@ -1,7 +1,7 @@
 //! Units: where numbers with units enter the program and become SI.
 //!
-//! Everything inside is SI. A number typed by a user carries its unit
-//! (`36km/h`, `24t`, `0.75ms`); a solver file carries none, so a
+//! All internal values are in SI. A number typed by a user carries its unit
+//! (`36km/h`, `24t`, `0.75ms`); a solver file has none, so a
 //! [`UnitSystem`] is declared once in the study manifest.
 //!
 //! ```

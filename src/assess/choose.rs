@@ -2,8 +2,8 @@
 //!
 //! `auto` considers the models that are at or below `nearest`, `linear` and `forest` in mean force error and in mean
 //! velocity error. Of these it takes the simplest one within 10 % of the smallest force error. Speeds inside the range and
-//! its two ends are reported apart. The errors of what was chosen flatter it, so `--nested` repeats the choice without each
-//! left-out speed. For trains the ends count as the inner speeds do, and of the best models those are taken first
+//! its two ends are reported separately. The errors of the chosen model are optimistic, so `--nested` repeats the choice without each
+//! left-out speed. For trains the ends count as much as the inner speeds, and among the best models those are preferred
 //! whose force follows the closing speed.
 
 use schemars::JsonSchema;

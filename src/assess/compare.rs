@@ -1,4 +1,4 @@
-//! Comparison of the methods at a speed that is left out: the curve of each in one multi-body
+//! Comparison of the methods at a left-out speed: the curve of each in the same multi-body
 //! model, against FE.
 
 use schemars::JsonSchema;

@@ -2,7 +2,7 @@
 //!
 //! FE's own curve in a run comes from the speeds alone: between two states the mean force is the change of kinetic energy
 //! over that of deflection. A body that runs on it has FE's speeds at FE's deflections, whatever the filter. Its unloading
-//! has FE's shape, and the energy of FE's mean speed of separation over 20 ms. A recorded force swings, so what is stored
+//! has FE's shape, and the energy of FE's mean separation speed over 20 ms. A recorded force oscillates, so the stored energy
 //! is scaled by the mean force and not by the force itself.
 
 use crate::curve::body::filtered;

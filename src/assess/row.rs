@@ -1,4 +1,4 @@
-//! Rows: the motion that a method gives, rated against FE's.
+//! Rows: the motion of each method, rated against FE's.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Scatter: how far nominally equal runs lie from their mean, which no model can remove.
+//! Scatter: deviation of nominally equal runs from their mean, which no model can remove.
 
 use super::left_out::forces_n;
 use super::reference::Reference;

@@ -1,4 +1,4 @@
-//! Validation: every model at every speed that is left out, and the model that is chosen.
+//! Validation: every model at every left-out speed, and the chosen model.
 //!
 //! Each speed is left out and predicted by every model with every rule for the maximum crush, and each prediction drives
 //! the multi-body model of one mass. Accelerations are compared after CFC 60 on both sides, the class of SAE J211 for

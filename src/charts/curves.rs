@@ -1,4 +1,4 @@
-//! Force over deflection: the runs of a group, predictions, and a speed that was left out.
+//! Force over deflection: the runs of a group, predictions, and a left-out speed.
 
 use super::speed;
 use crate::assess::reference::Reference;

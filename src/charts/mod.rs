@@ -1,4 +1,4 @@
-//! What crumple's results look like: charts of curves, predictions, runs and histories.
+//! Charts of curves, predictions, runs and histories.
 //!
 //! Each function takes results and gives a [`Chart`](crate::plot::Chart); `crumple plot` writes it, the report shows it.
 //!

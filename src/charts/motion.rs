@@ -1,4 +1,4 @@
-//! A multi-body run over time: speeds, accelerations, forces, energies; and force over deflection. And
+//! A multi-body run over time: speeds, accelerations, forces, energies; force over deflection; and
 //! the speeds of a train by several methods.
 
 use crate::assess::train::TrainComparison;

@@ -1,4 +1,4 @@
-//! What `crumple inspect` says of a keyword deck.
+//! Output of `crumple inspect` for a keyword deck.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `crumple demo`: the whole flow on the bundled FE runs.
+//! `crumple demo`: the whole workflow on the bundled FE runs.
 
 use crate::error::Error;
 use std::io::{self, Write};

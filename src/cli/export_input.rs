@@ -1,4 +1,4 @@
-//! What `crumple export` is given: a predicted curve, a model, a database or another curve's file, by content.
+//! The input of `crumple export`: a predicted curve, a model, a database or another curve's file, by content.
 
 use crate::error::error;
 use std::io::Read;

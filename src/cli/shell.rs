@@ -1,4 +1,4 @@
-//! `crumple completions`, `crumple man` and the help: made from the command line's own definition.
+//! `crumple completions`, `crumple man` and the help, generated from the definition of the command line.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! `crumple validate`: every model at every speed that is left out.
+//! `crumple validate`: every model at every left-out speed.
 
 use crate::error::Error;
 use crate::plural::counted;

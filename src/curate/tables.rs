@@ -1,4 +1,4 @@
-//! Cases as CSV tables: one of the cases, and long ones of the samples of their curves.
+//! Cases as CSV tables: one of the cases, and long tables of the samples of their curves.
 
 use crate::error::Error;
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! Body force: what moves the car body, from the rate of the deflection.
+//! Body force: the force that drives the car body, from the rate of the deflection.
 
 use super::loading::{loading_branch, loading_end};
 use super::{Case, Curve, Envelope};

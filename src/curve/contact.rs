@@ -1,9 +1,9 @@
-//! Contact: when it begins in a record, and what of the record is not it.
+//! Contact: when it starts in a record, and which force pulses are not contact.
 //!
 //! Contact begins with the force pulse that holds most of the impulse, where the force crosses its threshold between two
-//! states. A record that begins in contact counts from its first state. The sign of a force is that of its impulse, which one
-//! wrong state does not turn. A body slows down two to four milliseconds after its nose has touched, so a body force takes the
-//! contact from a contact force that the recipe names (`contact`), or says that it cannot.
+//! states. A record that starts in contact counts from its first state. The sign of a force is that of its impulse, which one
+//! wrong state does not reverse. A body slows down two to four milliseconds after its nose has touched, so for a body force the
+//! start of contact is taken from a contact force named in the recipe (`contact`), or a warning is given.
 
 /// A contact force is above this share of the largest, unless the recipe says otherwise.
 pub(crate) const THRESHOLD: f64 = 0.005;

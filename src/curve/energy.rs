@@ -1,6 +1,6 @@
-//! Energy audit, and the refusal of runs whose energy or impulse cannot be.
+//! Energy audit, and the refusal of runs with an impossible energy or impulse.
 //!
-//! Refuses what no crash can be: work or impulse outside 0.67 to 1.5 of what mass and speed ask for, or a crush, speed or
+//! Refuses impossible crashes: work or impulse outside 0.67 to 1.5 times that of mass and speed, or a crush, speed or
 //! loading time of no vehicle. Units are distinguished by trying the usual systems: energy, impulse, speed and the times must all
 //! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is compared with the speed that it
 //! had reached.

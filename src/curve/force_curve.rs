@@ -1,5 +1,5 @@
-//! Force curves: what the database, models, files and NSDM give, and what multi-body runs,
-//! exports and comparisons take.
+//! Force curves: the output of database, models, files and NSDM, and the input of multi-body runs,
+//! exports and comparisons.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
 use super::{Case, Envelope, ForceKind};

@@ -1,4 +1,4 @@
-//! From a table of force over deflection to the curve of a case: with times as of an FE record,
+//! From a table of force over deflection to the curve of a case: with times like an FE record,
 //! without them by the motion that the table itself implies.
 //!
 //! **Without times** the maximum deflection of the table is taken as the maximum crush. A body

@@ -1,8 +1,8 @@
-//! The motion of a body that a table of force over deflection stops and throws back.
+//! The motion of a body that is stopped and thrown back by a table of force over deflection.
 //!
 //! Speeds follow from the work of the piecewise linear force and are exact at every state. Times
 //! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
-//! stands still.
+//! is at rest.
 
 use super::{ForceKind, Masses};
 use crate::error::{Error, error};

@@ -1,9 +1,9 @@
-//! Stopped mass: how much of the moved mass a crush zone has stopped at each deflection.
+//! Stopped mass: how much of the moving mass a crush zone has stopped at each deflection.
 //!
 //! A crush zone comes to rest from its tip on. Contact force and body speed alone determine by momentum
 //! `m_s = M − (M v₀ − J)/v` with the impulse `J = ∫F dt` at each deflection, as long as `v` is not small.
 //! All runs of a group share one `λ = dm_s/dd`, constant between nodes, by least squares with smoothing. It
-//! is not negative, and nowhere so large that the crush force `F − λv²` would pull.
+//! is not negative, and never so large that the crush force `F − λv²` would become tensile.
 
 use serde::{Deserialize, Serialize};
 

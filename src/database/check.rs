@@ -1,5 +1,5 @@
-//! Checking a database file: every dataset is read, and what is stored twice or follows from
-//! the curves is compared with each other.
+//! Checking a database file: every dataset is read, and values that are stored twice or follow from
+//! the curves are compared with each other.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Writing a database over a file into which others have put something: a copy of the file is
-//! edited and, after it was read back and nothing of theirs is missing, renamed into place. So
+//! Rewriting a database file that contains objects of other programs: a copy of the file is
+//! edited, read back to check that none of them is missing, and renamed into place. So
 //! their links, types and attributes stay as they were encoded.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};

@@ -1,4 +1,4 @@
-//! What others have put into a database file.
+//! Objects of other programs in a database file.
 
 use std::collections::{BTreeSet, HashSet};
 use std::fmt;

@@ -1,5 +1,5 @@
-//! Attributes of a group: its cases in order, and the mass that its crush zone stops, which follows from
-//! them and is written anew with each change.
+//! Attributes of a group: its cases in order, and the stopped mass of its crush zone, which follows from
+//! them and is rewritten with each change.
 
 use std::collections::HashMap;
 

@@ -1,7 +1,7 @@
 //! Curve database: cases in HDF5, by group and impact speed.
 //!
 //! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
-//! writes what it is made of. A file is always written whole and renamed into place,
+//! writes its parts. A file is always written as a whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 //!
 //! ```
@@ -16,7 +16,7 @@
 //!
 //! let database = Database::read(&path)?;
 //! for case in database.cases("lead-car-wall") {
-//!     // The curve takes up the impact's energy.
+//!     // The curve absorbs the energy of the impact.
 //!     assert!((case.quality.audit.ratio() - 1.0).abs() < 0.06, "{}", case.id.name);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())

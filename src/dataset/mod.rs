@@ -1,4 +1,4 @@
-//! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
+//! Data sets: the cases of a group, checked and converted into tables {v, d, …} → F.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashSet};

@@ -1,4 +1,4 @@
-//! Files: read only where they are files, and up to a bound; written so that a reader sees the
+//! Files: only regular files are read, up to a size limit; written so that a reader sees the
 //! old content or the new, never half of it.
 
 mod lock;

@@ -1,7 +1,7 @@
-//! Trees, and many rows through them: nodes packed, several rows in step.
+//! Trees, and the evaluation of many rows: packed nodes, several rows in step.
 //!
-//! Predictions of many rows go tree by tree, packed into 16 bytes a node. Rows walk in the order of the first tree's leaves,
-//! because neighbours take nearly the same ways in every tree: 32 of them go as one while their ranges lie on one side of the
+//! Many rows are predicted tree by tree, packed into 16 bytes per node. Rows walk in the order of the first tree's leaves,
+//! because neighbours take nearly the same paths in every tree: 32 of them go as one while their ranges lie on one side of the
 //! thresholds, then eight in step. Sums are taken in the order of the trees, so the bits are those of one row by itself.
 
 use linfa::Float;

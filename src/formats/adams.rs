@@ -1,7 +1,7 @@
 //! Adams: a spline as View command (`.cmd`), Solver statement (`.adm`) or spring property file (`.spr`).
 //!
 //! Adams interpolates by Akima's or cubic splines, so kinks are fenced with points; beyond the ends linear extrapolation is
-//! asked for. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
+//! requested. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
 
 use super::text::{Lines, nine_digits, title};
 use super::thin::for_splines;

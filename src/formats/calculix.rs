@@ -1,6 +1,6 @@
 //! CalculiX and Abaqus: `*SPRING, NONLINEAR`, elastic, alone or in an input of one mass on the spring.
 //!
-//! CalculiX 2.20 takes at most 200 rows and is silently wrong with more, so the curve is thinned to that at equal energy.
+//! CalculiX 2.20 accepts at most 200 rows and is silently wrong with more, so the curve is thinned to that at equal energy.
 
 use super::lsdyna::InUnits;
 use super::text::{Lines, nine_digits};

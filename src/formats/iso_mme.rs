@@ -1,7 +1,7 @@
 //! ISO-MME: a folder of channels over time, of a recorded case or of a multi-body run; SI.
 //!
 //! Layout: ISO/TS 13499, version 1.6. `NAME.mme` describes the test, `Channel/NAME.chn` lists the channels, and
-//! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value a line.
+//! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value per line.
 
 use super::text::nine_digits;
 use super::{Exported, Options};

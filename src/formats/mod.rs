@@ -1,7 +1,7 @@
-//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] takes them
+//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] reads them
 //! back.
 //!
-//! What all targets share stands once: the curve made ready ([`ExportCurve`]), its tail, thinning, softening, numbers and
+//! Shared by all targets: the prepared curve ([`ExportCurve`]), its tail, thinning, softening, numbers and
 //! titles as text.
 
 mod adams;

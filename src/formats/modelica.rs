@@ -1,8 +1,8 @@
 //! Modelica: a self-contained package with the spring and its memory (`.mo`), or a CombiTable text (`.txt`); SI.
 //!
 //! The package needs no library: the law is the one of [`ForceLaw`](crate::multibody::ForceLaw) with a straight unloading
-//! line, its tables are constants of the package. Memory: the maximum deflection is a discrete variable that moves while
-//! the deflection falls (`when v < 0`); on the way up the force is that of the loading branch.
+//! line, its tables are constants of the package. Memory: the maximum deflection is a discrete variable that is updated while
+//! the deflection decreases (`when v < 0`); during loading the force is that of the loading branch.
 
 use crate::error::{Error, error};
 use std::fmt::Write;

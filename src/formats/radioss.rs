@@ -2,7 +2,7 @@
 //!
 //! Layout: Radioss reference guide. TYPE4 takes compression in the third quadrant. Hardening flag 2
 //! (uncoupled): after the crush the spring unloads with K1 and has no force in tension, where isotropic
-//! hardening (1) would pull. The solver takes the smaller of the curve and a line of K1 (OpenRadioss,
+//! hardening (1) would cause tension. The solver takes the smaller of the curve and a line of K1 (OpenRadioss,
 //! `redef3.F`), so K1 is at least the steepest rise.
 
 use super::lsdyna::InUnits;

@@ -1,14 +1,14 @@
-//! What an exported curve does beyond the maximum crush of its own impact.
+//! Continuation of an exported curve beyond the maximum crush of its own impact.
 //!
-//! A train crushes an end further than the same vehicle alone does, and most tools end a table with an error, with a held
-//! force or with the last slope. The rule, in three steps:
+//! A train crushes an end further than a single vehicle does, and most tools end a table with an error, a constant
+//! force or the last slope. The rule, in three steps:
 //!
 //! 1. If faster runs show how the force continues (the curve comes from a model), it follows them, at the level with
-//!    which the curve ends. Else the force goes within 5 % of the maximum crush to the mean over the curve's last tenth, if
+//!    which the curve ends. Otherwise the force changes within 5 % of the maximum crush to the mean over the curve's last tenth, if
 //!    that is more than its last force, and stays there.
-//! 2. At 1.5 times the maximum crush, or where the faster runs end, the structure is taken as fully crushed.
-//! 3. From there the force rises with the unloading stiffness (a steeper rise would change how tools unload that take the
-//!    steepest rise for it) to three times the curve's largest force.
+//! 2. At 1.5 times the maximum crush, or where the faster runs end, the structure is assumed to be fully crushed.
+//! 3. From there the force rises with the unloading stiffness (a steeper rise would change the unloading of tools that use the
+//!    steepest rise for it) to three times the curve's peak force.
 
 use crate::curve::Envelope;
 use crate::error::Error;

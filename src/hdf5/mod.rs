@@ -1,6 +1,6 @@
-//! HDF5: the one room that names the crate hdf5-pure, and what is built on it for all others.
+//! HDF5: the only module that uses the crate hdf5-pure, with everything built on it for the others.
 //!
-//! The names below are all that the program uses of that crate: a replacement has to offer
+//! The names below are all that the program uses of that crate: a replacement has to provide
 //! these.
 
 pub(crate) mod skeleton;

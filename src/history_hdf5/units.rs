@@ -1,4 +1,4 @@
-//! Units of components, by their names as binout has them.
+//! Units of components, by their names as in binout.
 
 use crate::unit::{UnitSystem, named_or};
 

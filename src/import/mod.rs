@@ -1,7 +1,7 @@
 //! Adding curves of files to a database: each becomes a case of the study `IMPORTED`.
 //!
 //! All files are read, and all cases made, before anything is written; the database is locked
-//! meanwhile, and written whole.
+//! meanwhile, and written as a whole.
 
 mod case;
 mod said;

@@ -1,4 +1,4 @@
-//! What was found put into words: each value of a proposal with where it is from.
+//! The findings in words: each value of a proposal with its source.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

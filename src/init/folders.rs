@@ -1,4 +1,4 @@
-//! The folders of a proposal: which hold runs, how they are called, where they are seen from the
+//! The folders of a proposal: which contain runs, their names, and their paths relative to the
 //! study.
 
 use std::collections::{BTreeMap, HashSet};

@@ -1,7 +1,7 @@
-//! Proposals: a study from run folders, and a scenario from models, with where each value is from.
+//! Proposals: a study from run folders, and a scenario from models, with the source of each value.
 //!
-//! Nothing is made up: a value is read, computed from what was read, or the likely one of several,
-//! and says so; what cannot be found is left to fill in.
+//! Nothing is invented: a value is read, computed from what was read, or the most likely of several,
+//! and says so; unknown values are left to fill in.
 
 mod agree;
 mod describe;

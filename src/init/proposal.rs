@@ -1,4 +1,4 @@
-//! A proposed study: every value with where it is from.
+//! A proposed study: every value with its source.
 
 use std::path::PathBuf;
 

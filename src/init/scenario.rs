@@ -1,5 +1,5 @@
-//! From models to a proposed scenario: vehicles with the models' masses meet at a speed that the
-//! models were trained for.
+//! From models to a proposed scenario: vehicles with the models' masses meet at a speed for which the
+//! models were trained.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

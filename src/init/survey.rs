@@ -1,8 +1,8 @@
-//! A run looked over: in which direction it moves, which bodies it has, which nodes could stand
-//! for them, and which forces could have moved them.
+//! Survey of a run: in which direction it moves, which bodies it has, which nodes could represent
+//! them, and which forces could have moved them.
 //!
-//! A node stands for a body if its velocity follows the force's impulse, `∫F dt = m Δv`: what lies
-//! in the crush zone is stopped first and then shakes, and what is not part of the body does not
+//! A node represents a body if its velocity follows the impulse of the force, `∫F dt = m Δv`: nodes
+//! in the crush zone are stopped first and then vibrate, and nodes outside the body do not
 //! follow at all. A force is the one between two bodies if some node follows it; a contact within
 //! a body is followed as well, but has a smaller impulse than what acts on the body from outside.
 

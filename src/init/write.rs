@@ -1,4 +1,4 @@
-//! A proposed study as TOML, every value with a comment that says where it is from.
+//! A proposed study as TOML, every value with a comment that states its source.
 
 use serde::Serialize;
 

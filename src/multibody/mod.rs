@@ -8,7 +8,7 @@
 //! use crumple::curve::Envelope;
 //! use crumple::multibody::{Body, Chain, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading, simulate};
 //!
-//! // 24 t at 10 m/s against a wall, on a spring of 40 MN/m that gives all back: crush v √(m/k).
+//! // 24 t at 10 m/s against a wall, on an elastic spring of 40 MN/m: crush v √(m/k).
 //! let curve = Envelope::new(vec![0.0, 1.0], vec![0.0, 40e6])?;
 //! let law = ForceLaw::new(curve, Unloading::Elastic, EnvelopeEnd::Hold);
 //! let bodies = vec![Body::new("car", 24e3, 10.0)];

@@ -1,4 +1,4 @@
-//! Forces that follow speeds: dampers, the rate of crush zones, and mass that is stopped on the way.
+//! Forces that follow speeds: dampers, the rate effect of crush zones, and stopped mass.
 
 use std::sync::Arc;
 

@@ -2,11 +2,11 @@
 //!
 //! The reference method of the literature on train crashes, besides prescribed curves: one mass with
 //! `m x'' + c(|x'|) x' + k(|x|) x = 0`, `x(0) = 0`, `x'(0) = v₀`. `k` is continuous and
-//! piecewise linear with 10 segments up to the reference's largest displacement, `c` with 5
+//! piecewise linear with 10 segments up to the reference's maximum displacement, `c` with 5
 //! segments up to its impact speed. The 30 node values and positions are found by a genetic
-//! algorithm and a simplex search behind it; see [`fit`]. What the law gives at another speed
-//! is [`Nsdm::run`]; as spring and damper stand in for each other, fit with several seeds
-//! and look at their [`Identifiability`].
+//! algorithm followed by a simplex search; see [`fit`]. The motion at another speed
+//! is [`Nsdm::run`]; since spring and damper can replace each other, fit with several seeds
+//! and check their [`Identifiability`].
 //!
 //! ```
 //! use crumple::nsdm::{FitSettings, Target, fit};

@@ -1,4 +1,4 @@
-//! How far fits of several seeds lie apart: whether their parameters mean anything.
+//! Spread of fits with several seeds: whether their parameters are meaningful.
 
 use serde::Serialize;
 

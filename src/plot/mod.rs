@@ -1,7 +1,7 @@
 //! Charts: axes, series, bands and a legend, as SVG and PNG of one drawing.
 //!
-//! A [`Chart`] says what is shown. [`Chart::drawing`] places it: every line, and every text with the size that its
-//! font gives it. The two writers only spell that drawing, so both pictures show the same. The font is part of the
+//! A [`Chart`] defines the content. [`Chart::drawing`] lays it out: every line, and every text with the size that its
+//! font gives it. Both writers only output that drawing, so both pictures show the same. The font is part of the
 //! program; system fonts and platform functions are not used, so the bytes are the same everywhere.
 //!
 //! ```

@@ -1,4 +1,4 @@
-//! Rating: every measure of how far a prediction is from its reference.
+//! Rating: all measures of the difference between a prediction and its reference.
 //!
 //! Two signals over time are filtered on request, brought to common times at 10 kHz, and rated by
 //! all measures at once. Whatever the unit of the values, both have the same.

@@ -1,4 +1,4 @@
-//! What the report says of a group: its runs, how good predictions are, a prediction, the methods.
+//! The report on a group: its runs, the accuracy of predictions, a prediction, the methods.
 
 use super::figure::Figure;
 use super::page::{energy, force, mass, metres, percent, signed_percent};

@@ -1,7 +1,7 @@
 //! The report: one HTML page about a database and the runs made with it.
 //!
-//! The page needs nothing else: styles, script and numbers are inside, and it may not reach anywhere (`default-src
-//! 'none'`). Every picture stands in it as SVG; the script gives it values under the pointer and zoom. Without the script,
+//! The page is self-contained: styles, script and numbers are inside, and it may not load anything (`default-src
+//! 'none'`). Every picture is embedded as SVG; the script adds values under the pointer and zoom. Without the script,
 //! tables and pictures remain.
 
 mod figure;

@@ -1,4 +1,4 @@
-//! What the report says of a scenario: motion, crush and energy of its run, and the comparison with FE's train.
+//! The report on a scenario: motion, crush and energy of its run, and the comparison with FE's train.
 
 use std::path::Path;
 

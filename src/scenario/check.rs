@@ -1,4 +1,4 @@
-//! Checks that a single key cannot show: a scenario as written becomes a [`CheckedScenario`].
+//! Checks across several keys: a scenario as written becomes a [`CheckedScenario`].
 
 use std::borrow::Cow;
 use std::collections::HashSet;

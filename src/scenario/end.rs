@@ -1,7 +1,7 @@
 //! Ends of vehicles from models: crush force, rate and stopped mass at one end, and the plates
 //! that meet.
 //!
-//! Models count speed and deflection against a wall, or of two equal ends together. An end takes
+//! Models give speed and deflection against a wall, or of two equal ends together. An end takes
 //! half of the deflection of two, twice their reduced stopped mass, and twice their stiffness.
 
 use std::sync::Arc;

@@ -1,11 +1,11 @@
 //! Interface-local speeds: curves for the speed at which each interface closes itself.
 //!
-//! The interfaces inside a train close far more slowly than the trains meet. What an interface
-//! closes at depends on the curves of all, so both are sought together, by iteration.
+//! The interfaces inside a train close far more slowly than the trains meet. The closing speed of an interface
+//! depends on all curves, so both are determined together, by iteration.
 //!
 //! Local speeds are a fixed point: curves for the present speeds; a run; each interface's largest closing speed up to the
 //! first peak of its force; and again, until none changes by 0.1 m/s. Models are used beyond their maximum crush here,
-//! because neighbours push on; the closing speed that rate effects follow is then zero.
+//! because neighbours keep pushing; the closing speed that rate effects follow is then zero.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Springs: what a curve's source gives at one interface, and the force law made of it.
+//! Springs: the curve of a source at one interface, and its force law.
 
 use super::layout::{Connection, Role};
 use super::{CurveSource, CurveTable as Table, LawName};

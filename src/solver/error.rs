@@ -1,6 +1,6 @@
-//! Selections compared with what a file has.
+//! Selections checked against the content of a file.
 //!
-//! Errors are about a key that callers know to answer: `format` if no reader knows the file, `deck` for a
+//! Errors name a key that callers can handle: `format` if no reader knows the file, `deck` for a
 //! keyword deck, `ids[k]` and `component` for what was selected and is missing.
 
 use std::path::Path;

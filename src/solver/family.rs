@@ -1,4 +1,4 @@
-//! Which files make up one: the continuations of a binary file, a run's several binouts, the histories of its restarts.
+//! Which files belong together: the continuations of a binary file, a run's several binouts, the histories of its restarts.
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
 //! Solver files: from bytes to [`History`](crate::history::History).
 //!
 //! A reader takes a [`Source`] and a [`Selection`], returns a [`SolverFile`], and treats
-//! damage as part of the result ([`Problem`]): complete states are returned, what is
-//! missing is named. It never prints, panics, or holds more than was selected.
+//! damage as part of the result ([`Problem`]): complete states are returned, missing
+//! parts are named. It never prints, panics, or holds more than was selected.
 //!
 //! ```
 //! use crumple::solver::{Selection, read};

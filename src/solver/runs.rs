@@ -1,4 +1,4 @@
-//! Run folders: which folders below one hold solver files, and which files of a folder those are.
+//! Run folders: which folders below one contain solver files, and which files those are.
 
 use std::collections::HashSet;
 use std::fs;

@@ -1,8 +1,8 @@
 //! Where bytes come from: files, memory maps and memory, read at a position.
 //!
-//! Plain reading is the default, because the file of a run that is still going may grow or
+//! Plain reading is the default, because the file of a running job may grow or
 //! shrink at any time: a plain read then ends early, while the access to a map beyond the
-//! end of its file kills the process. What is written after the opening is missing for a
+//! end of its file kills the process. Data written after opening are ignored by a
 //! reader: its end would move while it reads, and half a line would be followed by another.
 
 use std::fs::File;

@@ -1,6 +1,6 @@
-//! Zeros that look like an overwritten part of a binary file, which has no check sums.
+//! Zeros that look like an overwritten part of a binary file, which has no checksums.
 //!
-//! One value, or all of one entity's, may be zero in one state by physics: a node stands on
+//! One value, or all of one entity's, may be zero in one state for physical reasons: a node rests on
 //! a wall, a contact is lost. So only several values next to each other are named.
 
 use std::collections::HashMap;

@@ -1,4 +1,4 @@
-//! What of a study manifest only the whole shows.
+//! Checks of a study manifest across several keys.
 
 use std::collections::HashSet;
 

@@ -1,22 +1,22 @@
-//! Bands: how far FE curves lay from the model at speeds it had not seen.
+//! Bands: deviation of FE curves from the model at speeds it was not trained on.
 //!
 //! The half width is Student's t times the root mean square of the left-out residuals, relative to the local level of
 //! the force. (A pointwise quantile of two to five residuals would be their largest and promise more than they can.)
 //! Neighbouring residuals of a curve belong to one fold and are one observation; its folds are several. So t has the
 //! degrees of freedom of the stretches over which a curve's residuals are alike. The band that must hold a whole curve
-//! has those of the curves, and so have bands outside the training speeds, where a whole curve drifts away. Each says on
-//! how many curves it rests.
+//! has those of the curves, and so have bands outside the training speeds, where a whole curve drifts away. Each states on
+//! how many curves it is based.
 //!
-//! A speed that is left out opens a gap about twice as wide as a query finds. So residuals are divided by the power 0.65
+//! Leaving out a speed opens a gap about twice as wide as a query encounters. So residuals are divided by the power 0.65
 //! of their gap, and the band is the result times the same power of the query's gap: the distance between the two
-//! training speeds around it; at a training speed, the wider of the two gaps beside it. A left-out speed lies in the
+//! training speeds around it; at a training speed, the wider of the two adjacent gaps. A left-out speed lies in the
 //! middle of its gap, so it does not show how fast errors decrease towards the gap's ends.
 //!
-//! Where speeds have several runs, their scatter is a part of its own: what a single run differs from the mean of its
-//! like by no gap can change. A left-out residual is that of interpolation plus the scatter of the runs it is measured
-//! against, of n the n-th part, which is taken off its square; the half width is the root of the squares of both parts.
+//! If speeds have several runs, their scatter is a separate part: the deviation of a single run from the mean of its
+//! kind does not depend on the gap. A left-out residual is that of interpolation plus the scatter of the runs it is measured
+//! against (for n runs the n-th part), which is subtracted from its square; the half width is the root of the squares of both parts.
 //!
-//! The declared force and the body force have a band each, made in the same way of their own residuals and scatter.
+//! The declared force and the body force each have a band, from their own residuals and scatter.
 //!
 //! Outside the training speeds, the band is based on the two left-out ends, in proportion to the distance. Further outside than
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,

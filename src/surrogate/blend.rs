@@ -1,10 +1,10 @@
 //! How much of each run goes into a value at another impact speed.
 //!
-//! The values of the runs are taken for a smooth function of the impact speed with noise, a Gaussian
+//! The values of the runs are modelled as a smooth function of the impact speed with noise, a Gaussian
 //! process of unknown mean (ordinary kriging: Rasmussen and Williams, Gaussian Processes for Machine
-//! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that stands out from the others does so by a fold of its
-//! own, which its neighbours in speed need not have. The residual of a run fades with
-//! the square of the nearness in speed, so that at its own speed a run comes out as it is.
+//! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that deviates from the others does so by an individual
+//! fold, which need not occur at neighbouring speeds. The residual of a run fades with
+//! the square of the proximity in speed, so that at its own speed a run is reproduced exactly.
 
 use super::curves::neighbours;
 use crate::signal::Cholesky;

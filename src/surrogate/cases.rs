@@ -1,4 +1,4 @@
-//! What a model keeps of its training cases, and their curves by force.
+//! The data that a model keeps of its training cases, and their curves by force.
 
 use serde::{Deserialize, Serialize};
 

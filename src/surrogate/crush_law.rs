@@ -1,14 +1,14 @@
 //! Crush law: one law behind the contact force and the body force of a group.
 //!
-//! A crush zone is stopped from its tip on. With `m_s(d)` the mass that has been stopped,
-//! `λ = dm_s/dd` and `u` the speed of the body against what has been stopped,
+//! A crush zone comes to rest from its tip on. With `m_s(d)` the stopped mass,
+//! `λ = dm_s/dd` and `u` the speed of the body relative to the stopped mass,
 //! - the crush force `F_f = Q(d; v) (1 + β√u)` acts between crush zone and body,
-//! - the contact feels `F_c = F_f + λ u²`, by the momentum of what is being stopped,
+//! - the contact force is `F_c = F_f + λ u²`, with the momentum of the mass being stopped,
 //! - the body moves by `(M − m_s) dv/dt = −F_f`.
 //!
 //! The stopped mass is that of [`StoppedMass`]. Of the β that makes the `Q` of neighbouring speeds most
-//! alike where they overlap, half is taken, as by the model `rate`. What this leaves of their levels is put
-//! down to the impact speed, as `1 + γ√v`; freed of it, the `Q` of the runs are blended (`blend.rs`).
+//! alike where they overlap, half is taken, as in the model `rate`. The remaining differences in level are attributed
+//! to the impact speed, as `1 + γ√v`; divided by it, the `Q` of the runs are blended (`blend.rs`).
 //!
 //! The same equations hold in the closing coordinates of two equal bodies, with the reduced mass.
 

@@ -1,6 +1,6 @@
 //! `crush-law`: contact force and body force from one law of stopped mass, rate and impact speed.
 //!
-//! The other models fit the two forces one by one. Here both follow from [`CrushLaw`]: the contact feels
+//! The other models fit the two forces separately. Here both follow from [`CrushLaw`]: the contact force is
 //! `F_f + λu²`, the body moves as one mass under `F_f M/(M − m_s)`.
 
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What the table of models says of each.
+//! The entries of the table of models.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What leave-one-speed-out finds: errors of a model at speeds it was not trained on.
+//! Results of leave-one-speed-out: errors of a model at speeds it was not trained on.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! Maximum crush as a function of impact speed: four rules, and their spread.
 //!
 //! Four rules: a cubic spline over the speeds, a monotone interpolation, the kinetic energy, and the motion: where the
-//! body's force stops the body. `energy` solves the same on the declared force, which as a contact force takes up the
+//! body force stops the body. `energy` solves the same with the declared force, which as a contact force absorbs the
 //! energy too early (W/E in `db ls`). A model uses the rule with the smallest errors of crush and energy when speeds were
 //! left out, never the spline, which need not be monotone; `--paper` uses the spline.
 

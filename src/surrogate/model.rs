@@ -1,4 +1,4 @@
-//! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
+//! Models: a surrogate fitted to a group, with everything needed to predict and to assess it.
 
 use std::sync::Arc;
 

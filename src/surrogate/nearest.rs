@@ -1,4 +1,4 @@
-//! `nearest` (FDRM): the one FE curve measured at the nearest speed, used as it is.
+//! `nearest` (FDRM): the FE curve at the nearest speed, unchanged.
 
 use std::sync::Arc;
 

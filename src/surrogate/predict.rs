@@ -1,17 +1,17 @@
-//! Prediction in stages: query → motion of the body → the declared force and the maximal
+//! Prediction in stages: query → motion of the body → the declared force and the maximum
 //! crush by every rule → the curve to one of them, with its audit and warnings.
 //!
 //! Order of work: body force → motion u(d) → maximum crush → declared force at these speeds → band → audit. The motion
-//! is what makes `rate` more than an interpolation.
+//! makes `rate` more than an interpolation.
 //!
 //! A model has two forces. The **declared** one is the recipe's: it is exported and compared along FE's crush. The
-//! **body's**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), moves a body of one mass. FE's own
-//! contact force in a one-mass model misses FE's velocity by 1.7 to 2.9 % in the mean of a group, because the crush zone
+//! **body force**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), drives a body of one mass. FE's own
+//! contact force in a one-mass model misses FE's velocity by 1.7 to 2.9 % on average over a group, because the crush zone
 //! stops part of the mass early.
 //!
-//! Unloading: FE curves begin with a flank far steeper than the line of the rebound. One stiffness for both would have
-//! to be the steep one (else a deflection creates energy) and would lose most of the rebound. A predicted curve has one
-//! stiffness per force, from its maximum crush, which gives the measured speed of separation (`rebound`). The body force
+//! Unloading: FE curves begin with a rise far steeper than the line of the rebound. One stiffness for both would have
+//! to be the steep one (otherwise a deflection creates energy) and would lose most of the rebound. A predicted curve has one
+//! stiffness per force, from its maximum crush, which gives the measured separation speed (`rebound`). The body force
 //! of the bundled runs rises less steeply than that, so tools with one constant get the rebound and create no energy.
 //! Exports take the body force by default and also state its steepest rise.
 

@@ -1,4 +1,4 @@
-//! The predicted curve: the master format of exports, and what can be made of it.
+//! The predicted curve: the master format of exports, and its conversions.
 
 use std::collections::BTreeMap;
 

@@ -1,15 +1,14 @@
 //! `rate`: a force that depends on deflection and on the speed at that deflection.
 //!
-//! `F = Q(d; v) (1 + β√ḋ)`: the training curves are divided by the factor of their own falling speed, blended linearly
-//! over the speed, and multiplied by the factor of the query's own motion.
+//! `F = Q(d; v) (1 + β√ḋ)`: the training curves are divided by the factor of their own decreasing speed, blended linearly
+//! over speed, and multiplied by the factor of the motion of the query.
 //!
-//! Why β√ḋ: strain rate and the inertia of folds both raise the force, less than in proportion to the speed. The root
-//! lies between the power 1/4 of Cowper and Symonds and 1. Why half of the β that fits best: two runs that overlap also
-//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot separate these causes
-//! apart.
+//! Why β√ḋ: strain rate and the inertia of folds both raise the force, less than proportionally to speed. The root
+//! lies between the power 1/4 of Cowper and Symonds and 1. Why half of the best-fit β: overlapping runs also
+//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot separate these causes.
 //!
 //! Tried in prototypes and dropped, because none was better on the bundled runs: a Gaussian process over {d, v} and over
-//! {d, v, ḋ}; blending in √v, log v and v²; more than two neighbours; carrying a slower curve on for longer.
+//! {d, v, ḋ}; blending in √v, log v and v²; more than two neighbours; extending a slower curve further.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Spikes: points of a predicted force that stand alone as none of a training curve does.
+//! Spikes: isolated points of a predicted force that no training curve has.
 
 use super::Model;
 use crate::error::{Error, error};

@@ -1,4 +1,4 @@
-//! The journal of a run: CSV beside the output, taken up again where it ends, renamed or
+//! The journal of a run: CSV next to the output, resumed where it ends, renamed or
 //! converted when it is complete.
 
 use std::ffi::OsString;

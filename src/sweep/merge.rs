@@ -1,4 +1,4 @@
-//! Files of shards: their head, and how all are joined.
+//! Files of shards: their headers, and how they are joined.
 
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Read, Write};

@@ -1,4 +1,4 @@
-//! A row of results as numbers and as a line of CSV, and what stands above the rows.
+//! A row of results as numbers and as a line of CSV, and the header above the rows.
 
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What the variables of a plan do to a scenario.
+//! The effect of a plan's variables on a scenario.
 
 use serde::Serialize;
 

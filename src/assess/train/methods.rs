@@ -1,4 +1,4 @@
-//! The methods in a train: what each makes of the scenario and its sources.
+//! The methods in a train: scenario and sources of each.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `crumple db`: look into a curve database, and curate it. One file for commands that belong
+//! `crumple db`: show and edit a curve database. One file for commands that belong
 //! together.
 
 mod add;

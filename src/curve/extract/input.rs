@@ -1,4 +1,4 @@
-//! What an extraction starts from: the run's histories, and what the manifest says of it.
+//! The input of an extraction: the run's histories, and its settings in the manifest.
 
 use crate::curve::Masses;
 use crate::curve::recipe::{Filter, RecordedMotion, Sampling};

@@ -1,4 +1,4 @@
-//! Where contact begins in a record.
+//! Start of contact in a record.
 
 use super::error::ExtractError;
 use super::from_contact::FromContact;

@@ -1,4 +1,4 @@
-//! The archive of an FMU: which file lies where.
+//! The archive of an FMU and the places of its files.
 
 use crate::error::{Error, error};
 use std::io::{Cursor, Write};

@@ -1,8 +1,8 @@
 //! FMUs: a force law as a component for any tool that imports FMI 2.0 or 3.0, by model exchange or by
-//! co-simulation. Of all exports they alone carry the whole law with its memory.
+//! co-simulation. They are the only exports with the complete law and its memory.
 //!
 //! The component is written in C (`c/`) and compiled when crumple is built. One binary serves both
-//! versions; an export writes the curve into a marked block of it, so that nobody needs a compiler.
+//! versions; an export writes the curve into a marked block of it, so that users need no compiler.
 //! The same sources go into the archive, with the curve as a C file.
 
 mod archive;

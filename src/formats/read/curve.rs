@@ -1,4 +1,4 @@
-//! A curve as in its file, in SI, with what the file says of it.
+//! A curve as in its file, in SI, with the metadata of the file.
 
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};

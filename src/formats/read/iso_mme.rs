@@ -1,9 +1,9 @@
 //! Curve of an ISO-MME test (ISO/TS 13499): a channel of displacement and one of force over time.
 //!
-//! A channel file has lines `name :value`, then one value a line. Characters 13 and 14 of its
+//! A channel file has lines `name :value`, then one value per line. Characters 13 and 14 of its
 //! channel code are the dimension: `DS` for displacement, `FO` for force, `TI` for time. With the implicit
 //! reference channel, or without any, times are the time of the first sample and multiples of the interval, in s;
-//! with an explicit one they are the values of the channel that `Reference channel name` says.
+//! with an explicit one they are the values of the channel named by `Reference channel name`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! Which columns of a table hold what: by their headers, by a row of units below, by the title, or as the user has named
-//! them.
+//! The meaning of the columns of a table: by their headers, by a row of units below, by the title, or as named by
+//! the user.
 
 use super::ColumnNames;
 use super::columns::LISTED;

@@ -1,11 +1,11 @@
-//! Curves of other tools: one file per format, each giving a [`ReadCurve`] in SI that says what
-//! was taken how.
+//! Curves of other tools: one file per format, each giving a [`ReadCurve`] in SI that states how
+//! it was read.
 //!
 //! **Units** are those of the column's header (`d_mm`, `Force [kN]`), of a comment
 //! (`units: mm-t-s`), or those that are given ([`ReadOptions::units`]); without any, a file is
 //! refused. **Comments** `key: value` that our own exports write give force kind, speed, speed
 //! kind, mass and unloading stiffness. **Signs**: compression becomes positive. **Points** that
-//! repeat the one before, and guard points (below zero deflection with no force; the last force
+//! repeat the previous one, and guard points (below zero deflection with no force; the last force
 //! repeated equally far beyond the end) are removed. Each of these leaves a note.
 
 mod columns;

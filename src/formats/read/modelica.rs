@@ -1,7 +1,7 @@
 //! Curve of a Modelica table file: `#1`, then `double name(rows,columns)` and the values.
 //!
 //! Values are separated by blanks, tabs, commas or semicolons, wherever lines end; `#` begins a
-//! comment. The first two columns are deflection and force. Units stand in a comment of the
+//! comment. The first two columns are deflection and force. Units are in a comment of the
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;

@@ -1,6 +1,6 @@
 //! Curve of a Radioss deck: a function `/FUNCT/id`.
 //!
-//! After the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. A
+//! The keyword is followed by a title and points of two fields of 20 columns; the next keyword ends them. A
 //! `/MOVE_FUNCT/id` scales and then shifts the function of that number. Lines that begin with `#` or `$` are
 //! comments. Units are those of a comment (`units: mm-t-s`) or of `/BEGIN`, where
 //! the fourth line has mass, length and time, by name or by their size in SI.

@@ -1,11 +1,11 @@
 //! Tables of numbers in a text: titles, a header, a row of units, rows; or curves of two columns, one after the other.
 //!
-//! The header is the first line that names what is looked for and after which a row of as many numbers follows, with or
-//! without a row of units between; else the first line above such a row. Columns are separated by tabs, semicolons,
+//! The header is the first line that names the required columns and is followed by a row with the same number of values, with or
+//! without a row of units in between; otherwise the first line above such a row. Columns are separated by tabs, semicolons,
 //! commas or blanks, whichever gives the header and the row below it the same number of fields. Lines that begin with
 //! `#` or `$` are comments.
 //!
-//! Curves of two columns stand below titles and labels: of four lines the second is the x axis and the third the y axis,
+//! Curves of two columns follow below titles and labels: of four lines the second is the x axis and the third the y axis,
 //! else those that name a quantity; without any, the last comment may name both. `CONTINUE` or `endcurve` ends a curve,
 //! and another may follow; `NAME #pts=N` begins one of a `Curveplot` file, whose labels are those of all its curves.
 

@@ -1,4 +1,4 @@
-//! One interface on its law: which branch it is on, and what leaving a piece leads to.
+//! One interface on its law: its current branch, and what happens when it leaves a segment.
 
 use super::super::law::{Branch, ForceLaw, Piece};
 

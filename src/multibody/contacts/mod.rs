@@ -1,7 +1,7 @@
-//! Contacts: all interfaces of a chain side by side, each on one straight piece of its law.
+//! Contacts: all interfaces of a chain side by side, each on one linear segment of its law.
 //!
 //! A step's forces are one pass of multiply-adds over arrays; only an interface that has left
-//! its piece is looked at by itself.
+//! its segment is treated separately.
 
 mod contact;
 mod work;

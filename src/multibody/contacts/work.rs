@@ -1,4 +1,4 @@
-//! Work of the contacts, which only outputs and corrections ask for: exact from the laws' tables.
+//! Work of the contacts, needed only for outputs and corrections: exact from the laws' tables.
 
 use super::super::law::{OnEnvelope, Piece};
 use super::super::rows::{LANES, LaneIndex, Row, Rows, each, larger};

@@ -1,4 +1,4 @@
-//! Events: what happens where an interface leaves its piece within a step.
+//! Events: corrections where an interface leaves its segment within a step.
 
 use super::super::contacts::{Direction, Move, StepPoint};
 use super::super::recorder::Moment;

@@ -1,4 +1,4 @@
-//! Fixed steps over a chain: velocity Verlet, and a scheme of fourth order.
+//! Fixed steps over a chain: velocity Verlet, and a fourth-order scheme.
 //!
 //! Where an interface goes from one piece of its law to another within a step, the quadrature
 //! misses some of the impulse and of its moment. Both follow from the law's tables (`events.rs`):
@@ -19,8 +19,8 @@
 //! the difference of two works is their rounding, and the correction is skipped. Where a deflection turns, its top is the
 //! vertex of the parabola through the step's start; memory has no error of the step.
 //!
-//! Velocity Verlet is the default: it takes every law, and everyone knows it. The scheme of fourth order (Chin's 4A: two
-//! forces and a gradient, which a piecewise linear law gives at no cost) takes up to 35 times the step with errors of about
+//! Velocity Verlet is the default: it works with every law and is well known. The fourth-order scheme (Chin's 4A: two
+//! forces and a gradient, which a piecewise linear law gives at no cost) takes steps up to 35 times as long with errors of about
 //! 1e-6 m/s, for forces that do not depend on speeds.
 //!
 //! Known limit: vehicles that touch without closing, behind a curve that begins above 0, chatter, and every method needs

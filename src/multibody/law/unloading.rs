@@ -1,4 +1,4 @@
-//! Unloading of a law: what of the work done on the envelope comes back, and along which branch.
+//! Unloading of a law: which part of the work done on the envelope is returned, and along which branch.
 
 use super::{EnvelopeEnd, ForceLaw, OnEnvelope, Unloading};
 use crate::curve::{CurveUnloading, ForceCurve};

@@ -1,17 +1,17 @@
-//! The frame all LS-DYNA ASCII readers share: header, legend, then the file's own body.
+//! The frame shared by all LS-DYNA ASCII readers: header, legend, then the body of the file.
 //!
-//! # How a state of a text file is found
+//! # How states of a text file are found
 //!
-//! This module reads header and legend, and hands every other line to the file's own `Body`. The body recognises
+//! This module reads header and legend, and passes every other line to the `Body` of the file. The body recognises
 //! lines and says where their fields are. `solver/states` collects rows into states, parses only the selected
-//! fields, and decides whether a state is whole. A body never counts lines, because the number of blank lines
+//! fields, and decides whether a state is complete. A body never counts lines, because the number of blank lines
 //! differs between versions.
 //!
-//! - A state begins when the time changes, or when a row's entity is already there. (Times have six digits, so two
+//! - A state begins when the time changes, or when the entity of a row is already present. (Times have six digits, so two
 //!   states may print the same one.)
 //! - A row without labels must have the width that its id requires. So a row that is cut or shifted cannot pass for
 //!   another number.
-//! - Where labels stand (`label_values`), a number is what is between its label and the next one. It must be whole;
+//! - In rows with labels (`label_values`), a number is the text between its label and the next one. It must be complete;
 //!   labels and widths may differ between releases.
 //! - A legend that is not closed ends at the first line of the body.
 

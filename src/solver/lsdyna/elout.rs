@@ -7,7 +7,7 @@
 //! `_ip2`, and so on, those of details with `_point1` or `_node7`. Elements may erode: their values
 //! are then NaN. Each kind of element has a block of its own in a state.
 //!
-//! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
+//! Rows may come and go, because elements erode; missing values are NaN. Their number is limited, so that damage
 //! that looks like erosion cannot fill the memory.
 
 use super::ascii::{self, Body};

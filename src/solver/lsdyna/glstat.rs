@@ -1,7 +1,7 @@
 //! `glstat`: energies and other quantities of the whole model, one labelled line each.
 //!
-//! A state is label → value, and labels may be absent. A cut removes them from the end, so a last state that ends
-//! early is not whole. What stands between the labels and is not known to stand there is counted.
+//! A state is label → value, and labels may be absent. Truncation removes them from the end, so a last state that ends
+//! early is incomplete. Unexpected text between the labels is counted.
 
 use super::ascii::{self, Body, Skipped};
 use super::dotted::split;

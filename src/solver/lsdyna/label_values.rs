@@ -1,6 +1,6 @@
 //! Rows of labels and numbers (`xforce=   1.0000E+00   yforce= …`): where the numbers are.
 //!
-//! A number is what stands between its label and the next one, so that a label that comes or
+//! A number is the text between its label and the next one, so that a label that comes or
 //! goes with a release, and a gap of another width, change nothing. Within one file widths stay:
 //! once numbers fill their usual columns, one that does not has lost some of its digits.
 

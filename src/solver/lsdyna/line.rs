@@ -1,4 +1,4 @@
-//! Lines, columns and Fortran numbers: what all LS-DYNA ASCII files are made of.
+//! Lines, columns and Fortran numbers, common to all LS-DYNA ASCII files.
 
 use std::io::{self, BufRead};
 

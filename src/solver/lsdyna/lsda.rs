@@ -1,7 +1,7 @@
 //! LSDA: the container of binout. Header, records and paths; no meaning of content.
 //!
-//! Records are walked in order and symbol tables skipped: a run that died has no last table,
-//! so nothing may depend on one. Where a record makes no sense, the walk continues at the next
+//! Records are walked in order and symbol tables skipped: a run that terminated early has no last table,
+//! so nothing may depend on one. After an invalid record, the walk continues at the next
 //! record that changes to an absolute path.
 
 use std::io;

@@ -1,6 +1,6 @@
 //! `rbdout`: motion of rigid bodies in global and in local directions.
 //!
-//! Never seen with data; read as the source of LSTC's converter `l2a` writes it.
+//! Never tested with real data; read as the source of LSTC's converter `l2a` writes it.
 
 use super::ascii::{self, Body};
 use super::label_values::{Widths, numbers};

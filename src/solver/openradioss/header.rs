@@ -1,4 +1,4 @@
-//! Records of a T01, and its header: what there are histories of.
+//! Records of a T01, and its header, which lists the histories.
 
 use std::io::{self, BufRead, Read};
 

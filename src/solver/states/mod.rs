@@ -1,7 +1,7 @@
-//! Collects rows into states and keeps only whole states of selected histories.
+//! Collects rows into states and keeps only complete states of selected histories.
 //!
 //! A file is a sequence of states; a state is one row per entity in one or more tables
-//! (`nodout` has two: translations and rotations). The first whole state fixes the
+//! (`nodout` has two: translations and rotations). The first complete state fixes the
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 

@@ -1,4 +1,4 @@
-//! Rows of the same components, and the histories that become of them.
+//! Rows of the same components, and the histories built from them.
 
 use std::collections::HashMap;
 use std::sync::Arc;

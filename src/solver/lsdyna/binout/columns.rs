@@ -1,4 +1,4 @@
-//! From records, a row of entities each, to histories, a column of states each.
+//! From records (rows of entities) to histories (columns of states).
 
 use std::collections::HashMap;
 use std::ops::Range;

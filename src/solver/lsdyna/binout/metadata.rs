@@ -1,4 +1,4 @@
-//! What a section says of itself: title, version, ids, sides, titles of entities.
+//! Metadata of a section: title, version, ids, sides, titles of entities.
 
 use std::collections::HashMap;
 use std::io;

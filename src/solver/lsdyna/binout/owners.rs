@@ -1,4 +1,4 @@
-//! Whom the values of a component belong to.
+//! The entities to which the values of a component belong.
 
 use std::collections::{HashMap, HashSet};
 use std::io;

@@ -1,4 +1,4 @@
-//! One section: what it says of itself, and its selected histories.
+//! One section: its metadata and its selected histories.
 
 use std::collections::{HashMap, HashSet};
 use std::io;

@@ -1,4 +1,4 @@
-//! The whole states of a section, in order of their numbers, and the ids of each.
+//! The complete states of a section, in order of their numbers, and the ids of each.
 
 use std::collections::{HashMap, HashSet};
 use std::io;

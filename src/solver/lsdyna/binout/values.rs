@@ -1,4 +1,4 @@
-//! The values of one component over the whole states, a history for each entity.
+//! The values of one component over the complete states, a history for each entity.
 
 use std::io;
 use std::sync::Arc;

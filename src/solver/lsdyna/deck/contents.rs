@@ -1,4 +1,4 @@
-//! What a deck says of its run, and the speed that follows from it.
+//! The metadata of a run in its deck, and the resulting speed.
 
 use super::parameters::Value;
 use crate::solver::problem::Problem;

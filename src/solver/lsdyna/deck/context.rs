@@ -1,4 +1,4 @@
-//! What is known of a deck while its cards are read: its contents so far, its parameters, the
+//! State of reading a deck: its contents so far, its parameters, the
 //! files that are open, and its problems.
 
 use super::card::{Card, Field};

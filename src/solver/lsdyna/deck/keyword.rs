@@ -1,4 +1,4 @@
-//! Keyword lines: names, options, and the card format they ask for.
+//! Keyword lines: names, options, and the card format they select.
 
 use nom::IResult;
 use nom::Parser;

@@ -1,7 +1,7 @@
 //! LS-DYNA keyword decks: the metadata that names and sizes a run; not its mesh.
 //!
 //! Cards as in the LS-DYNA Keyword User's Manual, Volume I. A deck is read in one pass:
-//! a parameter holds for the cards below it, an include is read where it stands. Keywords
+//! a parameter applies to the cards below it, an include is read in place. Keywords
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;

@@ -1,4 +1,4 @@
-//! Reads a deck card by card, its includes where they stand.
+//! Reads a deck card by card, with includes in place.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, Read};

@@ -1,16 +1,16 @@
 //! States of a nodout that repeat the layout of the one above them: found by arithmetic,
 //! verified, and read without going through their lines.
 //!
-//! Every state with the same nodes has the same number of bytes. What stands around its
+//! Every state with the same nodes has the same number of bytes. The text around its
 //! rows (blank lines, state line, column line) must equal the state above but for cycle and
 //! time, and the id columns of the first and last row of each block must equal theirs; where
-//! all rows are read, those of all rows. At the first surprise the line reader continues.
+//! all rows are read, those of all rows. At the first irregularity the line reader continues.
 //!
 //! The layout is learned from a state that was read by lines. Of each further state this module verifies the state
 //! line, the column lines, the blank lines, and the ids of the first and last row (of all rows where all are read);
-//! then it takes the wanted rows. Batches of states are parsed in parallel and handed on in order. At the first
-//! surprise the line reader takes that state, and leaping continues after it. `tests/stride.rs` holds both ways against
-//! each other, on whole and on damaged files.
+//! then it takes the selected rows. Batches of states are parsed in parallel and passed on in order. At the first
+//! irregularity the line reader takes that state, and skipping continues after it. `tests/stride.rs` compares both ways
+//! on intact and on damaged files.
 
 use std::io;
 
