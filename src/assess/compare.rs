@@ -32,7 +32,7 @@ pub(crate) struct Comparison {
     pub mass_kg: f64,
     /// From contact to 30 ms after FE's maximum deflection, as far as the record reaches.
     pub window_s: f64,
-    /// Largest force of FE's record, in N.
+    /// Peak force of FE's record, in N.
     #[serde(rename = "reference_peak_force_N")]
     pub reference_peak_force_n: f64,
     /// Maximum deflection of FE's record, in m.

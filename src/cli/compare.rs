@@ -193,7 +193,11 @@ fn cells(row: &Row) -> Vec<String> {
     let score = |rating: &Rating| {
         rating.iso18571.map_or("-".to_string(), |iso| format!("{:.3}", iso.rating))
     };
-    let factor = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.3e}"));
+    let factor = |f: Option<f64>| match f {
+        None => "-".into(),
+        Some(f) if (0.01..1e3).contains(&f) => format!("{f:.2}"),
+        Some(f) => format!("{f:.1e}"),
+    };
     let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
     vec![
         row.method.clone(),

@@ -424,6 +424,12 @@ fn milliseconds(time_s: f64) -> String {
     format!("{} ms", (time_s * 1e9).round() / 1e6)
 }
 
+/// Five significant digits.
+fn digits(value: f64) -> String {
+    let decimals = (4.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// The lines of the table: measure, value, and what belongs to it.
 fn rows(rating: &Rating) -> Vec<[String; 3]> {
     let percent = |ratio: f64| format!("{:.2} %", ratio * 100.0);
@@ -438,9 +444,9 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
     let left_out = rating.pointwise.map(|p| format!("{} left out", percent(p.left_out)));
     row("pointwise", rating.pointwise.map(|p| percent(p.mean)), left_out.unwrap_or_default());
     let at = format!("at {}", milliseconds(rating.max_abs.time_s));
-    row("max_abs", Some(format!("{:.5}", rating.max_abs.value)), at);
+    row("max_abs", Some(digits(rating.max_abs.value)), at);
     for (number, peak) in rating.peaks.iter().enumerate() {
-        let at = format!("of {:.5} at {}", peak.value, milliseconds(peak.time_s));
+        let at = format!("of {} at {}", digits(peak.value), milliseconds(peak.time_s));
         let (value, more) = match (peak.error, peak.shift_s) {
             (Some(error), Some(shift_s)) => {
                 let word = if shift_s < 0.0 { "earlier" } else { "later" };
@@ -469,7 +475,7 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
     row("CORA", rating.cora.map(|c| score(c.rating)), parts.unwrap_or_default());
     if let Some(of) = rating.deceleration {
         let both = |value: fn(&Deceleration) -> Option<f64>| {
-            let number = |of: &Deceleration| or_dash(value(of).map(|v| format!("{v:.5}")));
+            let number = |of: &Deceleration| or_dash(value(of).map(digits));
             (Some(number(&of.prediction)), format!("reference {}", number(&of.reference)))
         };
         let (value, more) = both(|d| d.mean);

@@ -37,7 +37,7 @@ pub(crate) struct Difference {
     /// ∫F dd up to it, in J.
     #[serde(rename = "work_J")]
     pub work_j: f64,
-    /// Largest force, in N.
+    /// Peak force, in N.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
     /// Difference of the speed.
@@ -48,7 +48,7 @@ pub(crate) struct Difference {
     pub max_deflection_difference: f64,
     /// Difference of the work.
     pub work_difference: f64,
-    /// Difference of the largest force.
+    /// Difference of the peak force.
     pub peak_force_difference: f64,
     /// Deflection up to which both have a loading branch, in m.
     pub common_deflection_m: f64,

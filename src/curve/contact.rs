@@ -9,11 +9,11 @@
 pub(crate) const THRESHOLD: f64 = 0.005;
 /// Before the crossing the force is gone where it is below this share of the threshold.
 const GONE: f64 = 0.1;
-/// Spells of force closer than this belong together: a nose plate may bounce.
+/// Force pulses closer than this belong together: a nose plate may bounce.
 const PAUSE_S: f64 = 0.010;
 /// A first piece of the contact with less than this share of its impulse may be noise.
 const SMALL_SHARE: f64 = 1e-3;
-/// Spells before the contact that are named one by one.
+/// Pulses before the contact that are listed individually.
 const NAMED: usize = 3;
 
 /// The force above which a record is in contact: a share of its largest.
@@ -29,7 +29,7 @@ pub(crate) struct Onset {
     /// From the last state without force to the first in contact, in s; `None` if the record
     /// begins in contact.
     pub interval_s: Option<f64>,
-    /// What the user should look at: spells before the contact, and a doubtful beginning.
+    /// What the user should check: pulses before the contact, and a doubtful start.
     pub warnings: Vec<String>,
 }
 
@@ -43,7 +43,7 @@ struct Spell {
     largest_n: f64,
 }
 
-/// The onset of the spell that holds most of the impulse; `None` if the force never exceeds the
+/// The onset of the pulse that holds most of the impulse; `None` if the force never exceeds the
 /// threshold.
 ///
 /// `time_s`: increasing, in s; `force_n`: as many values, in N, not filtered (a filter without
@@ -99,7 +99,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
     Some(Onset { time_s: crossing_s, interval_s, warnings })
 }
 
-/// Spells of states above the threshold; those less than `pause_s` apart are one.
+/// Pulses: states above the threshold; those less than `pause_s` apart are one.
 fn spells(time_s: &[f64], force_n: &[f64], threshold_n: f64, pause_s: f64) -> Vec<Spell> {
     let mut spells: Vec<Spell> = Vec::new();
     let last = time_s.len() - 1;

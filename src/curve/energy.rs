@@ -95,7 +95,7 @@ impl ImpossibleRun {
     }
 }
 
-/// What an energy or impulse that cannot be likely comes from.
+/// The likely cause of an impossible energy or impulse.
 #[derive(Debug, Clone, PartialEq)]
 enum Cause {
     /// Units as which it would fit.
@@ -106,7 +106,7 @@ enum Cause {
     RecordedSpeed(String),
     /// Speed, deck or files of another run, as text with its speed.
     OtherRun(String),
-    /// A factor of two, with the mass that impulse and speeds ask for, as text.
+    /// A factor of two, with the mass that impulse and speeds imply, as text.
     Half(String),
     /// A factor of four, likewise.
     OneBody(String),
@@ -165,7 +165,7 @@ impl Cause {
 impl StatedConditions<'_> {
     /// Work and impulse against the impact's, over the loading branch. A record that ends
     /// while loading is compared with the speed that it has reached; without recorded speeds
-    /// there is nothing to hold it against.
+    /// there is nothing to compare it with.
     pub(crate) fn balance(&self) -> EnergyBalance {
         let end = loading_end(self.curve);
         let mass = self.masses.effective_kg();
@@ -180,7 +180,7 @@ impl StatedConditions<'_> {
         let impulse_ns: f64 = (1..=end).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1])).sum();
         let lost_ns = self.closing_m_per_s.zip(self.recorded_m_per_s);
         let lost_ns = lost_ns.map(|(closing, first)| mass * (first - closing[end]));
-        // Next to nothing may be off by any factor: a record cut right after contact.
+        // Tiny values may be off by any factor: a record cut right after contact.
         let ratio = |is: f64, lost: f64, whole: f64| (lost > 0.1 * whole).then(|| is / lost);
         let recorded = self.recorded_m_per_s.unwrap_or(v);
         EnergyBalance {
@@ -189,7 +189,7 @@ impl StatedConditions<'_> {
         }
     }
 
-    /// Refuses what no crash can be, with the likely cause.
+    /// Refuses impossible crashes, with the likely cause.
     pub(crate) fn check(&self) -> Result<EnergyBalance, ImpossibleRun> {
         let balance = self.balance();
         let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);

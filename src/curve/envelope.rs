@@ -161,7 +161,7 @@ impl Envelope {
         (1..self.force_n.len()).map(slope).fold(0.0, f64::max)
     }
 
-    /// Largest force, in N.
+    /// Peak force, in N.
     pub fn peak_force_n(&self) -> f64 {
         self.force_n.iter().copied().fold(0.0, f64::max)
     }

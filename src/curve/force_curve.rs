@@ -26,7 +26,7 @@ pub struct ForceCurve {
     pub data_end_m: Option<f64>,
 }
 
-/// What is known of a curve's unloading from its maximum deflection.
+/// The known unloading of a curve from its maximum deflection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CurveUnloading {
     /// Nothing.
@@ -56,7 +56,7 @@ pub(crate) enum ForceCurveError {
 }
 
 impl ForceCurve {
-    /// A curve of which nothing else is known.
+    /// A curve without further data.
     pub(crate) fn bare(loading: Envelope) -> Self {
         Self {
             loading,
@@ -69,7 +69,7 @@ impl ForceCurve {
         }
     }
 
-    /// A force that moves bodies of one mass, and of which nothing else is known.
+    /// A force that drives bodies of one mass, without further data.
     pub(crate) fn of_body(loading: Envelope) -> Self {
         Self { kind: Some(ForceKind::Body), ..Self::bare(loading) }
     }

@@ -28,7 +28,7 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     )
 }
 
-/// What an error of the extraction says of a table, which has no recipe.
+/// The message of an extraction error for a table, which has no recipe.
 fn of_table(error: ExtractError) -> Error {
     match error {
         ExtractError::ImpossibleRun(found) => impossible_table(found),
@@ -52,7 +52,7 @@ fn of_table(error: ExtractError) -> Error {
 /// The curve of a table under an impact.
 ///
 /// # Errors
-/// It says what cannot be, and what to change.
+/// It names what is impossible, and what to change.
 pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     // As many of everything as there are deflections, so that no index is out of bounds.
     let deflection = table.deflection_m.len();

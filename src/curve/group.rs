@@ -25,7 +25,7 @@ const LEAST_CORRELATION: f64 = 0.5;
 /// Something unusual in a case compared with the others: its name, a code and words.
 pub(crate) type Remark = (String, &'static str, String);
 
-/// What is odd in a group. `cases`: readable, of one group, by speed.
+/// Unusual cases of a group. `cases`: readable, of one group, by speed.
 pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     let mut all = copies(cases);
     all.extend(titles(cases));

@@ -109,7 +109,7 @@ impl Curve {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum ForceKind {
-    /// What the obstacle feels: wall, contact side, section.
+    /// The force on the obstacle: wall, contact side, section.
     Contact,
     /// Mass times acceleration of the body.
     Body,
@@ -224,7 +224,7 @@ impl EnergyAudit {
 }
 
 /// What a case was built from, by the names in the manifest at that time: a case that was renamed
-/// since, here or there, is known by it.
+/// since, here or there, is recognised by it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// Path of the study's manifest from the root on, as given.
@@ -282,11 +282,11 @@ pub struct Quality {
     pub audit: EnergyAudit,
     /// What the extraction did beyond the manifest.
     pub notes: Vec<String>,
-    /// What the user should look at before trusting the case.
+    /// What the user should check before trusting the case.
     pub warnings: Vec<String>,
 }
 
-/// Where a case comes from, and the words that users gave it.
+/// Where a case comes from, and its tags and notes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     /// The recipe and the run's entry, as JSON.
@@ -302,9 +302,9 @@ pub struct Provenance {
     pub built_utc: Option<String>,
     /// What it was built from; `None` if from a file, and in databases before version 3.
     pub origin: Option<Origin>,
-    /// Words that users gave it, in alphabetical order, each once.
+    /// Users' tags, in alphabetical order, each once.
     pub tags: Vec<String>,
-    /// What users noted of it, in their order.
+    /// Users' notes, in their order.
     pub user_notes: Vec<String>,
 }
 
@@ -353,7 +353,7 @@ impl Case {
         self.curves.original.deflection_m[self.loading_end()]
     }
 
-    /// Largest force of the original states, in N: contact or body force, as in the recipe.
+    /// Peak force of the original states, in N: contact or body force, as in the recipe.
     pub fn peak_force_n(&self) -> f64 {
         self.curves.original.force_n.iter().copied().fold(0.0, f64::max)
     }

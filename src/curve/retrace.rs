@@ -36,7 +36,7 @@ pub struct Impact {
     pub body_unloading_stiffness_n_per_m: Option<f64>,
     /// Units in which the table's values were read, to find the cause of errors.
     pub units: UnitSystem,
-    /// Take the table whatever its energy says.
+    /// Accept the table whatever its energy.
     pub accept_energy: bool,
 }
 

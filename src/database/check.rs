@@ -15,7 +15,7 @@ use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
 use crate::signal::interpolate;
 
-/// Something to look at before a case is trusted.
+/// Something to check before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Finding {
     /// Group of the case.
@@ -194,7 +194,7 @@ impl Findings<'_> {
         }
     }
 
-    /// Holds what is stored against what follows from the curves.
+    /// Compares stored values with those that follow from the curves.
     fn case(&mut self, found: &FoundCase) -> Result<(), Error> {
         let FoundCase { case, attributes, hashes } = found;
         let content = Content::of(case)?;

@@ -15,7 +15,7 @@ use crate::error::{Error, error};
 use crate::file::write_by_path;
 use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Group};
 
-/// Writes a database over the file at `path` with all that others have put into it, which is
+/// Writes a database over the file at `path` with all objects of other programs in it, which is
 /// `before`: into a copy of the file, in which only what differs is changed, and which then takes
 /// its place.
 pub(super) fn write_keeping(
@@ -121,7 +121,7 @@ impl Moves {
         Self { gone, groups, cases, all }
     }
 
-    /// Where something of others is afterwards.
+    /// Where objects of other programs are afterwards.
     fn of_item(&self, item: &Item) -> Item {
         let rest = item.place.split_once('/').map_or("", |(_, rest)| rest);
         let place = match (item.case().and_then(|case| self.all.get(&case)), item.group()) {
@@ -311,7 +311,7 @@ fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditErro
     Ok(())
 }
 
-/// Writes the datasets of a case anew, with the attributes that others have given them.
+/// Rewrites the datasets of a case, with the attributes added by other programs.
 fn replace_curves(case: &Group, content: &Content<'_>) -> Result<(), EditError> {
     for (path, values) in &content.datasets {
         // Absent in files of earlier versions.

@@ -30,12 +30,12 @@ pub(crate) const OLDEST: i64 = 2;
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
 /// Group of a case with the curve at the solver's rate.
 pub(crate) const ORIGINAL: &str = "original";
-/// Attribute of a case with the BLAKE3 hashes of what it holds.
+/// Attribute of a case with the BLAKE3 hashes of its content.
 pub(crate) const HASHES: &str = "hashes";
 /// Name, among the hashes, of the one over the attributes.
 pub(crate) const ATTRIBUTES: &str = "attributes";
 
-/// Everything that is written of a case, before it is anywhere.
+/// Everything that is written for a case, before it is written.
 pub(crate) struct Content<'a> {
     /// In the order in which they are written and hashed.
     pub attributes: Vec<(&'static str, AttrValue)>,
@@ -46,7 +46,7 @@ pub(crate) struct Content<'a> {
 /// The dataset of the force that moves the body, which follows from the closing speed.
 pub(crate) const BODY_FORCE: &str = "body_force_N";
 
-/// Every attribute that a case can have; what else it has is others'.
+/// Every attribute that a case can have; others belong to other programs.
 pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
     "study",
     "speed_m_per_s",

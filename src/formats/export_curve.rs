@@ -201,7 +201,7 @@ impl ExportCurve {
         self.other_mass_kg().map_or(mass, |other| mass * other / (mass + other))
     }
 
-    /// Speed of separation over impact speed, as the target unloads from the maximum crush.
+    /// Separation speed over impact speed, as the target unloads from the maximum crush.
     pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
@@ -220,14 +220,14 @@ impl ExportCurve {
         ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
     }
 
-    /// Speed of separation over impact speed in crumple's own runs, whose curve is not softened.
+    /// Separation speed over impact speed in crumple's own runs, whose curve is not softened.
     pub fn own_restitution(&self) -> f64 {
         let end_n = self.predicted.force_n.last().copied().unwrap_or_default();
         let stored_j = 0.5 * end_n * end_n / self.stiffness_n_per_m();
         self.restitution_of(stored_j)
     }
 
-    /// Speed of separation over impact speed, from the energy in J that comes back.
+    /// Separation speed over impact speed, from the energy in J that comes back.
     fn restitution_of(&self, stored_j: f64) -> f64 {
         (2.0 * stored_j / self.effective_mass_kg()).sqrt() / self.predicted.speed_m_per_s
     }

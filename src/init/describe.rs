@@ -202,7 +202,7 @@ fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
     (proposed, cut)
 }
 
-/// What the user should look at.
+/// What the user should check.
 fn doubts(measured: &Measured<'_>, warnings: &mut Vec<String>) {
     let agreed = measured.agreed;
     if agreed.force.is_some() && agreed.residual > FOLLOWS {

@@ -42,7 +42,7 @@ pub struct Proposal {
     pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
     pub(crate) notes: Vec<String>,
-    /// What the user should look at.
+    /// What the user should check.
     pub(crate) warnings: Vec<String>,
 }
 

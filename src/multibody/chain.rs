@@ -91,7 +91,7 @@ pub struct Interface {
     pub stopping: Option<Stopping>,
 }
 
-/// A law on the extension beyond the distance at which the bodies stand at first.
+/// A law on the extension beyond the initial distance of the bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tension {
     /// Force over the extension.
@@ -231,7 +231,7 @@ impl Chain {
         Ok(())
     }
 
-    /// What is wrong with the rate or the crush zone of an interface.
+    /// Error in the rate or the crush zone of an interface.
     fn crush_fault(&self, interface: &Interface) -> Option<&'static str> {
         let bodies = self.bodies.len();
         if let Some(rate) = &interface.rate {

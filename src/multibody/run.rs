@@ -150,7 +150,7 @@ pub struct InterfaceHistory {
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,
-    /// Speed of separation over speed of approach at the interface, once it has opened again.
+    /// Separation speed over speed of approach at the interface, once it has opened again.
     /// `None` below 0.1 m/s of approach, and above 1: where contacts repeat or neighbours push.
     pub restitution: Option<f64>,
 }

@@ -82,7 +82,7 @@ fn runs(group: &str, cases: &[Case]) -> Table {
         "run",
         &format!("{kind} speed"),
         "mass",
-        "largest force",
+        "peak force",
         "maximum crush",
         "work",
         "work / energy",
@@ -252,7 +252,7 @@ impl Validated<'_> {
         let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
-            ("largest force".into(), force(peak)),
+            ("peak force".into(), force(peak)),
             ("maximum crush".into(), metres(curve.max_deflection_m)),
             ("energy of the curve".into(), energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),

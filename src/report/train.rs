@@ -121,7 +121,7 @@ fn interfaces(prepared: &Prepared, run: &Run) -> Table {
     let rows = row.collect();
     let heading = [
         "interface",
-        "largest force",
+        "peak force",
         "maximum crush",
         "at",
         "energy lost",

@@ -29,7 +29,7 @@ pub struct ModelCase {
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Speed of separation after the body force has first fallen to zero.
+    /// Separation speed after the body force has first fallen to zero.
     #[serde(default)]
     pub rebound_speed_m_per_s: Option<f64>,
     /// Warnings of its build.

@@ -18,7 +18,7 @@ use crate::unit::Speed;
 const SAME_MASS: f64 = 1e-3;
 /// Share of a curve over which the force before its maximum crush is averaged.
 const LAST_SHARE_OF_CRUSH: f64 = 0.05;
-/// Power of that force with which the speed of separation goes: the energy returned with its root.
+/// Power of that force with which the separation speed goes: the energy returned with its root.
 const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 
 /// A query to a model.
@@ -195,7 +195,7 @@ impl<'a> ResolvedQuery<'a> {
     }
 }
 
-/// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
+/// The separation speed: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
 /// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
 /// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
 /// the root lies between. The residual of a run fades with the square of the proximity in speed.

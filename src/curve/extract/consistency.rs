@@ -15,7 +15,7 @@ use crate::unit::Shown;
 /// time; a clock that is 10 ms off makes it 11 to 45 %.
 const IMPULSE: f64 = 0.08;
 /// Displacement and the integral of the velocity differ by 0.02 % of the range in clean runs, by
-/// 0.07 % where only each 6 ms are written.
+/// 0.07 % where only every 6 ms are written.
 const DISPLACEMENT: f64 = 0.005;
 /// A force after the contact counts from this share of the peak on, and from this share of the
 /// momentum.
@@ -273,7 +273,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// Whether the output interval is short enough for the curve, by what it would be without each second
+/// Whether the output interval is short enough for the curve, by what it would be without every second
 /// state; and what the recipe's common times make of it.
 pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     let mut remarks = Notes::default();

@@ -5,7 +5,7 @@ use crate::curve::energy;
 use crate::error::Error;
 use crate::signal::cfc;
 
-/// Why a run gives no curve.
+/// Reasons why a run has no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExtractError {
     /// A history has fewer than two states.
@@ -18,7 +18,7 @@ pub enum ExtractError {
         /// Number of its states.
         states: usize,
     },
-    /// A value is infinite or no number.
+    /// A value is not a finite number.
     #[error(
         "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
     )]

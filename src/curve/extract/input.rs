@@ -25,13 +25,13 @@ pub struct Measured<'a> {
 
 /// The force, or what makes it.
 pub enum MeasuredForce<'a> {
-    /// What the obstacle feels.
+    /// The force on the obstacle.
     Contact(&'a History),
     /// Acceleration or velocity of the body's node, to be multiplied by its mass.
     Body(&'a History, RecordedMotion),
 }
 
-/// What the manifest says of a run.
+/// Settings of a run in the manifest.
 #[derive(Clone, Debug)]
 pub struct Setup<'a> {
     /// Of the force.
@@ -49,9 +49,9 @@ pub struct Setup<'a> {
     pub manifest_speed_m_per_s: Option<f64>,
     /// Of the run, if its deck gives it.
     pub deck_speed: Option<DeckSpeed>,
-    /// Share of the largest force above which a record is in contact.
+    /// Share of the peak force above which a record is in contact.
     pub contact_threshold: f64,
-    /// What the run's entry says of its record.
+    /// Settings of the record in the run's entry.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.
     pub others: &'a [(String, f64)],

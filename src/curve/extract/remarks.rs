@@ -1,11 +1,11 @@
 //! Notes and warnings on a run.
 
-/// Choices that were made, and what the user should look at.
+/// Choices that were made, and what the user should check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Notes {
     /// Choices made, for the record.
     pub notes: Vec<String>,
-    /// What the user should look at.
+    /// What the user should check.
     pub warnings: Vec<String>,
 }
 

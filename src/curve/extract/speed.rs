@@ -9,7 +9,7 @@ use crate::unit::{Speed, km_per_h};
 /// Two speeds of one impact may differ by this share before it is reported.
 const SAME_SPEED: f64 = 0.01;
 
-/// Who says the impact speed.
+/// Source of the impact speed.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum SpeedBy {
     Manifest,

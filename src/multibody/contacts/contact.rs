@@ -23,7 +23,7 @@ pub(super) struct Contact {
     pub peak_n: f64,
 }
 
-/// What leaving a piece led to.
+/// What happened when an interface left a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in super::super) struct Move {
     /// From no force or an unloading branch to a new maximum deflection.

@@ -12,7 +12,7 @@ pub(super) use contact::Move;
 use contact::{Contact, Stage};
 use work::Totals;
 
-/// Which state of a step is meant.
+/// Which state of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StepPoint {
     Start = 0,

@@ -146,7 +146,7 @@ impl Engine<'_> {
         self.on_wall(StepPoint::End, h / 3.0);
     }
 
-    /// Tells the recorder where forces on bodies have begun or changed their sign since the last
+    /// Notifies the recorder where forces on bodies have begun or changed their sign since the last
     /// look; `v` is `ahead_s` ahead.
     #[inline(always)]
     fn look<const N: usize>(&mut self, ahead_s: f64) {

@@ -17,7 +17,7 @@ pub(super) use pieces::{Branch, OnEnvelope, Piece};
 use unloading::{Memory, StoredBy};
 pub use unloading::{UnloadingChoice, UnloadingShape};
 
-/// What happens when the deflection falls.
+/// What happens when the deflection decreases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unloading {
     /// The envelope is followed back (the reference model, which has no memory).
@@ -95,7 +95,7 @@ impl ForceLaw {
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
     /// line of the unloading stiffness from the envelope's end.
     ///
-    /// A recorded force swings, and what a structure has stored does not swing with it.
+    /// A recorded force oscillates, but the energy stored in a structure does not.
     /// Therefore the storable energy is taken from the mean force `work/δ`, scaled to that
     /// energy at the end, and only bounded by `cδF`.
     pub fn recorded(

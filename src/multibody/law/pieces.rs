@@ -103,7 +103,7 @@ impl ForceLaw {
         }
     }
 
-    /// Largest force of the envelope's points `from..=to`.
+    /// Peak force of the envelope's points `from..=to`.
     #[inline(always)]
     pub(in super::super) fn peak_between_n(&self, from: usize, to: usize) -> f64 {
         self.envelope.force_n()[from..=to].iter().copied().fold(0.0, f64::max)

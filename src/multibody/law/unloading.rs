@@ -8,7 +8,7 @@ use crate::curve::{CurveUnloading, ForceCurve};
 pub(super) enum StoredBy {
     /// The force at the maximum deflection.
     Force,
-    /// The mean force up to there: a recorded force swings, what is stored does not.
+    /// The mean force up to there: a recorded force oscillates, the stored energy does not.
     MeanForce,
 }
 
